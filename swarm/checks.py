@@ -1,0 +1,83 @@
+"""Checks of arguments: each returns the value in its final type or raises a `SceneError` that names it."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from .errors import SceneError
+
+Vector = tuple[float, float, float]
+
+
+def number(name: str, value: Any, expected: str = "a finite number") -> float:
+    """`value` as a finite float."""
+    try:
+        if isinstance(value, (bool, str, bytes)):
+            raise TypeError
+        result = float(value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} must be {expected}, got {value!r}") from None
+    if not math.isfinite(result):
+        raise SceneError(f"{name} must be {expected}, got {result}")
+    return result
+
+
+def positive(name: str, value: Any) -> float:
+    """`value` as a finite float above zero."""
+    result = number(name, value, "a finite number above 0")
+    if result <= 0.0:
+        raise SceneError(f"{name} must be above 0, got {result:g}")
+    return result
+
+
+def at_least(name: str, value: Any, bound: float) -> float:
+    """`value` as a finite float not below `bound`."""
+    result = number(name, value, f"a finite number, {bound:g} or more")
+    if result < bound:
+        raise SceneError(f"{name} must be {bound:g} or more, got {result:g}")
+    return result
+
+
+def count(name: str, value: Any, least: int = 1) -> int:
+    """`value` as an integer not below `least`."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise SceneError(f"{name} must be a whole number, {least} or more, got {value!r}")
+    result = int(value)
+    if result < least:
+        raise SceneError(f"{name} must be {least} or more, got {result}")
+    return result
+
+
+def vector(name: str, value: Any) -> Vector:
+    """`value` as three finite floats."""
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        parts = list(value)
+    except TypeError:
+        raise SceneError(f"{name} must be three numbers, got {value!r}") from None
+    if len(parts) != 3:
+        raise SceneError(f"{name} must be three numbers, got {len(parts)}: {value!r}")
+    x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(parts))
+    return x, y, z
+
+
+def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
+    """`value` if it is one of `choices`; otherwise the error names the closest of them."""
+    known = list(choices)
+    if isinstance(value, str) and value in known:
+        return value
+    raise SceneError(f"{name} must be one of {listed(known)}, got {value!r}{closest(value, known)}")
+
+
+def closest(value: Any, known: Iterable[str]) -> str:
+    """A hint "; did you mean ...?" or nothing."""
+    found = difflib.get_close_matches(str(value), list(known), n=1, cutoff=0.5)
+    return f"; did you mean {found[0]!r}?" if found else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """'a', 'b' and 'c'."""
+    quoted = [repr(name) for name in names]
+    return " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if len(quoted) > 1 else "".join(quoted)

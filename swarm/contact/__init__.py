@@ -1,0 +1,1 @@
+"""What the methods share at a contact, and only that."""

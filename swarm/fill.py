@@ -1,0 +1,86 @@
+"""Particles at random, uniform in the admissible volume of a scene."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import checks
+from .errors import SceneError
+from .particles import Floats, Particles
+from .scene import Scene
+
+_BATCH = 1 << 18
+# Give up when so many points were tried and fewer than one in a million was admissible.
+_TRIES = 20_000_000
+
+
+def fill(
+    scene: Scene,
+    n: int,
+    *,
+    speed: float | None = None,
+    temperature: float | None = None,
+    mass: ArrayLike = 1.0,
+    seed: int = 0,
+) -> Particles:
+    """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
+
+    Args:
+        scene: its volume must be bounded.
+        n: number of particles, 1 or more.
+        speed: |v| of every particle [m/s], >= 0, in a direction uniform on the sphere; or
+        temperature: k_B T [J], >= 0: each component of v is normal with variance temperature/mass.
+        mass: one number or (n,) [kg], above 0.
+        seed: the same seed gives the same particles.
+
+    Returns:
+        The particles.
+
+    Raises:
+        SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
+            volume is open, or so thin that random points do not find it.
+
+    >>> import swarm
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> swarm.fill(cavity, 10, speed=0.5, seed=1)
+    Particles(10)
+    """
+    n = checks.count("n", n)
+    seed = checks.count("seed", seed, least=0)
+    if (speed is None) == (temperature is None):
+        came = "neither" if speed is None else "both"
+        raise SceneError(f"fill needs one of speed and temperature, got {came}")
+    if speed is not None:
+        checks.at_least("speed", speed, 0.0)
+    if temperature is not None:
+        checks.at_least("temperature", temperature, 0.0)
+    random = np.random.default_rng(seed)
+    # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
+    particles = Particles(_points(scene, n, random), np.zeros((3, n)), mass)
+    normal = random.standard_normal((3, n))
+    if speed is not None:
+        particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))
+    elif temperature is not None:
+        particles.velocity = normal * np.sqrt(temperature / particles.mass)
+    return particles
+
+
+def _points(scene: Scene, n: int, random: np.random.Generator) -> Floats:
+    low, high = (np.array(corner)[:, None] for corner in scene.bounds())
+    if not np.isfinite(high - low).all():
+        raise SceneError(
+            "fill needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or give "
+            "the particles as arrays or a CSV file"
+        )
+    points, found, tried = np.empty((3, n)), 0, 0
+    while found < n:
+        trial = low + (high - low) * random.random((3, _BATCH))
+        inside = trial[:, (scene.gaps(trial) <= 0.0).all(axis=0)][:, : n - found]
+        points[:, found : found + inside.shape[1]] = inside
+        found += inside.shape[1]
+        tried += _BATCH
+        if tried >= _TRIES and found < 1e-6 * tried:
+            raise SceneError(
+                f"fill found {found} admissible points in {tried} tries: the admissible part of the box {low.ravel()} to "
+                f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+            )
+    return points

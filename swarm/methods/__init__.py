@@ -1,0 +1,7 @@
+"""The methods by their kind in a scene file."""
+
+from .base import Method
+from .impact import Impact
+from .penalty import Penalty
+
+ALL_METHODS: dict[str, type[Method]] = {"impact": Impact, "penalty": Penalty}

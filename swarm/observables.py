@@ -1,0 +1,164 @@
+"""What is measured at a frame: arrays in, numbers out.
+
+Sums run over fixed chunks of particles in a fixed order, so they have the same bits for any number of threads.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._jit import by_type, inlined, kernel, select
+from .contact import regularisation
+from .gravity import Nothing, potential
+from .surfaces import base as surfaces
+from .surfaces import chain as walls
+
+# Particles a partial sum: a constant of the results, unlike the block size.
+CHUNK = 1024
+# Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
+_COLUMNS = 64
+
+_KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
+
+Floats = NDArray[np.float64]
+
+
+@by_type
+def contact_energy(law, chain, x, y, z):
+    """Energy stored in the walls by one particle; rigid walls (None) store none."""
+    raise NotImplementedError
+
+
+@contact_energy.register(Nothing)
+def _(law, chain, x, y, z):
+    return 0.0
+
+
+@by_type
+def _stored(chain, law, x, y, z):
+    raise NotImplementedError
+
+
+@_stored.register(walls.Chain)
+def _(chain, law, x, y, z):
+    g = surfaces.gap_of(chain.first, surfaces.inner(chain.first, x, y, z))
+    return regularisation.stored_energy(law, g) + _stored(chain.rest, law, x, y, z)
+
+
+@_stored.register(Nothing)
+def _(chain, law, x, y, z):
+    return 0.0
+
+
+@contact_energy.register(regularisation.Linear)
+@contact_energy.register(regularisation.Hertz)
+@contact_energy.register(regularisation.Power)
+def _(law, chain, x, y, z):
+    return _stored(chain, law, x, y, z)
+
+
+@by_type
+def penetration(chain, x, y, z):
+    """Largest distance outside, max(g, 0)/|grad g|, over all surfaces."""
+    raise NotImplementedError
+
+
+@penetration.register(walls.Chain)
+def _(chain, x, y, z):
+    gap = surfaces.gap_of(chain.first, surfaces.inner(chain.first, x, y, z))
+    gx, gy, gz = surfaces.gradient(chain.first, x, y, z)
+    distance = select(gap > 0.0, gap / math.sqrt(gx * gx + gy * gy + gz * gz), 0.0)
+    other = penetration(chain.rest, x, y, z)
+    return select(other > distance, other, distance)
+
+
+@penetration.register(Nothing)
+def _(chain, x, y, z):
+    return 0.0
+
+
+@inlined
+def _energy(law, chain, gravity, m, x, y, z, vx, vy, vz):
+    """Kinetic, potential and contact energy of one particle."""
+    kinetic = 0.5 * m * (vx * vx + vy * vy + vz * vz)
+    return kinetic, m * potential(gravity, x, y, z), contact_energy(law, chain, x, y, z)
+
+
+@kernel
+def start_energies(law, chain, gravity, size, state):
+    """Fill `energy` and `inverse_scale`: energy errors are relative to kinetic + contact + m |G| size at the start."""
+    position, velocity, mass = state.position, state.velocity, state.mass
+    weight = abs(potential(gravity, size, 0.0, 0.0)) + abs(potential(gravity, 0.0, size, 0.0))
+    weight += abs(potential(gravity, 0.0, 0.0, size))
+    for i in range(mass.size):
+        kinetic, fall, stored = _energy(
+            law, chain, gravity, mass[i],
+            position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i],
+        )  # fmt: skip
+        state.energy[i] = kinetic + fall + stored
+        scale = kinetic + stored + mass[i] * weight
+        state.inverse_scale[i] = 1.0 / scale if scale > 0.0 else 0.0
+
+
+@kernel
+def observe_block(law, chain, gravity, state, start, stop, partial):
+    """Partial sums and maxima of particles start to stop into partial[chunk, ROWS]; start is a chunk's start."""
+    position, velocity, mass = state.position, state.velocity, state.mass
+    energy, inverse_scale = state.energy, state.inverse_scale
+    sums = np.empty((ROWS, _COLUMNS))
+    for begin in range(start, stop, CHUNK):
+        end = min(begin + CHUNK, stop)
+        sums[:] = 0.0
+        for left in range(begin, end, _COLUMNS):
+            for j in range(min(_COLUMNS, end - left)):
+                i = left + j
+                m, x, y, z = mass[i], position[0, i], position[1, i], position[2, i]
+                vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
+                kinetic, fall, stored = _energy(law, chain, gravity, m, x, y, z, vx, vy, vz)
+                px, py, pz = m * vx, m * vy, m * vz
+                error = abs(kinetic + fall + stored - energy[i]) * inverse_scale[i]
+                depth = penetration(chain, x, y, z)
+                sums[_KINETIC, j] += kinetic
+                sums[_POTENTIAL, j] += fall
+                sums[_CONTACT, j] += stored
+                sums[_PX, j] += px
+                sums[_PY, j] += py
+                sums[_PZ, j] += pz
+                sums[_LX, j] += y * pz - z * py
+                sums[_LY, j] += z * px - x * pz
+                sums[_LZ, j] += x * py - y * px
+                sums[_ENERGY_ERROR, j] = select(error > sums[_ENERGY_ERROR, j], error, sums[_ENERGY_ERROR, j])
+                sums[_PENETRATION, j] = select(depth > sums[_PENETRATION, j], depth, sums[_PENETRATION, j])
+        # Pairwise over the columns.
+        half = _COLUMNS // 2
+        while half > 0:
+            for row in range(_ENERGY_ERROR):
+                for j in range(half):
+                    sums[row, j] += sums[row, j + half]
+            for row in range(_ENERGY_ERROR, ROWS):
+                for j in range(half):
+                    sums[row, j] = max(sums[row, j], sums[row, j + half])
+            half //= 2
+        for row in range(ROWS):
+            partial[begin // CHUNK, row] = sums[row, 0]
+
+
+def summary(partial: Floats, impacts: NDArray[np.int64], impulse: Floats) -> dict[str, Any]:
+    """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise."""
+    totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
+    kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
+    return {
+        "kinetic_energy": kinetic,
+        "potential_energy": fall,
+        "contact_energy": stored,
+        "total_energy": kinetic + fall + stored,
+        "energy_error": float(partial[:, _ENERGY_ERROR].max()),
+        "momentum": totals[_PX : _PZ + 1],
+        "angular_momentum": totals[_LX : _LZ + 1],
+        "max_penetration": float(partial[:, _PENETRATION].max()),
+        "impacts": int(impacts.sum()),
+        "impulse": impulse.sum(axis=1),
+        "unconverged": 0,
+    }

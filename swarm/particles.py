@@ -1,0 +1,140 @@
+"""Particles: struct-of-arrays state, one row a component."""
+
+import csv
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import FileError, SceneError
+
+Floats = NDArray[np.float64]
+
+_COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
+
+
+class Particles:
+    """Positions, velocities and masses of N particles.
+
+    Args:
+        position: (3, N) or (3,) [m], rows x, y, z.
+        velocity: (3, N) or (3,) [m/s].
+        mass: one number or (N,) [kg], above 0.
+
+    The arrays are copied, in C order.
+
+    Raises:
+        SceneError: wrong shapes, no particle, a value that is not finite, a mass not above 0.
+
+    >>> len(Particles([[0.0, 0.1], [0.0, 0.0], [0.0, 0.0]], np.ones((3, 2))))
+    2
+    """
+
+    def __init__(self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0) -> None:
+        self.position = _rows("position", position)
+        self.velocity = _rows("velocity", velocity)
+        n = self.position.shape[1]
+        if self.velocity.shape[1] != n:
+            raise SceneError(f"velocity must have the shape of position, (3, {n}), got {self.velocity.shape}")
+        masses = _array("mass", mass)
+        if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
+            raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
+        self.mass: Floats = np.ascontiguousarray(np.broadcast_to(masses, (n,))).copy()
+        wrong = ~(np.isfinite(self.mass) & (self.mass > 0.0))
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            raise SceneError(f"mass must be a finite number above 0, got {self.mass[first]:g} for particle {first}")
+
+    def __len__(self) -> int:
+        return self.position.shape[1]
+
+    def __repr__(self) -> str:
+        return f"Particles({len(self)})"
+
+    def fastest(self) -> float:
+        """The largest speed [m/s]."""
+        return float(np.sqrt((self.velocity**2).sum(axis=0).max()))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> "Particles":
+        """Particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
+
+        Raises:
+            FileError: the file cannot be read.
+            SceneError: a column is missing or unknown, or a cell is not a number (names file, row, column).
+        """
+        try:
+            with open(path, newline="", encoding="utf-8-sig") as file:
+                table = list(csv.reader(file))
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"cannot read {path}: {error}") from error
+        header = [name.strip() for name in table[0]] if table else []
+        missing = [name for name in _COLUMNS if name not in header]
+        unknown = [name for name in header if name not in (*_COLUMNS, "mass")]
+        if missing or unknown or len(set(header)) < len(header):
+            problem = f"column {missing[0]!r} is missing" if missing else f"columns are {', '.join(header)}"
+            raise SceneError(f"{path}: expected the columns {', '.join(_COLUMNS)} and optionally mass; {problem}")
+        rows = [(number, cells) for number, cells in enumerate(table[1:], start=2) if cells]
+        if not rows:
+            raise SceneError(f"{path}: expected at least one particle below the header, got none")
+        values = np.array([_csv_row(path, number, header, cells) for number, cells in rows])
+        columns = dict(zip(header, values.T, strict=True))
+        return cls(
+            [columns[name] for name in _COLUMNS[:3]],
+            [columns[name] for name in _COLUMNS[3:]],
+            columns.get("mass", 1.0),
+        )
+
+
+class State(NamedTuple):
+    """The arrays that kernels advance. Energies are per particle, at the start of the run."""
+
+    position: Floats  # (3, N)
+    velocity: Floats  # (3, N)
+    mass: Floats  # (N,)
+    energy: Floats  # (N,) total energy at the start
+    inverse_scale: Floats  # (N,) 1/energy scale, what energy errors are relative to
+    impacts: NDArray[np.int64]  # (N,) since the start
+    impulse: Floats  # (surfaces, N) normal impulse since the start [N s]
+
+
+def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:
+    if len(cells) != len(header):
+        raise SceneError(f"{path}, row {number}: expected {len(header)} cells, got {len(cells)}")
+    values = []
+    for name, cell in zip(header, cells, strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell!r}")
+        values.append(value)
+    return values
+
+
+def _array(name: str, value: ArrayLike) -> Floats:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} must be an array of numbers, got {type(value).__name__}") from None
+
+
+def _rows(name: str, value: ArrayLike) -> Floats:
+    rows = _array(name, value)
+    if rows.shape == (3,):
+        rows = rows.reshape(3, 1)
+    if rows.ndim != 2 or rows.shape[0] != 3:
+        hint = "; transpose it" if rows.ndim == 2 and rows.shape[1] == 3 else ""
+        raise SceneError(f"{name} must have shape (3, N), rows x, y, z, got {rows.shape}{hint}")
+    if rows.shape[1] == 0:
+        raise SceneError(f"{name} must hold at least one particle, got shape {rows.shape}")
+    finite = np.isfinite(rows).all(axis=0)
+    if not finite.all():
+        first = int(np.argmin(finite))
+        raise SceneError(
+            f"{name} must be finite, got {tuple(rows[:, first].tolist())} for particle {first} "
+            f"({int((~finite).sum())} such particles)"
+        )
+    return np.array(rows, order="C")

@@ -1,0 +1,149 @@
+"""The scene: surfaces and gravity; what volume they leave."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import checks
+from .errors import SceneError
+from .gravity import Gravity
+from .surfaces import base
+from .surfaces.base import Box, Surface
+from .surfaces.chain import Chain, chain_of
+from .surfaces.plane import Plane
+
+# The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
+_STARTS = 512
+_MOVES = 200
+# Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
+_FAR = 1e6
+
+
+@dataclass(frozen=True, init=False)
+class Scene:
+    """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
+
+    Args:
+        surfaces: at least one surface.
+        gravity: None, or three numbers (gx, gy, gz) [m/s^2].
+
+    Raises:
+        SceneError: no surface, or surfaces that leave no volume.
+
+    >>> import swarm
+    >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
+    0.5
+    """
+
+    surfaces: tuple[Surface, ...]
+    gravity: checks.Vector | None
+
+    def __init__(self, surfaces: Sequence[Surface], gravity: Sequence[float] | None = None) -> None:
+        surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
+        if not surfaces:
+            raise SceneError("surfaces must hold at least one surface, got none")
+        for i, surface in enumerate(surfaces):
+            if not isinstance(surface, Surface):
+                raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
+        pull = None if gravity is None else checks.vector("gravity", gravity)
+        object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
+        if not self._has_volume():
+            raise SceneError(
+                f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
+                "have no point in common; check their `side`, and that solids are smaller than their cavity"
+            )
+
+    def chain(self) -> Chain | None:
+        """The surfaces as kernels take them."""
+        return chain_of(self.surfaces)
+
+    def pull(self) -> Gravity | None:
+        """Gravity as kernels take it."""
+        return None if self.gravity is None else Gravity(*self.gravity)
+
+    def size(self) -> float:
+        """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
+        smallest = min(surface.size() for surface in self.surfaces)
+        if math.isfinite(smallest):
+            return smallest
+        low, high = self.bounds()
+        return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
+
+    def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Signed gap of every surface at points (3, N), shape (surfaces, N); a point is admissible where all are <= 0."""
+        rows = np.asarray(points, dtype=np.float64)
+        return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
+
+    def bounds(self) -> Box:
+        """A box (lower, upper) around the admissible volume; infinite where that is open."""
+        boxes = np.array([surface.bounds() for surface in self.surfaces])
+        low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
+        planes = [surface for surface in self.surfaces if isinstance(surface, Plane)]
+        if planes:
+            low, high = _polyhedron_bounds(planes, low, high)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def _has_volume(self) -> bool:
+        low, high = (np.array(corner) for corner in self.bounds())
+        if not (low < high).all():
+            return False
+        # Open directions are searched as far as the scene itself extends.
+        reach = 2.0 * self._extent()
+        low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
+        points = low + (high - low) * np.random.default_rng(0).random((3, _STARTS))
+        for _ in range(_MOVES):
+            gaps = self.gaps(points)
+            if (gaps.max(axis=0) <= 0.0).any():
+                return True
+            worst = gaps.argmax(axis=0)
+            for i, surface in enumerate(self.surfaces):
+                outside = worst == i
+                gradient = _side(surface) * surface.gradient(points[:, outside])
+                slope = np.maximum((gradient**2).sum(axis=0), np.finfo(np.float64).tiny)
+                # A little past the surface: thin volumes need not be hit exactly.
+                points[:, outside] -= 1.05 * gaps[i, outside] / slope * gradient
+        return False
+
+    def _extent(self) -> float:
+        """Distance from the origin within which the scene's surfaces lie."""
+        reach = 0.0
+        for surface in self.surfaces:
+            size = surface.size()
+            reach = max(reach, size if math.isfinite(size) else 0.0)
+            reach = max(reach, *(abs(part) for part in getattr(surface, "center", (0.0,))))
+            reach = max(reach, *getattr(surface, "semi_axes", (0.0,)), abs(getattr(surface, "offset", 0.0)))
+        return reach or 1.0
+
+
+def _side(surface: Surface) -> float:
+    return base.SIDES[getattr(surface, "side", "inside")]
+
+
+def _polyhedron_bounds(planes: list[Plane], low: Any, high: Any) -> tuple[Any, Any]:
+    """Bounds of the half-spaces' intersection with a box, from its vertices."""
+    finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(plane.offset) for plane in planes]
+    far = _FAR * (max(finite, default=0.0) or 1.0)
+    box_low, box_high = np.maximum(low, -far), np.minimum(high, far)
+    normals = np.vstack([[plane.normal for plane in planes], np.eye(3), -np.eye(3)])
+    offsets = np.concatenate([[plane.offset for plane in planes], box_high, -box_low])
+    vertices = []
+    for triple in itertools.combinations(range(len(offsets)), 3):
+        matrix = normals[list(triple)]
+        if abs(np.linalg.det(matrix)) > 1e-12:
+            vertex = np.linalg.solve(matrix, offsets[list(triple)])
+            if (normals @ vertex <= offsets + 1e-9 * (np.abs(offsets) + np.abs(vertex).max())).all():
+                vertices.append(vertex)
+    if not vertices:
+        return np.zeros(3), np.zeros(3)
+    found_low, found_high = np.min(vertices, axis=0), np.max(vertices, axis=0)
+    new_low, new_high = np.maximum(low, found_low), np.minimum(high, found_high)
+    # A vertex on the far box means that the volume is open that way.
+    new_low[found_low <= -0.5 * far] = low[found_low <= -0.5 * far]
+    new_high[found_high >= 0.5 * far] = high[found_high >= 0.5 * far]
+    return new_low, new_high

@@ -1,0 +1,24 @@
+"""What a kernel can report."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Codes that kernels return; the worst of a run becomes one sentence."""
+
+    DONE = 0
+    INTERRUPTED = 1
+    UNSOLVED = 2
+    NOT_FINITE = 3
+
+    @property
+    def sentence(self) -> str:
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Status.DONE: "the block reached the frame time",
+    Status.INTERRUPTED: "the run was interrupted",
+    Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
+    Status.NOT_FINITE: "position or velocity are no longer finite numbers",
+}

@@ -1,0 +1,8 @@
+"""The surfaces by their kind in a scene file."""
+
+from .base import Surface
+from .ellipsoid import Ellipsoid
+from .plane import Plane
+from .sphere import Sphere
+
+ALL_SURFACES: dict[str, type[Surface]] = {"sphere": Sphere, "ellipsoid": Ellipsoid, "plane": Plane}

@@ -1,0 +1,267 @@
+"""All surfaces of a scene at once: the functions of one surface, folded over the chain.
+
+The fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from .._jit import by_type, select
+from ..gravity import Gravity, Nothing
+from . import base
+
+
+class Chain(NamedTuple):
+    """The surfaces of a scene as nested pairs, ended by None: what is not there compiles to nothing."""
+
+    first: Any
+    rest: Any
+
+
+def chain_of(surfaces: tuple[base.Surface, ...]) -> Chain | None:
+    """The numbers of `surfaces` as a chain."""
+    return Chain(surfaces[0].numbers(), chain_of(surfaces[1:])) if surfaces else None
+
+
+@by_type
+def length(chain):
+    """How many surfaces there are: a constant for the compiler."""
+    raise NotImplementedError
+
+
+@length.register(Chain)
+def _(chain):
+    return 1 + length(chain.rest)
+
+
+@length.register(Nothing)
+def _(chain):
+    return 0
+
+
+@by_type
+def first_hit(chain, x, y, z, vx, vy, vz):
+    """Time of the first hit of a straight flight, and the index of the surface."""
+    raise NotImplementedError
+
+
+@first_hit.register(Chain)
+def _(chain, x, y, z, vx, vy, vz):
+    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
+    later, index = first_hit(chain.rest, x, y, z, vx, vy, vz)
+    sooner = later < time
+    return select(sooner, later, time), select(sooner, index + 1.0, 0.0)
+
+
+@first_hit.register(Nothing)
+def _(chain, x, y, z, vx, vy, vz):
+    return math.inf, 0.0
+
+
+@by_type
+def hit_of(chain, index, x, y, z, vx, vy, vz):
+    """Time of the first hit with surface `index`."""
+    raise NotImplementedError
+
+
+@hit_of.register(Chain)
+def _(chain, index, x, y, z, vx, vy, vz):
+    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
+    other = hit_of(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
+    return select(index == 0.0, time, other)
+
+
+@hit_of.register(Nothing)
+def _(chain, index, x, y, z, vx, vy, vz):
+    return math.inf
+
+
+@by_type
+def other_hit(chain, index, x, y, z, vx, vy, vz):
+    """Time and index of the first hit with any surface but `index`."""
+    raise NotImplementedError
+
+
+@other_hit.register(Chain)
+def _(chain, index, x, y, z, vx, vy, vz):
+    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
+    later, found = other_hit(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
+    use = (later < time) | (index == 0.0)
+    return select(use, later, time), select(use, found + 1.0, 0.0)
+
+
+@other_hit.register(Nothing)
+def _(chain, index, x, y, z, vx, vy, vz):
+    return math.inf, 0.0
+
+
+@by_type
+def unit_normal(chain, index, x, y, z):
+    """Unit normal of surface `index`, out of the admissible side."""
+    raise NotImplementedError
+
+
+@unit_normal.register(Chain)
+def _(chain, index, x, y, z):
+    nx, ny, nz = base.unit_normal(chain.first, x, y, z)
+    ox, oy, oz = unit_normal(chain.rest, index - 1.0, x, y, z)
+    here = index == 0.0
+    return select(here, nx, ox), select(here, ny, oy), select(here, nz, oz)
+
+
+@unit_normal.register(Nothing)
+def _(chain, index, x, y, z):
+    return 0.0, 0.0, 0.0
+
+
+@by_type
+def chord_normal(chain, index, x, y, z, px, py, pz):
+    """Unit normal of the contact step on surface `index` with free displacement p."""
+    raise NotImplementedError
+
+
+@chord_normal.register(Chain)
+def _(chain, index, x, y, z, px, py, pz):
+    nx, ny, nz = base.chord_normal(chain.first, x, y, z, px, py, pz)
+    ox, oy, oz = chord_normal(chain.rest, index - 1.0, x, y, z, px, py, pz)
+    here = index == 0.0
+    return select(here, nx, ox), select(here, ny, oy), select(here, nz, oz)
+
+
+@chord_normal.register(Nothing)
+def _(chain, index, x, y, z, px, py, pz):
+    return 0.0, 0.0, 0.0
+
+
+@by_type
+def settle(chain, index, x, y, z):
+    """The point moved onto surface `index`, from within round-off of it."""
+    raise NotImplementedError
+
+
+@settle.register(Chain)
+def _(chain, index, x, y, z):
+    sx, sy, sz = base.settle(chain.first, x, y, z)
+    ox, oy, oz = settle(chain.rest, index - 1.0, x, y, z)
+    here = index == 0.0
+    return select(here, sx, ox), select(here, sy, oy), select(here, sz, oz)
+
+
+@settle.register(Nothing)
+def _(chain, index, x, y, z):
+    return x, y, z
+
+
+@by_type
+def outside(chain, index, x, y, z):
+    """Whether a point is outside any surface but `index` (-1: any at all)."""
+    raise NotImplementedError
+
+
+@outside.register(Chain)
+def _(chain, index, x, y, z):
+    here = base.level_of(chain.first, base.inner(chain.first, x, y, z)) > 0.0
+    return (here & (index != 0.0)) | outside(chain.rest, index - 1.0, x, y, z)
+
+
+@outside.register(Nothing)
+def _(chain, index, x, y, z):
+    return False
+
+
+@by_type
+def push(chain, index, x0, y0, z0, px, py, pz, kappa):
+    """The end r1 of a step that surface `index` pushes with kappa."""
+    raise NotImplementedError
+
+
+@push.register(Chain)
+def _(chain, index, x0, y0, z0, px, py, pz, kappa):
+    x1, y1, z1 = base.push(chain.first, x0, y0, z0, px, py, pz, kappa)
+    ox, oy, oz = push(chain.rest, index - 1.0, x0, y0, z0, px, py, pz, kappa)
+    here = index == 0.0
+    return select(here, x1, ox), select(here, y1, oy), select(here, z1, oz)
+
+
+@push.register(Nothing)
+def _(chain, index, x0, y0, z0, px, py, pz, kappa):
+    return x0, y0, z0
+
+
+@by_type
+def inner_gradient(chain, index, x0, y0, z0, x1, y1, z1):
+    """Discrete gradient of the inner function of surface `index`."""
+    raise NotImplementedError
+
+
+@inner_gradient.register(Chain)
+def _(chain, index, x0, y0, z0, x1, y1, z1):
+    dx, dy, dz = base.inner_gradient(chain.first, x0, y0, z0, x1, y1, z1)
+    ox, oy, oz = inner_gradient(chain.rest, index - 1.0, x0, y0, z0, x1, y1, z1)
+    here = index == 0.0
+    return select(here, dx, ox), select(here, dy, oy), select(here, dz, oz)
+
+
+@inner_gradient.register(Nothing)
+def _(chain, index, x0, y0, z0, x1, y1, z1):
+    return 0.0, 0.0, 0.0
+
+
+# --- Free time, with and without gravity -----------------------------------------------------------------
+
+
+@by_type
+def free_time(gravity, chain, x, y, z, vx, vy, vz):
+    """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
+    raise NotImplementedError
+
+
+@free_time.register(Nothing)
+def _(gravity, chain, x, y, z, vx, vy, vz):
+    time, _index = first_hit(chain, x, y, z, vx, vy, vz)
+    return select(outside(chain, -1.0, x, y, z), 0.0, time)
+
+
+@free_time.register(Gravity)
+def _(gravity, chain, x, y, z, vx, vy, vz):
+    return safe_time(chain, x, y, z, vx, vy, vz, gravity.x, gravity.y, gravity.z)
+
+
+@by_type
+def safe_time(chain, x, y, z, vx, vy, vz, gx, gy, gz):
+    """The smallest safe time of all surfaces."""
+    raise NotImplementedError
+
+
+@safe_time.register(Chain)
+def _(chain, x, y, z, vx, vy, vz, gx, gy, gz):
+    time = base.safe_time(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
+    other = safe_time(chain.rest, x, y, z, vx, vy, vz, gx, gy, gz)
+    return select(other < time, other, time)
+
+
+@safe_time.register(Nothing)
+def _(chain, x, y, z, vx, vy, vz, gx, gy, gz):
+    return math.inf
+
+
+@by_type
+def touched(chain, x, y, z, px, py, pz):
+    """Walls that a step with free displacement p is in contact with: (the first one or -1, how many)."""
+    raise NotImplementedError
+
+
+@touched.register(Chain)
+def _(chain, x, y, z, px, py, pz):
+    surface = chain.first
+    before = base.level_of(surface, base.inner(surface, x, y, z))
+    after = base.level_of(surface, base.inner(surface, x + px, y + py, z + pz))
+    contact = (before > 0.0) | (after > 0.0)
+    index, count = touched(chain.rest, x, y, z, px, py, pz)
+    later = select(count > 0.0, index + 1.0, -1.0)
+    return select(contact, 0.0, later), count + select(contact, 1.0, 0.0)
+
+
+@touched.register(Nothing)
+def _(chain, x, y, z, px, py, pz):
+    return -1.0, 0.0

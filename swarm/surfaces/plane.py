@@ -1,0 +1,144 @@
+"""Plane: phi = n.(r) - offset, the signed distance; inner function q = n.r."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import select
+from ..checks import Vector, number, vector
+from ..errors import SceneError
+from . import base
+
+
+@dataclass(frozen=True)
+class Plane(base.Surface):
+    """A plane wall; admissible is normal.r <= offset, with the normal scaled to unit length.
+
+    Args:
+        normal: three numbers, not all 0; it points out of the admissible half-space.
+        offset: distance of the plane from the origin along the normal [m].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Plane(normal=(0, 0, -2), offset=0.0).phi([[0.0], [0.0], [0.25]])
+    array([-0.25])
+    """
+
+    normal: Vector
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        normal = vector("normal", self.normal)
+        length = math.hypot(*normal)
+        if length == 0.0:
+            raise SceneError("normal must not be the zero vector, got (0, 0, 0)")
+        object.__setattr__(self, "normal", tuple(part / length for part in normal))
+        object.__setattr__(self, "offset", number("offset", self.offset))
+
+    def numbers(self) -> "PlaneNumbers":
+        return PlaneNumbers(*self.normal, self.offset)
+
+    def size(self) -> float:
+        return math.inf
+
+    def bounds(self) -> base.Box:
+        # Half-spaces bound only together: scene.py does that.
+        return base.UNBOUNDED
+
+
+class PlaneNumbers(NamedTuple):
+    """What kernels know of a plane."""
+
+    nx: float
+    ny: float
+    nz: float
+    offset: float
+
+
+# --- The level set ---------------------------------------------------------------------------------------
+
+
+@base.phi.register(PlaneNumbers)
+def _(surface, x, y, z):
+    return base.inner(surface, x, y, z) - surface.offset
+
+
+@base.gradient.register(PlaneNumbers)
+def _(surface, x, y, z):
+    return surface.nx, surface.ny, surface.nz
+
+
+# --- Flight ----------------------------------------------------------------------------------------------
+
+
+@base.first_hit.register(PlaneNumbers)
+def _(surface, x, y, z, vx, vy, vz):
+    approach = base.inner(surface, vx, vy, vz)
+    distance = surface.offset - base.inner(surface, x, y, z)
+    time = distance / approach
+    return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf)
+
+
+@base.safe_time.register(PlaneNumbers)
+def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
+    c = base.inner(surface, x, y, z) - surface.offset
+    b = 0.5 * base.inner(surface, vx, vy, vz)
+    a = 0.5 * base.inner(surface, gx, gy, gz)
+    return select(c > 0.0, 0.0, base.rise_time(c, b, a))
+
+
+# --- Contact ---------------------------------------------------------------------------------------------
+
+
+@base.unit_normal.register(PlaneNumbers)
+def _(surface, x, y, z):
+    return surface.nx, surface.ny, surface.nz
+
+
+@base.chord_normal.register(PlaneNumbers)
+def _(surface, x, y, z, px, py, pz):
+    return surface.nx, surface.ny, surface.nz
+
+
+@base.inner.register(PlaneNumbers)
+def _(surface, x, y, z):
+    return surface.nx * x + surface.ny * y + surface.nz * z
+
+
+@base.gap_of.register(PlaneNumbers)
+def _(surface, q):
+    return q - surface.offset
+
+
+@base.level_of.register(PlaneNumbers)
+def _(surface, q):
+    return q - surface.offset
+
+
+@base.gap_slope.register(PlaneNumbers)
+def _(surface, q0, q1):
+    return 1.0, 0.0
+
+
+@base.inner_gradient.register(PlaneNumbers)
+def _(surface, x0, y0, z0, x1, y1, z1):
+    return surface.nx, surface.ny, surface.nz
+
+
+@base.push.register(PlaneNumbers)
+def _(surface, x0, y0, z0, px, py, pz, kappa):
+    return x0 + (px - kappa * surface.nx), y0 + (py - kappa * surface.ny), z0 + (pz - kappa * surface.nz)
+
+
+@base.pushed.register(PlaneNumbers)
+def _(surface, x0, y0, z0, px, py, pz, kappa):
+    return base.inner(surface, x0, y0, z0) + (base.inner(surface, px, py, pz) - kappa), -1.0
+
+
+@base.settle.register(PlaneNumbers)
+def _(surface, x, y, z):
+    g = base.inner(surface, x, y, z) - surface.offset
+    return x - g * surface.nx, y - g * surface.ny, z - g * surface.nz

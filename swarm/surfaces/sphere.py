@@ -1,0 +1,181 @@
+"""Sphere: phi = |r - c| - R, the distance; inner function q = |r - c|^2."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..checks import Vector, positive, vector
+from . import base
+
+
+@dataclass(frozen=True)
+class Sphere(base.Surface):
+    """A sphere; its cavity (`side="inside"`) or the space around the solid ball (`side="outside"`).
+
+    Args:
+        radius: R > 0 [m].
+        center: three numbers [m].
+        side: "inside" or "outside", the admissible part.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Sphere(radius=0.5).phi([[0.0], [0.3], [0.4]])
+    array([0.])
+    """
+
+    radius: float
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", positive("radius", self.radius))
+        object.__setattr__(self, "center", vector("center", self.center))
+        base.side_sign(self.side)
+
+    def numbers(self) -> "SphereNumbers":
+        side = base.side_sign(self.side)
+        return SphereNumbers(*self.center, self.radius, self.radius**2, side / self.radius, side)
+
+    def size(self) -> float:
+        return self.radius
+
+    def bounds(self) -> base.Box:
+        return base.box_around(self.center, (self.radius,) * 3, self.side)
+
+
+class SphereNumbers(NamedTuple):
+    """What kernels know of a sphere."""
+
+    cx: float
+    cy: float
+    cz: float
+    radius: float
+    radius2: float
+    curvature: float  # side/R
+    side: float
+
+
+# --- The level set ---------------------------------------------------------------------------------------
+
+
+@base.phi.register(SphereNumbers)
+def _(surface, x, y, z):
+    return np.sqrt(base.inner(surface, x, y, z)) - surface.radius
+
+
+@base.gradient.register(SphereNumbers)
+def _(surface, x, y, z):
+    # At the centre, where |r - c| has no gradient, the answer is 0.
+    distance = np.maximum(np.sqrt(base.inner(surface, x, y, z)), np.finfo(np.float64).tiny)
+    return (x - surface.cx) / distance, (y - surface.cy) / distance, (z - surface.cz) / distance
+
+
+# --- Flight ----------------------------------------------------------------------------------------------
+
+
+@base.first_hit.register(SphereNumbers)
+def _(surface, x, y, z, vx, vy, vz):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    c = dx * dx + dy * dy + dz * dz - surface.radius2
+    b = dx * vx + dy * vy + dz * vz
+    a = vx * vx + vy * vy + vz * vz
+    return base.rise_time(surface.side * c, surface.side * b, surface.side * a)
+
+
+@base.safe_time.register(SphereNumbers)
+def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    c = dx * dx + dy * dy + dz * dz - surface.radius2
+    b = dx * vx + dy * vy + dz * vz
+    a = vx * vx + vy * vy + vz * vz
+    gg = gx * gx + gy * gy + gz * gz
+    # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
+    a2 = a + dx * gx + dy * gy + dz * gz
+    a3 = vx * gx + vy * gy + vz * gz
+    window = surface.radius / math.sqrt(a + surface.radius * math.sqrt(gg))
+    side = surface.side
+    return base.safe_rise_time(side * c, side * b, side * a2, a3, side * 0.25 * gg, window)
+
+
+# --- Contact ---------------------------------------------------------------------------------------------
+
+
+@base.unit_normal.register(SphereNumbers)
+def _(surface, x, y, z):
+    k = surface.curvature
+    return (x - surface.cx) * k, (y - surface.cy) * k, (z - surface.cz) * k
+
+
+@base.chord_normal.register(SphereNumbers)
+def _(surface, x, y, z, px, py, pz):
+    # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
+    nx = 2.0 * (x - surface.cx) + px
+    ny = 2.0 * (y - surface.cy) + py
+    nz = 2.0 * (z - surface.cz) + pz
+    k = surface.side / math.sqrt(nx * nx + ny * ny + nz * nz)
+    return nx * k, ny * k, nz * k
+
+
+@base.inner.register(SphereNumbers)
+def _(surface, x, y, z):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    return dx * dx + dy * dy + dz * dz
+
+
+@base.gap_of.register(SphereNumbers)
+def _(surface, q):
+    return surface.side * (math.sqrt(q) - surface.radius)
+
+
+@base.level_of.register(SphereNumbers)
+def _(surface, q):
+    return surface.side * (q - surface.radius2)
+
+
+@base.gap_slope.register(SphereNumbers)
+def _(surface, q0, q1):
+    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1))
+    root1 = math.sqrt(q1)
+    slope = 1.0 / (math.sqrt(q0) + root1)
+    return surface.side * slope, -0.5 * surface.side * slope * slope / root1
+
+
+@base.inner_gradient.register(SphereNumbers)
+def _(surface, x0, y0, z0, x1, y1, z1):
+    # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
+    return x0 + x1 - 2.0 * surface.cx, y0 + y1 - 2.0 * surface.cy, z0 + z1 - 2.0 * surface.cz
+
+
+@base.push.register(SphereNumbers)
+def _(surface, x0, y0, z0, px, py, pz, kappa):
+    # r1 = [(1 - kappa) r0 + p]/(1 + kappa), relative to the centre
+    w = 1.0 / (1.0 + kappa)
+    u = (1.0 - kappa) * w
+    return (
+        surface.cx + ((x0 - surface.cx) * u + px * w),
+        surface.cy + ((y0 - surface.cy) * u + py * w),
+        surface.cz + ((z0 - surface.cz) * u + pz * w),
+    )
+
+
+@base.pushed.register(SphereNumbers)
+def _(surface, x0, y0, z0, px, py, pz, kappa):
+    # q1 = [(1 - kappa)^2 q0 + 2 (1 - kappa) r0.p + p.p]/(1 + kappa)^2: three numbers, whatever kappa is.
+    dx, dy, dz = x0 - surface.cx, y0 - surface.cy, z0 - surface.cz
+    q0 = dx * dx + dy * dy + dz * dz
+    rp = dx * px + dy * py + dz * pz
+    pp = px * px + py * py + pz * pz
+    w = 1.0 / (1.0 + kappa)
+    u = (1.0 - kappa) * w
+    q1 = u * u * q0 + 2.0 * u * w * rp + w * w * pp
+    return q1, -2.0 * w * (u * q0 + w * rp + q1)
+
+
+@base.settle.register(SphereNumbers)
+def _(surface, x, y, z):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    f = (dx * dx + dy * dy + dz * dz - surface.radius2) / (2.0 * surface.radius2)
+    return x - f * dx, y - f * dy, z - f * dz
