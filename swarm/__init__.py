@@ -1,13 +1,36 @@
-"""Particles bouncing in rigid cavities and off rigid solids, with energy conserved to round-off."""
+"""Particles bouncing in rigid cavities and off rigid solids, with energy conserved to round-off.
 
-from .errors import FileError, RunError, SceneError, SwarmError
-from .fill import fill
-from .methods import Impact, Penalty
-from .particles import Particles
-from .scene import Scene
-from .simulate import Frame, Result, simulate
-from .surfaces import Ellipsoid, Plane, Sphere
+The public names are loaded when they are first used, so that `swarm --help` need not wait for Numba.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from .version import VERSION
+
+if TYPE_CHECKING:
+    from .errors import FileError, RunError, SceneError, SwarmError
+    from .filling import fill
+    from .methods import Impact, Penalty
+    from .output.trajectory import Trajectory, load
+    from .particles import Particles
+    from .scene import Scene
+    from .simulation import Frame, Result, simulate
+    from .surfaces import Ellipsoid, Plane, Sphere
+
+__version__ = VERSION
+
+_HOMES = {
+    "errors": ("FileError", "RunError", "SceneError", "SwarmError"),
+    "filling": ("fill",),
+    "methods": ("Impact", "Penalty"),
+    "output.trajectory": ("Trajectory", "load"),
+    "particles": ("Particles",),
+    "scene": ("Scene",),
+    "simulation": ("Frame", "Result", "simulate"),
+    "surfaces": ("Ellipsoid", "Plane", "Sphere"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Ellipsoid",
@@ -23,7 +46,22 @@ __all__ = [
     "SceneError",
     "Sphere",
     "SwarmError",
+    "Trajectory",
+    "__version__",
     "fill",
+    "load",
     "simulate",
 ]
-__version__ = VERSION
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'swarm' has no attribute {name!r}")
+    # No public name is the name of a module: importing that module would hide it.
+    value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -13,15 +13,19 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba import types
 from numba.extending import intrinsic, overload
+from numpy.typing import NDArray
 
+Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Strict IEEE arithmetic: `fastmath` would let the compiler reorder sums, and with them the energy balance.
 # The NumPy error model makes 1/0 an infinity; Python's would put a branch before every division, and a
 # branch in the lane loop costs its vectorisation.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_INLINE: Any = {"forceinline": True, **_FLAGS}
 
 
 def _source_hash() -> str:
@@ -46,27 +50,30 @@ def cache_folder() -> Path:
 
 
 _CACHE = cache_folder()
+_CONFIG: Any = numba.config
 
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_CACHE)
+    previous = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(_CACHE)
     try:
-        return numba.njit(cache=True, **_FLAGS)(function)
+        compiled: F = numba.njit(cache=True, **_FLAGS)(function)
+        return compiled
     finally:
-        numba.config.CACHE_DIR = previous
+        _CONFIG.CACHE_DIR = previous
 
 
 def inlined(function: F) -> F:
     """Compile a helper that is always inlined into the kernel that calls it, so that its loop vectorises."""
-    return numba.njit(forceinline=True, **_FLAGS)(function)
+    compiled: F = numba.njit(**_INLINE)(function)
+    return compiled
 
 
-def _python_class(kind: Any) -> type:
+def _python_class(kind: Any) -> Any:
     """The Python class whose values the Numba type `kind` describes."""
     if isinstance(kind, types.BaseNamedTuple):
-        return kind.instance_class
+        return kind.instance_class  # type: ignore[attr-defined]
     if isinstance(kind, types.NoneType):
         return type(None)
     return float if isinstance(kind, types.Float) else object
@@ -85,11 +92,11 @@ def by_type(function: Callable[..., Any]) -> Any:
     def chosen(*args: Any) -> Any:
         return generic.dispatch(_python_class(args[0]))
 
-    overload(generic, jit_options={"forceinline": True, **_FLAGS})(chosen)
+    overload(generic, jit_options=_INLINE)(chosen)
     return generic
 
 
-@intrinsic
+@intrinsic  # type: ignore[call-arg]
 def _select(_typing, condition, first, second):
     def emit(_context, builder, _signature, args):
         return builder.select(*args)
@@ -108,6 +115,6 @@ def select(condition: Any, first: Any, second: Any) -> Any:
     return first if condition else second
 
 
-@overload(select, jit_options={"forceinline": True, **_FLAGS})
+@overload(select, jit_options=_INLINE)
 def _compiled_select(condition, first, second):
-    return lambda condition, first, second: _select(condition, first, second)
+    return lambda condition, first, second: _select(condition, first, second)  # type: ignore[call-arg]

@@ -1,24 +1,203 @@
 """One block of particles to one time, in lanes.
 
-A block is copied into lane arrays; one pass does one flight and one contact for every live lane, in two loops without
+A block is copied into lane arrays; one pass does one flight and one contact for every live lane, in loops without
 branches, which LLVM vectorises. Lanes that reached the frame time retire, and the next particle, or the last live lane,
 takes their slot. The result does not depend on which lane or block a particle is in.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ._jit import by_type, kernel, select
+from ._jit import Array, by_type, inlined, kernel, select
 from .gravity import Nothing
 from .methods import base as methods
 from .status import Status
 from .surfaces import chain as walls
 
-# Lanes of a block: 256 x 13 rows of 8 bytes fit in the L1 cache beside what the loops spill.
-LANES = 256
-# The row stride is not a power of two, so that a lane's rows do not share a cache set.
+# Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
+_LANES = 256
+# The row stride is not a power of two, so that the rows of a lane do not share a cache set.
 _STRIDE = 264
 
 _X, _Y, _Z, _VX, _VY, _VZ, _LEFT, _K0, _K1, _K2, _HITS, _ROWS = range(12)
+
+
+class Lanes(NamedTuple):
+    """Arrays of one column a lane."""
+
+    rows: Array  # (_ROWS, stride) position, velocity, time left, the method's constants, impacts
+    impulse: Array  # (surfaces, stride) normal impulse per mass
+    surface: Array  # the wall of the contact in this pass, or -1
+    hard: Array  # 1 where the pass needs loops and branches
+    kappa: Array  # the contact's unknown
+    change: Array  # its last Newton step
+    particle: Array  # int64, the particle in the lane
+
+
+@kernel
+def advance_block(method, chain, gravity, state, span, start, stop, halt):
+    """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
+
+    `span` is in the method's unit. `halt[0]` set to 1 by another thread stops the block at its next pass.
+    """
+    lanes = Lanes(
+        np.empty((_ROWS, _STRIDE)),
+        np.empty((walls.length(chain), _STRIDE)),
+        np.empty(_STRIDE),
+        np.empty(_STRIDE),
+        np.zeros(_STRIDE),
+        np.zeros(_STRIDE),
+        np.empty(_STRIDE, np.int64),
+    )
+    live, following = 0, start
+    while True:
+        while live < _LANES and following < stop:
+            _load(method, lanes, live, state, following, span)
+            live += 1
+            following += 1
+        if live == 0:
+            return Status.DONE.value, stop - 1
+        if halt[0] != 0:
+            return Status.INTERRUPTED.value, stop - 1
+        _fly(method, chain, gravity, lanes, live)
+        _solve(method, chain, gravity, lanes, live)
+        retired, hard = _contact(method, chain, gravity, lanes, live)
+        if hard > 0:
+            finished, status, lane = _hard_passes(method, chain, gravity, lanes, live)
+            if status != Status.DONE.value:
+                return status, lanes.particle[lane]
+            retired += finished
+        lane = 0
+        while retired > 0:
+            if lanes.rows[_LEFT, lane] > 0.0:
+                lane += 1
+            else:
+                _retire(lanes, lane, state)
+                retired -= 1
+                live -= 1
+                _move(lanes, live, lane)
+
+
+# --- A particle in and out -------------------------------------------------------------------------------
+
+
+@inlined
+def _load(method, lanes, lane, state, i, span):
+    """Particle i into a lane."""
+    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
+    position, velocity = state.position, state.velocity
+    for axis in range(3):
+        rows[_X + axis, lane] = position[axis, i]
+        rows[_VX + axis, lane] = velocity[axis, i]
+    constants = methods.lane_constants(
+        method, state.mass[i], state.energy[i], velocity[0, i], velocity[1, i], velocity[2, i]
+    )
+    rows[_K0, lane], rows[_K1, lane], rows[_K2, lane] = constants
+    rows[_LEFT, lane], rows[_HITS, lane] = span, 0.0
+    for s in range(impulse.shape[0]):
+        impulse[s, lane] = 0.0
+    particle[lane] = i
+
+
+@inlined
+def _retire(lanes, lane, state):
+    """A lane back into its particle."""
+    rows, impulse = lanes.rows, lanes.impulse
+    position, velocity, impacts, total = state.position, state.velocity, state.impacts, state.impulse
+    i = lanes.particle[lane]
+    for axis in range(3):
+        position[axis, i] = rows[_X + axis, lane]
+        velocity[axis, i] = rows[_VX + axis, lane]
+    impacts[i] += np.int64(rows[_HITS, lane])
+    for s in range(impulse.shape[0]):
+        total[s, i] += impulse[s, lane] * state.mass[i]
+
+
+@inlined
+def _move(lanes, source, target):
+    """The last live lane into the free slot. What flight and contact leave for each other need not move."""
+    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
+    for row in range(_ROWS):
+        rows[row, target] = rows[row, source]
+    for s in range(impulse.shape[0]):
+        impulse[s, target] = impulse[s, source]
+    particle[target] = particle[source]
+
+
+# --- The passes ------------------------------------------------------------------------------------------
+
+
+@inlined
+def _fly(method, chain, gravity, lanes, live):
+    """Every lane to its next contact, or to the end of the frame."""
+    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    for i in range(live):
+        x, y, z, vx, vy, vz, left, wall, is_hard = methods.flight(
+            method, chain, gravity,
+            rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+            rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i],
+        )  # fmt: skip
+        rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
+        rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz
+        rows[_LEFT, i] = left
+        surface[i] = wall
+        hard[i] = select(is_hard, 1.0, 0.0)
+
+
+@inlined
+def _solve(method, chain, gravity, lanes, live):
+    """The contact's unknown of every lane; sweeps end when the last lane is solved."""
+    rows, surface, kappa, change = lanes.rows, lanes.surface, lanes.kappa, lanes.change
+    if methods.most_sweeps(method) > 0:
+        for i in range(live):
+            kappa[i], change[i] = methods.guess(
+                method, chain, gravity,
+                rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+                rows[_K0, i], surface[i],
+            )  # fmt: skip
+    for _sweep in range(methods.most_sweeps(method)):
+        unsolved = 0
+        for i in range(live):
+            kappa[i], change[i], more = methods.improve(
+                method, chain, gravity,
+                rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+                rows[_K0, i], surface[i], kappa[i], change[i],
+            )  # fmt: skip
+            unsolved += more
+        if unsolved == 0:
+            break
+
+
+@inlined
+def _contact(method, chain, gravity, lanes, live):
+    """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
+    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    impulse, kappa, change = lanes.impulse, lanes.kappa, lanes.change
+    retired, hard_lanes = 0, 0
+    for i in range(live):
+        x, y, z, vx, vy, vz, left, given, hits, is_hard = methods.contact(
+            method, chain, gravity,
+            rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+            rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], kappa[i], change[i],
+        )  # fmt: skip
+        # A lane that is hard already stays as it is.
+        was_hard = hard[i] != 0.0
+        rows[_X, i] = select(was_hard, rows[_X, i], x)
+        rows[_Y, i] = select(was_hard, rows[_Y, i], y)
+        rows[_Z, i] = select(was_hard, rows[_Z, i], z)
+        rows[_VX, i] = select(was_hard, rows[_VX, i], vx)
+        rows[_VY, i] = select(was_hard, rows[_VY, i], vy)
+        rows[_VZ, i] = select(was_hard, rows[_VZ, i], vz)
+        left = select(was_hard, rows[_LEFT, i], left)
+        rows[_LEFT, i] = left
+        rows[_HITS, i] += select(was_hard, 0.0, hits)
+        _add_impulse(chain, impulse, 0, i, surface[i], select(was_hard, 0.0, given))
+        is_hard = is_hard | was_hard
+        hard[i] = select(is_hard, 1.0, 0.0)
+        hard_lanes += is_hard
+        retired += (not (left > 0.0)) & (not is_hard)
+    return retired, hard_lanes
 
 
 @by_type
@@ -38,124 +217,23 @@ def _(chain, impulse, row, lane, surface, given):
     pass
 
 
-@kernel
-def advance_block(method, chain, gravity, state, span, start, stop, halt):
-    """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
-
-    `span` is in the method's unit. `halt[0]` set to 1 by another thread stops the block at its next pass.
-    """
-    position, velocity, mass, energy = state.position, state.velocity, state.mass, state.energy
-    impacts, total_impulse = state.impacts, state.impulse
-    surfaces = walls.length(chain)
-
-    lanes = np.empty((_ROWS, _STRIDE))
-    impulse = np.empty((surfaces, _STRIDE))
-    surface, hard = np.empty(_STRIDE), np.empty(_STRIDE)
-    kappa, change = np.zeros(_STRIDE), np.zeros(_STRIDE)
-    particle = np.empty(_STRIDE, np.int64)
-    live, following = 0, start
-
-    while True:
-        while live < LANES and following < stop:
-            i, vx, vy, vz = following, velocity[0, following], velocity[1, following], velocity[2, following]
-            lanes[_X, live], lanes[_Y, live], lanes[_Z, live] = position[0, i], position[1, i], position[2, i]
-            lanes[_VX, live], lanes[_VY, live], lanes[_VZ, live] = vx, vy, vz
-            k0, k1, k2 = methods.lane_constants(method, mass[i], energy[i], vx, vy, vz)
-            lanes[_K0, live], lanes[_K1, live], lanes[_K2, live] = k0, k1, k2
-            lanes[_LEFT, live], lanes[_HITS, live] = span, 0.0
-            for s in range(surfaces):
-                impulse[s, live] = 0.0
-            particle[live] = i
-            live += 1
-            following += 1
-        if live == 0:
-            return Status.DONE.value, stop - 1
-        if halt[0] != 0:
-            return Status.INTERRUPTED.value, stop - 1
-
-        for i in range(live):
-            x, y, z, vx, vy, vz, left, wall, is_hard = methods.flight(
+@inlined
+def _hard_passes(method, chain, gravity, lanes, live):
+    """The hard lanes, one by one: (lanes that reached the end of the frame, worst status, its lane)."""
+    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    retired, worst, where = 0, 0, 0
+    for i in range(live):
+        if hard[i] != 0.0:
+            x, y, z, vx, vy, vz, left, hits, status = methods.hard_pass(
                 method, chain, gravity,
-                lanes[_X, i], lanes[_Y, i], lanes[_Z, i], lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i],
-                lanes[_LEFT, i], lanes[_K0, i], lanes[_K1, i], lanes[_K2, i],
+                rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], lanes.impulse, i,
             )  # fmt: skip
-            lanes[_X, i], lanes[_Y, i], lanes[_Z, i] = x, y, z
-            lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i] = vx, vy, vz
-            lanes[_LEFT, i] = left
-            surface[i] = wall
-            hard[i] = select(is_hard, 1.0, 0.0)
-        if methods.most_sweeps(method) > 0:
-            for i in range(live):
-                kappa[i], change[i] = methods.guess(
-                    method, chain, gravity,
-                    lanes[_X, i], lanes[_Y, i], lanes[_Z, i], lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i],
-                    lanes[_K0, i], surface[i],
-                )  # fmt: skip
-        for _sweep in range(methods.most_sweeps(method)):
-            unsolved = 0
-            for i in range(live):
-                kappa[i], change[i], more = methods.improve(
-                    method, chain, gravity,
-                    lanes[_X, i], lanes[_Y, i], lanes[_Z, i], lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i],
-                    lanes[_K0, i], surface[i], kappa[i], change[i],
-                )  # fmt: skip
-                unsolved += more
-            if unsolved == 0:
-                break
-        hard_lanes, retired = 0, 0
-        for i in range(live):
-            was_hard = hard[i] != 0.0
-            x, y, z, vx, vy, vz, left, given, hits, is_hard = methods.contact(
-                method, chain, gravity,
-                lanes[_X, i], lanes[_Y, i], lanes[_Z, i], lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i],
-                lanes[_LEFT, i], lanes[_K0, i], lanes[_K1, i], lanes[_K2, i], surface[i], kappa[i], change[i],
-            )  # fmt: skip
-            lanes[_X, i] = select(was_hard, lanes[_X, i], x)
-            lanes[_Y, i] = select(was_hard, lanes[_Y, i], y)
-            lanes[_Z, i] = select(was_hard, lanes[_Z, i], z)
-            lanes[_VX, i] = select(was_hard, lanes[_VX, i], vx)
-            lanes[_VY, i] = select(was_hard, lanes[_VY, i], vy)
-            lanes[_VZ, i] = select(was_hard, lanes[_VZ, i], vz)
-            left = select(was_hard, lanes[_LEFT, i], left)
-            lanes[_LEFT, i] = left
-            lanes[_HITS, i] += select(was_hard, 0.0, hits)
-            _add_impulse(chain, impulse, 0, i, surface[i], select(was_hard, 0.0, given))
-            is_hard = is_hard | was_hard
-            hard[i] = select(is_hard, 1.0, 0.0)
-            hard_lanes += is_hard
-            retired += (left <= 0.0) & (not is_hard)
-
-        if hard_lanes > 0:
-            for i in range(live):
-                if hard[i] != 0.0:
-                    x, y, z, vx, vy, vz, left, hits, status = methods.hard_pass(
-                        method, chain, gravity,
-                        lanes[_X, i], lanes[_Y, i], lanes[_Z, i], lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i],
-                        lanes[_LEFT, i], lanes[_K0, i], lanes[_K1, i], lanes[_K2, i], surface[i], impulse, i,
-                    )  # fmt: skip
-                    if status != Status.DONE.value:
-                        return status, particle[i]
-                    lanes[_X, i], lanes[_Y, i], lanes[_Z, i] = x, y, z
-                    lanes[_VX, i], lanes[_VY, i], lanes[_VZ, i] = vx, vy, vz
-                    lanes[_LEFT, i] = left
-                    lanes[_HITS, i] += hits
-                    retired += left <= 0.0
-
-        lane = 0
-        while retired > 0 and lane < live:
-            if lanes[_LEFT, lane] > 0.0:
-                lane += 1
-                continue
-            i = particle[lane]
-            position[0, i], position[1, i], position[2, i] = lanes[_X, lane], lanes[_Y, lane], lanes[_Z, lane]
-            velocity[0, i], velocity[1, i], velocity[2, i] = lanes[_VX, lane], lanes[_VY, lane], lanes[_VZ, lane]
-            impacts[i] += np.int64(lanes[_HITS, lane])
-            for s in range(surfaces):
-                total_impulse[s, i] += impulse[s, lane] * mass[i]
-            retired -= 1
-            live -= 1
-            for row in range(_ROWS):
-                lanes[row, lane] = lanes[row, live]
-            for s in range(surfaces):
-                impulse[s, lane] = impulse[s, live]
-            particle[lane] = particle[live]
+            rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
+            rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz
+            rows[_LEFT, i] = left
+            rows[_HITS, i] += hits
+            retired += not (left > 0.0)
+            if status > worst:
+                worst, where = status, i
+    return retired, worst, where

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import FileError, SceneError
+from .errors import SceneError
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Particles:
             raise SceneError(f"mass must be a finite number above 0, got {self.mass[first]:g} for particle {first}")
 
     def __len__(self) -> int:
-        return self.position.shape[1]
+        return int(self.position.shape[1])
 
     def __repr__(self) -> str:
         return f"Particles({len(self)})"
@@ -61,14 +61,14 @@ class Particles:
         """Particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
 
         Raises:
-            FileError: the file cannot be read.
-            SceneError: a column is missing or unknown, or a cell is not a number (names file, row, column).
+            SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names
+                file, row and column.
         """
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
                 table = list(csv.reader(file))
         except (OSError, UnicodeDecodeError) as error:
-            raise FileError(f"cannot read {path}: {error}") from error
+            raise SceneError(f"cannot read {path}: {error}") from error
         header = [name.strip() for name in table[0]] if table else []
         missing = [name for name in _COLUMNS if name not in header]
         unknown = [name for name in header if name not in (*_COLUMNS, "mass")]

@@ -76,7 +76,7 @@ class Scene:
         return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
 
     def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Signed gap of every surface at points (3, N), shape (surfaces, N); a point is admissible where all are <= 0."""
+        """Signed gap of every surface at points (3, N), shape (surfaces, N); admissible is <= 0 for all."""
         rows = np.asarray(points, dtype=np.float64)
         return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
 

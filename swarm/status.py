@@ -13,6 +13,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
+        """What happened, for the user."""
         return _SENTENCES[self]
 
 

@@ -4,4 +4,6 @@ from .base import Method
 from .impact import Impact
 from .penalty import Penalty
 
+__all__ = ["ALL_METHODS", "Impact", "Method", "Penalty"]
+
 ALL_METHODS: dict[str, type[Method]] = {"impact": Impact, "penalty": Penalty}

@@ -5,4 +5,6 @@ from .ellipsoid import Ellipsoid
 from .plane import Plane
 from .sphere import Sphere
 
+__all__ = ["ALL_SURFACES", "Ellipsoid", "Plane", "Sphere", "Surface"]
+
 ALL_SURFACES: dict[str, type[Surface]] = {"sphere": Sphere, "ellipsoid": Ellipsoid, "plane": Plane}

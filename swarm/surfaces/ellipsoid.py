@@ -41,8 +41,8 @@ class Ellipsoid(base.Surface):
         base.side_sign(self.side)
 
     def numbers(self) -> "EllipsoidNumbers":
-        weights = (1.0 / (axis * axis) for axis in self.semi_axes)
-        return EllipsoidNumbers(*self.center, *weights, base.side_sign(self.side))
+        a, b, c = (1.0 / (axis * axis) for axis in self.semi_axes)
+        return EllipsoidNumbers(*self.center, a, b, c, base.side_sign(self.side))
 
     def size(self) -> float:
         return min(self.semi_axes)

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from .._jit import select
 from ..checks import Vector, number, vector
 from ..errors import SceneError

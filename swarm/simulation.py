@@ -19,7 +19,6 @@ from .methods.base import Method
 from .particles import Particles, State
 from .scene import Scene
 from .status import Status
-from .surfaces.base import Surface
 
 # Blocks a thread and frame: enough that uneven ones even out, few enough that lanes stay full.
 _BLOCKS = 4
@@ -86,14 +85,15 @@ def simulate(
             tell the progress display
 
     Args:
-        scene, particles, method: what, from where, how. The particles are not changed.
+        scene: the walls and gravity.
+        particles: the start; it is not changed.
+        method: how to advance.
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
         recording: Rerun file to write (not yet supported).
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
 
-    Other arguments:
         progress: True for a progress bar, or a function that is called with every `Frame`.
         overwrite: replace an existing trajectory.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
@@ -124,7 +124,7 @@ def simulate(
 
     from .progress import display  # rich is imported only when it is shown
 
-    run = _Run(scene, particles, method, threads, block_size)
+    run = Run(scene, particles, method, threads, block_size)
     history: list[dict[str, Any]] = []
     with run, _output(trajectory, overwrite, scene, method, particles, scene_text) as write, display(progress) as show:
         now = method.span("time", 0.0)
@@ -196,11 +196,9 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
 def _distances_outside(scene: Scene, particles: Particles) -> NDArray[np.float64]:
     """Gap over its gradient for every surface and particle."""
 
-    def distance(gap: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
-        gradient = surface.gradient(particles.position)
-        return gap / np.maximum(np.sqrt((gradient**2).sum(axis=0)), np.finfo(np.float64).tiny)
-
-    return np.array([distance(*pair) for pair in zip(scene.gaps(particles.position), scene.surfaces, strict=True)])
+    gaps = scene.gaps(particles.position)
+    slopes = [np.sqrt((surface.gradient(particles.position) ** 2).sum(axis=0)) for surface in scene.surfaces]
+    return np.asarray(gaps / np.maximum(slopes, np.finfo(np.float64).tiny))
 
 
 def _magnitude(scene: Scene, particles: Particles) -> float:
@@ -227,7 +225,7 @@ def _output(
     return TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text)
 
 
-class _Run:
+class Run:
     """The state of a run and the threads that advance it."""
 
     def __init__(
@@ -261,7 +259,7 @@ class _Run:
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._frame_seconds = 0.0
 
-    def __enter__(self) -> "_Run":
+    def __enter__(self) -> "Run":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -272,9 +270,9 @@ class _Run:
         """Advance every particle by `span` in the method's unit."""
 
         def block(start: int, stop: int) -> tuple[int, int]:
-            return lanes.advance_block(
-                self._method, self._chain, self._gravity, self.state, span, start, stop, self._halt
-            )
+            args = self._method, self._chain, self._gravity, self.state, span, start, stop, self._halt
+            status, particle = lanes.advance_block(*args)
+            return status, particle
 
         began = time.perf_counter()
         status, particle = max(self._for_blocks(block))

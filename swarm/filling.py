@@ -80,7 +80,7 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> Floats:
         tried += _BATCH
         if tried >= _TRIES and found < 1e-6 * tried:
             raise SceneError(
-                f"fill found {found} admissible points in {tried} tries: the admissible part of the box {low.ravel()} to "
-                f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+                f"fill found {found} admissible points in {tried} tries: the admissible part of the box {low.ravel()} "
+                f"to {high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
             )
     return points

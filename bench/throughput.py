@@ -1,0 +1,274 @@
+"""Speed, memory, start-up and accuracy, each figure beside its bar.
+
+Times are of the kernels (`Run.advance`) unless the row says otherwise: minimum and median of the repeats. The bars are
+for a 2-core x86-64 with AVX-512; `ratio` is the figure over the bare loop in C of the same run, which is
+comparable from machine to machine.
+"""
+
+import csv
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import swarm
+from swarm import simulation
+
+from . import yardstick
+
+_RESULTS = Path(__file__).with_name("results")
+_ROOT = Path(__file__).parents[1]
+
+SPHERE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
+SLICE = swarm.Scene(
+    surfaces=[swarm.Sphere(radius=0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Plane((0.0, 0.0, 1.0), 0.3)]
+)
+SPEED = 0.5
+
+
+@dataclass
+class Row:
+    """One line of the report."""
+
+    what: str
+    best: float
+    median: float
+    unit: str
+    bar: str = ""
+    ratio: float | None = None
+
+
+def repeated(measure: Callable[[], float], repeats: int) -> tuple[float, float]:
+    """Minimum and median."""
+    values = [measure() for _ in range(repeats)]
+    return min(values), statistics.median(values)
+
+
+def advance_seconds(
+    scene: swarm.Scene, method: swarm.Impact | swarm.Penalty, n: int, until: float, threads: int = 1
+) -> Callable[[], tuple[float, int]]:
+    """A measurement: seconds of the kernels for one frame of `until`, and impacts."""
+    particles = swarm.fill(scene, n, speed=SPEED, seed=1)
+    span = method.span("until", until)
+
+    def measure() -> tuple[float, int]:
+        with simulation.Run(scene, particles, method, threads, None) as run:
+            run.advance(0.0, 0.0)  # compiles, and touches the arrays
+            start = time.perf_counter()
+            run.advance(span, until)
+            return time.perf_counter() - start, int(run.state.impacts.sum())
+
+    return measure
+
+
+def impacts(n: int, repeats: int, bare: float) -> list[Row]:
+    """Nanoseconds per impact."""
+    cases = [
+        ("Impact, sphere", SPHERE, swarm.Impact(), "6"),
+        ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "7.5"),
+        ("Impact, sphere and two planes", SLICE, swarm.Impact(), "8"),
+        ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), ""),
+        ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), ""),
+    ]
+    rows = []
+    for what, scene, method, bar in cases:
+        measure = advance_seconds(scene, method, n, until=100.0)
+
+        def nanoseconds(measure: Callable[[], tuple[float, int]] = measure) -> float:
+            seconds, count = measure()
+            return seconds / count * 1e9
+
+        best, median = repeated(nanoseconds, repeats)
+        rows.append(Row(what, best, median, "ns/impact", bar, best / bare if bare else None))
+    return rows
+
+
+def two_threads(n: int, repeats: int) -> list[Row]:
+    """Speed of two threads over one, alternating in one run."""
+    one, two = (advance_seconds(SPHERE, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
+    pairs = [(one()[0], two()[0]) for _ in range(repeats)]
+    ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
+    return [Row("two threads over one", ratio, statistics.median(a / b for a, b in pairs), "x", ">= 1.7")]
+
+
+def penalty(n: int, steps: int, repeats: int) -> list[Row]:
+    """Nanoseconds per particle-step, and the worst energy error; beside plain Verlet."""
+    rows = []
+    for dt, bar in ((1e-3, "0.9"), (0.025, "1.8")):
+        method = swarm.Penalty(dt=dt, penalty=1e4)
+        measure = advance_seconds(SPHERE, method, n, until=steps * dt)
+        best, median = repeated(lambda measure=measure: measure()[0] / (n * steps) * 1e9, repeats)
+        rows.append(Row(f"Penalty, sphere, dt={dt:g}", best, median, "ns/particle-step", bar))
+        particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+        def verlet(dt: float = dt, particles: swarm.Particles = particles) -> float:
+            position, velocity = particles.position.copy(), particles.velocity.copy()
+            start = time.perf_counter()
+            yardstick.plain_verlet(position, velocity, 0.5, 1e4, dt, steps)
+            return (time.perf_counter() - start) / (n * steps) * 1e9
+
+        verlet()
+        best, median = repeated(verlet, repeats)
+        rows.append(Row(f"  plain Verlet in Numba, dt={dt:g}", best, median, "ns/particle-step"))
+        result = swarm.simulate(SPHERE, particles, method, until=steps * dt, every=steps * dt / 10)
+        worst = float(result.observables["energy_error"].max())
+        rows.append(Row(f"  energy, worst particle, {steps} steps", worst, worst, "relative", "5e-12"))
+    return rows
+
+
+def overhead(frames: int, repeats: int) -> list[Row]:
+    """`simulate` without a file over 1.3 x the kernels' own time, per frame."""
+    n, every = 10_000, 0.1
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+    def excess() -> float:
+        with simulation.Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+            start = time.perf_counter()
+            for _ in range(frames):
+                run.advance(every, every)
+            kernel = time.perf_counter() - start
+        start = time.perf_counter()
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, threads=1)
+        return (time.perf_counter() - start - 1.3 * kernel) / frames * 1e6
+
+    excess()
+    best, median = repeated(excess, repeats)
+    return [Row(f"simulate - 1.3 x kernels, 10 000 particles, {frames} frames", best, median, "us/frame", "50")]
+
+
+_MEMORY = """
+import resource, sys, swarm
+n = int(sys.argv[1])
+scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+particles = swarm.fill(scene, n, speed=0.5, seed=1)
+swarm.simulate(scene, particles, swarm.Impact(), until=0.1, every=0.05, threads=2)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def _child(code: str, *args: str, **environment: str) -> str:
+    paths = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+    done = subprocess.run(
+        [sys.executable, "-c", code, *args],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": paths, **environment},
+    )
+    return done.stdout
+
+
+def memory(n: int) -> list[Row]:
+    """Peak bytes a particle of a whole run: caller's particles and engine's state."""
+    small, large = (float(_child(_MEMORY, str(k))) for k in (1000, n))
+    each = (large - small) / n
+    return [Row(f"memory, {n:,} particles".replace(",", " "), each, each, "bytes/particle", "200")]
+
+
+_FIRST_FRAME = """
+import time; start = time.perf_counter()
+from swarm import scene_file
+from swarm.simulation import simulate
+job = scene_file.read(r"{scene}")
+class Seen(Exception): pass
+def stop(frame):
+    if frame.number == 1: raise Seen
+try:
+    simulate(job.scene, job.particles(), job.method, until=job.run.until, every=job.run.every,
+             trajectory=r"{target}", overwrite=True, progress=stop, scene_text=job.text)
+except Seen:
+    print(time.perf_counter() - start)
+"""
+
+
+def start_up(repeats: int) -> list[Row]:
+    """Seconds from the start of Python's imports to the first computed frame of the main job, cold and warm."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = _ROOT / "examples" / "scenes" / "cavity.toml"
+        code = _FIRST_FRAME.format(scene=scene, target=Path(folder) / "cavity.h5")
+        cold = float(_child(code, NUMBA_CACHE_DIR=folder))
+        best, median = repeated(lambda: float(_child(code, NUMBA_CACHE_DIR=folder)), repeats)
+    return [
+        Row("first frame of the main job, first run", cold, cold, "s", "15"),
+        Row("first frame of the main job, later runs", best, median, "s", "1.5"),
+    ]
+
+
+def accuracy(many: float) -> list[Row]:
+    """Energy and penetration of Impact after many impacts each."""
+    rows = []
+    for name, scene in (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE)):
+        particles = swarm.fill(scene, 100, speed=SPEED, seed=2)
+        one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / 100 / 100.0
+        until = many / one
+        seen = swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / 1000).observables
+        mean = seen["impacts"][-1] / 100
+        worst = float(seen["energy_error"].max())
+        ulps = float(seen["max_penetration"].max()) / np.spacing(scene.size())
+        rows.append(Row(f"energy, Impact, {name}, {mean:.3g} impacts each", worst, worst, "relative", "1e-12"))
+        rows.append(Row(f"  largest penetration at 1001 frames, {name}", ulps, ulps, "ulp of the size", "4"))
+    return rows
+
+
+def main(quick: bool) -> None:
+    """Measure, print and, unless quick, write bench/results/throughput-MACHINE.csv."""
+    repeats = 2 if quick else 7
+    n = 5_000 if quick else 100_000
+    bare = yardstick.bare_impact(quick)
+    rows = [Row("bare loop in C, sphere", min(bare), statistics.median(bare), "ns/impact", "", 1.0)] if bare else []
+    rows += impacts(n, repeats, min(bare, default=0.0))
+    rows += two_threads(n, repeats)
+    rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
+    rows += overhead(50 if quick else 1_000, repeats)
+    rows += memory(100_000 if quick else 10_000_000)
+    rows += start_up(1 if quick else 3)
+    rows += accuracy(1e2 if quick else 1e5)
+    show(rows)
+    if not quick:
+        write(rows)
+
+
+def machine() -> str:
+    """The processor and its widest vectors."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return platform.processor() or platform.machine()
+    model = next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), "")
+    vectors = "AVX-512" if "avx512f" in text else "AVX2" if "avx2" in text else "SSE"
+    return f"{model}, {vectors}, {len(os.sched_getaffinity(0))} cores"
+
+
+def show(rows: list[Row]) -> None:
+    """The report on the screen."""
+    print(
+        f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
+    )
+    print(f"{'':<62}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
+    for row in rows:
+        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
+        print(f"{row.what:<62}{row.best:>10.3g}{row.median:>10.3g}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
+
+
+def write(rows: list[Row]) -> None:
+    """The report as CSV, one file a kind of machine."""
+    name = "".join(c if c.isalnum() else "-" for c in machine().lower()).strip("-")
+    path = _RESULTS / f"throughput-{name}.csv"
+    path.parent.mkdir(exist_ok=True)
+    with open(path, "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["what", "min", "median", "unit", "bar", "ratio"])
+        for row in rows:
+            ratio = "" if row.ratio is None else f"{row.ratio:.3g}"
+            table.writerow([row.what, f"{row.best:.4g}", f"{row.median:.4g}", row.unit, row.bar, ratio])
+    print(f"written to {path.relative_to(_ROOT)}")

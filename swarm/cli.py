@@ -1,0 +1,151 @@
+"""The commands. No physics, and no heavy import before it is needed: --help must be fast."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .errors import SceneError, SwarmError
+from .version import VERSION
+
+if TYPE_CHECKING:
+    from .simulation import Result
+
+_DONE, _FAILED, _BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Simulate particles bouncing in rigid cavities and off rigid solids, with energy conserved to round-off.",
+    epilog="Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"swarm {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")
+def run(
+    scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene, the method and the run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Threads [default: all cores]; results do not depend on it.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing trajectory.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+) -> None:
+    """Simulate a scene file and write its trajectory."""
+    from . import scene_file as files
+    from .output.trajectory import check_target
+
+    job = files.read(scene_file)
+    target = output or Path(job.run.trajectory or scene_file.with_suffix(".h5").name)
+    # Before particles are made and kernels compiled.
+    check_target(target, overwrite)
+
+    from .simulation import simulate
+
+    result = simulate(
+        job.scene,
+        job.particles(),
+        job.method,
+        until=job.run.until,
+        every=job.run.every,
+        trajectory=target,
+        threads=threads if threads is not None else job.run.threads,
+        progress=not quiet,
+        overwrite=overwrite,
+        scene_text=job.text,
+    )
+    if not quiet:
+        _summary(result)
+
+
+@app.command(epilog="Example:  swarm info cavity.h5")
+def info(file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")]) -> None:
+    """Say what a trajectory holds."""
+    from .output.trajectory import load
+
+    with load(file) as trajectory:
+        times, seen = trajectory.times, trajectory.observables
+        rows = {
+            "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+            "particles": f"{len(trajectory.frame(0)) if len(times) else 0}",
+            "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
+            "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
+            "method": _call(trajectory.method),
+            "observables": ", ".join(seen),
+            "size": f"{file.stat().st_size / 1e6:.1f} MB",
+        }
+        if len(times):
+            rows |= _figures(seen)
+    _table(rows)
+
+
+def _call(described: Any) -> str:
+    """A surface or method as one would write it."""
+    return str(described).replace("swarm.", "")
+
+
+def _figures(seen: dict[str, Any]) -> dict[str, str]:
+    """The figures that say whether a run went well."""
+    energy = seen["total_energy"]
+    drift = abs(energy[-1] - energy[0]) / abs(energy[0]) if energy[0] else abs(energy[-1])
+    return {
+        "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
+        "energy drift": f"{drift:.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
+        "largest penetration": f"{seen['max_penetration'].max():.1e} m",
+    }
+
+
+def _summary(result: "Result") -> None:
+    seen = result.observables
+    rate = seen["impacts"][-1] / result.wall_time
+    rows = {
+        **_figures(seen),
+        "wall time": f"{result.wall_time:.2f} s, {rate:.3g} impacts/s",
+        "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",
+    }
+    _table(rows)
+
+
+def _table(rows: dict[str, str]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console(highlight=False).print(table)
+
+
+def main() -> None:
+    """Run the command line; the exit code is 0 done, 1 the run failed, 2 bad input, 130 interrupted."""
+    try:
+        app(standalone_mode=True)
+    except SwarmError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(_BAD_INPUT if isinstance(error, SceneError) else _FAILED)
+    except KeyboardInterrupt:
+        print("interrupted: the trajectory holds the frames that were finished", file=sys.stderr)
+        sys.exit(_INTERRUPTED)

@@ -1,0 +1,92 @@
+"""Descriptions as plain tables (what a scene file and a trajectory hold) and back.
+
+Every error names the key by its full path, such as surface[1].radius.
+"""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import msgspec
+
+from .checks import closest, listed, one_of
+from .errors import SceneError
+from .methods import ALL_METHODS, Method
+from .scene import Scene
+from .surfaces import ALL_SURFACES, Surface
+
+T = TypeVar("T")
+
+
+def scene_of(surfaces: Any, gravity: Any) -> Scene:
+    """A scene from its tables: a list of surface tables, and gravity or None."""
+    if not isinstance(surfaces, list) or not surfaces:
+        raise SceneError("surface: expected at least one [[surface]] table, got none")
+    built = [_described(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
+    return Scene(surfaces=built, gravity=gravity)
+
+
+def method_of(table: Any) -> Method:
+    """A method from its table."""
+    return _described(table, "method", ALL_METHODS)
+
+
+def table_of(described: Surface | Method) -> dict[str, Any]:
+    """The table of a surface or a method: its kind, and every argument that is not None."""
+    kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
+    table = {key: value for key, value in dataclasses.asdict(described).items() if value is not None}
+    return {"kind": kinds[type(described)], **table}
+
+
+def scene_table(scene: Scene) -> dict[str, Any]:
+    """The tables of a scene."""
+    gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
+    return {**gravity, "surface": [table_of(surface) for surface in scene.surfaces]}
+
+
+def convert(table: Any, cls: type[T], where: str) -> T:
+    """A dataclass from a table: no unknown key, no missing one, every value of its type."""
+    if not isinstance(table, Mapping):
+        raise SceneError(f"{where}: expected a table, got {table!r}")
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    names = {field.metadata.get("key", field.name): field for field in fields}
+    for key in table:
+        if key not in names:
+            hint = "; gravity stands at the top, before the first table" if key == "gravity" else closest(key, names)
+            raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
+    for key, field in names.items():
+        if field.default is dataclasses.MISSING and key not in table:
+            raise SceneError(f"{where}.{key}: expected {_type_name(field.type)}, got nothing; add {key} = ...")
+    try:
+        return msgspec.convert({names[key].name: value for key, value in table.items()}, cls)
+    except msgspec.ValidationError as error:
+        raise SceneError(_sentence(str(error), where, table)) from None
+
+
+def _described(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
+    if not isinstance(table, Mapping):
+        raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
+    if "kind" not in table:
+        raise SceneError(f"{where}.kind: expected one of {listed(kinds)}, got nothing")
+    cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
+    return convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
+
+
+def _type_name(kind: Any) -> str:
+    return {"float": "a number", "int": "a whole number", "Vector": "three numbers"}.get(
+        getattr(kind, "__name__", str(kind)), "three numbers" if "tuple" in str(kind) else "a value"
+    )
+
+
+def _sentence(message: str, where: str, table: Mapping[str, Any]) -> str:
+    """Msgspec's "Expected `float`, got `str` - at `$.radius`", with the key first and the value that came."""
+    match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*)`)?", message)
+    assert match is not None
+    reason, path = match.groups()
+    if not path:
+        # From our own checks, which begin with the argument's name.
+        return f"{where}.{reason}"
+    key = re.split(r"[.\[]", path)[0]
+    value = f" (in {key} = {table[key]!r})" if key in table else ""
+    return f"{where}.{path}: {reason[0].lower()}{reason[1:].replace('`', '')}{value}"

@@ -1,0 +1,73 @@
+"""Tables that the tests share: a new surface, method or law joins by one line."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+import swarm
+from swarm.contact.regularisation import regularisation
+from swarm.surfaces import base
+
+settings.register_profile(
+    "swarm", derandomize=True, max_examples=40, deadline=None, suppress_health_check=list(HealthCheck)
+)
+settings.load_profile("swarm")
+
+EPSILON = float(np.finfo(np.float64).eps)
+
+# Every surface at every scale: `SURFACES[name](scale)`.
+SURFACES = {
+    "sphere": lambda s=1.0: swarm.Sphere(0.7 * s, (0.2 * s, -0.3 * s, 0.1 * s)),
+    "ball": lambda s=1.0: swarm.Sphere(0.7 * s, (0.2 * s, -0.3 * s, 0.1 * s), side="outside"),
+    "ellipsoid": lambda s=1.0: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s)),
+    "egg": lambda s=1.0: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s), "outside"),
+    "plane": lambda s=1.0: swarm.Plane((1.0, -2.0, 0.5), 0.3 * s),
+}
+METHODS = {
+    "impact": swarm.Impact(),
+    "impact, chord": swarm.Impact(contact_step=1e-3),
+    "penalty": swarm.Penalty(dt=1e-3, penalty=1e4),
+}
+LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 3.5, 4.0)}
+
+every_surface = pytest.mark.parametrize("name", SURFACES)
+every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+
+_unit = st.floats(-1.0, 1.0, allow_subnormal=False)
+vectors = st.tuples(_unit, _unit, _unit).map(np.array)
+directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.05)
+scales = st.sampled_from([1e-6, 1e-3, 1.0, 1e3, 1e6])
+
+
+def numbers_of(name, scale=1.0):
+    """The tuple of numbers of a surface of the table."""
+    return SURFACES[name](scale).numbers()
+
+
+def call(function, *arguments):
+    """A kernel's scalar function in plain Python, in the arithmetic of kernels: 1/0 is infinite and no error."""
+    flat = []
+    for part in arguments:
+        flat += map(np.float64, np.atleast_1d(part)) if isinstance(part, (float, int, np.ndarray)) else [part]
+    with np.errstate(all="ignore"):
+        return function(*flat)
+
+
+def wall_point(surface, point):
+    """A point of the surface, by Newton's method along the gradient."""
+    for _ in range(30):
+        gradient = np.array(call(base.gradient, surface, point))
+        point = point - call(base.phi, surface, point) / (gradient @ gradient) * gradient
+    return np.array(call(base.settle, surface, point))
+
+
+def gap(surface, point):
+    """The signed gap at a point."""
+    return float(call(base.gap_of, surface, call(base.inner, surface, point)))
+
+
+@pytest.fixture
+def scene():
+    """A factory of scenes from names of the table."""
+    return lambda *names, **keywords: swarm.Scene([SURFACES[name]() for name in names], **keywords)
