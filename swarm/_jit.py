@@ -64,6 +64,12 @@ def kernel(function: F) -> F:
         _CONFIG.CACHE_DIR = previous
 
 
+def outlined(function: F) -> F:
+    """Compile a helper that is rare and long: inlining it would only cost compile time."""
+    compiled: F = numba.njit(**_FLAGS)(function)
+    return compiled
+
+
 def inlined(function: F) -> F:
     """Compile a helper that is always inlined into the kernel that calls it, so that its loop vectorises."""
     compiled: F = numba.njit(**_INLINE)(function)
@@ -80,19 +86,28 @@ def _python_class(kind: Any) -> Any:
 
 
 def by_type(function: Callable[..., Any]) -> Any:
-    """A function dispatched on the type of its first argument, in Python and inside kernels alike.
+    """A function dispatched on the type of its first argument, in Python and inside kernels alike; always inlined.
 
     Register a definition with `@name.register(Class)`, where Class is a NamedTuple of numbers, or
     `type(None)` for "the scene has none". Registered functions carry no annotations and the same argument
     names, because Numba compares signatures.
     """
+    return _dispatched(function, _INLINE)
+
+
+def by_type_outlined(function: Callable[..., Any]) -> Any:
+    """`by_type` for what is rare and long: inlining it would only cost compile time."""
+    return _dispatched(function, _FLAGS)
+
+
+def _dispatched(function: Callable[..., Any], options: Any) -> Any:
     generic = functools.singledispatch(function)
 
     @functools.wraps(function)
     def chosen(*args: Any) -> Any:
         return generic.dispatch(_python_class(args[0]))
 
-    overload(generic, jit_options=_INLINE)(chosen)
+    overload(generic, jit_options=options)(chosen)
     return generic
 
 

@@ -28,8 +28,7 @@ class Lanes(NamedTuple):
 
     rows: Array  # (_ROWS, stride) position, velocity, time left, the method's constants, impacts
     impulse: Array  # (surfaces, stride) normal impulse per mass
-    surface: Array  # the wall of the contact in this pass, or -1
-    hard: Array  # 1 where the pass needs loops and branches
+    surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     change: Array  # its last Newton step
     particle: Array  # int64, the particle in the lane
@@ -45,19 +44,15 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         np.empty((_ROWS, _STRIDE)),
         np.empty((walls.length(chain), _STRIDE)),
         np.empty(_STRIDE),
-        np.empty(_STRIDE),
         np.zeros(_STRIDE),
         np.zeros(_STRIDE),
         np.empty(_STRIDE, np.int64),
     )
-    live, following = 0, start
-    while True:
-        while live < _LANES and following < stop:
-            _load(method, lanes, live, state, following, span)
-            live += 1
-            following += 1
-        if live == 0:
-            return Status.DONE.value, stop - 1
+    live = min(_LANES, stop - start)
+    for lane in range(live):
+        _load(method, lanes, lane, state, start + lane, span)
+    following = start + live
+    while live > 0:
         if halt[0] != 0:
             return Status.INTERRUPTED.value, stop - 1
         _fly(method, chain, gravity, lanes, live)
@@ -72,11 +67,18 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         while retired > 0:
             if lanes.rows[_LEFT, lane] > 0.0:
                 lane += 1
+                continue
+            _retire(lanes, lane, state)
+            retired -= 1
+            if following < stop:
+                _load(method, lanes, lane, state, following, span)
+                following += 1
+                # It may be done already: a span of 0.
+                lane += 1
             else:
-                _retire(lanes, lane, state)
-                retired -= 1
                 live -= 1
                 _move(lanes, live, lane)
+    return Status.DONE.value, stop - 1
 
 
 # --- A particle in and out -------------------------------------------------------------------------------
@@ -131,9 +133,9 @@ def _move(lanes, source, target):
 @inlined
 def _fly(method, chain, gravity, lanes, live):
     """Every lane to its next contact, or to the end of the frame."""
-    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    rows, surface = lanes.rows, lanes.surface
     for i in range(live):
-        x, y, z, vx, vy, vz, left, wall, is_hard = methods.flight(
+        x, y, z, vx, vy, vz, left, surface[i] = methods.flight(
             method, chain, gravity,
             rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
             rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i],
@@ -141,8 +143,6 @@ def _fly(method, chain, gravity, lanes, live):
         rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
         rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz
         rows[_LEFT, i] = left
-        surface[i] = wall
-        hard[i] = select(is_hard, 1.0, 0.0)
 
 
 @inlined
@@ -172,29 +172,22 @@ def _solve(method, chain, gravity, lanes, live):
 @inlined
 def _contact(method, chain, gravity, lanes, live):
     """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
-    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    rows, surface = lanes.rows, lanes.surface
     impulse, kappa, change = lanes.impulse, lanes.kappa, lanes.change
     retired, hard_lanes = 0, 0
     for i in range(live):
-        x, y, z, vx, vy, vz, left, given, hits, is_hard = methods.contact(
+        x, y, z, vx, vy, vz, left, wall, given, hits = methods.contact(
             method, chain, gravity,
             rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
             rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], kappa[i], change[i],
         )  # fmt: skip
-        # A lane that is hard already stays as it is.
-        was_hard = hard[i] != 0.0
-        rows[_X, i] = select(was_hard, rows[_X, i], x)
-        rows[_Y, i] = select(was_hard, rows[_Y, i], y)
-        rows[_Z, i] = select(was_hard, rows[_Z, i], z)
-        rows[_VX, i] = select(was_hard, rows[_VX, i], vx)
-        rows[_VY, i] = select(was_hard, rows[_VY, i], vy)
-        rows[_VZ, i] = select(was_hard, rows[_VZ, i], vz)
-        left = select(was_hard, rows[_LEFT, i], left)
+        rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
+        rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz
         rows[_LEFT, i] = left
-        rows[_HITS, i] += select(was_hard, 0.0, hits)
-        _add_impulse(chain, impulse, 0, i, surface[i], select(was_hard, 0.0, given))
-        is_hard = is_hard | was_hard
-        hard[i] = select(is_hard, 1.0, 0.0)
+        rows[_HITS, i] += hits
+        surface[i] = wall
+        _add_impulse(chain, impulse, 0, i, wall, given)
+        is_hard = wall <= methods.HARD
         hard_lanes += is_hard
         retired += (not (left > 0.0)) & (not is_hard)
     return retired, hard_lanes
@@ -220,14 +213,14 @@ def _(chain, impulse, row, lane, surface, given):
 @inlined
 def _hard_passes(method, chain, gravity, lanes, live):
     """The hard lanes, one by one: (lanes that reached the end of the frame, worst status, its lane)."""
-    rows, surface, hard = lanes.rows, lanes.surface, lanes.hard
+    rows, surface = lanes.rows, lanes.surface
     retired, worst, where = 0, 0, 0
     for i in range(live):
-        if hard[i] != 0.0:
+        if surface[i] <= methods.HARD:
             x, y, z, vx, vy, vz, left, hits, status = methods.hard_pass(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], lanes.impulse, i,
+                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], methods.HARD - surface[i], lanes.impulse, i,
             )  # fmt: skip
             rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
             rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz

@@ -3,7 +3,6 @@
 Sums run over fixed chunks of particles in a fixed order, so they have the same bits for any number of threads.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from .surfaces import chain as walls
 # Particles a partial sum: a constant of the results, unlike the block size.
 CHUNK = 1024
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
-_COLUMNS = 64
+_COLUMNS = 128
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
@@ -67,11 +66,9 @@ def penetration(chain, x, y, z):
 
 @penetration.register(walls.Chain)
 def _(chain, x, y, z):
-    gap = surfaces.gap_of(chain.first, surfaces.inner(chain.first, x, y, z))
-    gx, gy, gz = surfaces.gradient(chain.first, x, y, z)
-    distance = select(gap > 0.0, gap / math.sqrt(gx * gx + gy * gy + gz * gz), 0.0)
+    distance = surfaces.distance(chain.first, x, y, z)
     other = penetration(chain.rest, x, y, z)
-    return select(other > distance, other, distance)
+    return select(distance > other, distance, other)
 
 
 @penetration.register(Nothing)

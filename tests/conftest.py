@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 
 import swarm
@@ -10,7 +10,12 @@ from swarm.contact.regularisation import regularisation
 from swarm.surfaces import base
 
 settings.register_profile(
-    "swarm", derandomize=True, max_examples=40, deadline=None, suppress_health_check=list(HealthCheck)
+    "swarm",
+    derandomize=True,
+    max_examples=40,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+    phases=[Phase.explicit, Phase.generate, Phase.shrink],
 )
 settings.load_profile("swarm")
 

@@ -9,7 +9,7 @@ convex, decreasing function of kappa, so Newton's method from the left climbs to
 
 import math
 
-from .._jit import by_type, inlined, select
+from .._jit import by_type, inlined, outlined, select
 from ..gravity import Nothing
 from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
@@ -100,7 +100,7 @@ def unsolved(kappa, change):
     return not (abs(change) <= _NEWTON_TOLERANCE * abs(kappa))
 
 
-@inlined
+@outlined
 def careful(law, surface, x, y, z, px, py, pz, c):
     """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
     q0 = surfaces.inner(surface, x, y, z)

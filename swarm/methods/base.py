@@ -3,15 +3,18 @@
 A pass is a free flight followed by at most one contact. Its parts are scalar, branch-free functions, and lanes.py
 loops over each part separately: short loops keep more lanes in the processor's window than one long loop (measured on
 Zen 3: 7.8 instead of 10.3 ns an impact in an ellipsoid, 3.2 instead of 5.8 for the bare loop in C). What is rare and
-needs loops and branches sets `hard`, and `hard_pass` does it alone.
+needs loops and branches is left to `hard_pass`.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from .._jit import by_type
+from .._jit import by_type, by_type_outlined
 from ..particles import Particles
 from ..scene import Scene
+
+# A wall this low in place of a surface index asks for `hard_pass`: HARD - wall is the surface.
+HARD = -2.0
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,10 @@ def lane_constants(method, mass, energy, vx, vy, vz):
 
 @by_type
 def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
-    """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface, hard).
+    """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
 
-    `left` is what is left of the frame, in the method's unit; `surface` is the wall of the contact that follows, or -1;
-    `hard` sends the lane to `hard_pass`.
+    `left` is what is left of the frame, in the method's unit; `surface` is the wall of the contact that follows, or -1
+    for none; `HARD - wall` leaves the contact to `hard_pass`.
     """
     raise NotImplementedError
 
@@ -70,14 +73,15 @@ def improve(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, cha
 
 @by_type
 def contact(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, change):
-    """The contact with `surface`: (x, y, z, vx, vy, vz, left, impulse, hits, hard).
+    """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits).
 
-    `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts.
+    `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts. A `surface` that is HARD
+    already passes through and nothing else changes; to become hard, return `HARD - surface`.
     """
     raise NotImplementedError
 
 
-@by_type
+@by_type_outlined
 def hard_pass(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, lane):
     """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, status); adds to `impulse[surface, lane]`."""
     raise NotImplementedError

@@ -155,8 +155,9 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
     time, surface = walls.first_hit(chain, x, y, z, vx, vy, vz)
     hit = time <= left
     t = select(hit, time, left)
-    surface = select(hit, surface, -1.0)
-    return x + t * vx, y + t * vy, z + t * vz, vx, vy, vz, left - t, surface, hit & (time < k2)
+    # A flight shorter than the shortest ends in a contact that may graze.
+    surface = select(hit, select(time < k2, base.HARD - surface, surface), -1.0)
+    return x + t * vx, y + t * vy, z + t * vz, vx, vy, vz, left - t, surface
 
 
 @base.contact.register(ImpactNumbers)
@@ -173,9 +174,9 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
         select(hit, wy, vy),
         select(hit, wz, vz),
         left - select(hit, used, 0.0),
+        surface,
         select(hit, impulse, 0.0),
         select(hit, 1.0, 0.0),
-        False,
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from .._jit import by_type, inlined, select
+from .._jit import by_type_outlined, outlined, select
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..errors import SceneError
@@ -104,8 +104,9 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
     x, y, z, left = x + dx, y + dy, z + dz, left - steps
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
     surface, count = walls.touched(chain, x, y, z, px, py, pz)
-    steps_left = left > 0.0
-    return x, y, z, vx, vy, vz, left, select(steps_left, surface, -1.0), steps_left & (count > 1.0)
+    # Several walls at once: the careful way.
+    surface = select(count > 1.0, base.HARD - surface, surface)
+    return x, y, z, vx, vy, vz, left, select(left > 0.0, surface, -1.0)
 
 
 @base.most_sweeps.register(PenaltyNumbers)
@@ -146,8 +147,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
 
     # A push into another wall, or a slow solve: the careful way.
     solved = (not contact_impulse.unsolved(kappa, change)) & (not walls.outside(chain, surface, x1, y1, z1))
-    steps_left = left > 0.0
-    step = steps_left & (solved | (not touching))
+    step = (left > 0.0) & select(touching, solved, surface > base.HARD)
     new = step & touching & (not walls.outside(chain, -1.0, x, y, z))
     return (
         select(step, x1, x),
@@ -157,23 +157,23 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
         select(step, wy, vy),
         select(step, wz, vz),
         left - select(step, 1.0, 0.0),
+        select(touching & (not solved), base.HARD - surface, surface),
         select(step, abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz), 0.0),
         select(new, 1.0, 0.0),
-        steps_left & touching & (not solved),
     )
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@inlined
+@outlined
 def _reaction(surface, x0, y0, z0, x1, y1, z1, kappa):
     """kappa D(r0, r1) of one surface."""
     gx, gy, gz = surfaces.inner_gradient(surface, x0, y0, z0, x1, y1, z1)
     return kappa * gx, kappa * gy, kappa * gz
 
 
-@by_type
+@by_type_outlined
 def _reactions(chain, kappas, k, x0, y0, z0, x1, y1, z1):
     """The sum of kappa D over all surfaces."""
     raise NotImplementedError
@@ -191,7 +191,7 @@ def _(chain, kappas, k, x0, y0, z0, x1, y1, z1):
     return 0.0, 0.0, 0.0
 
 
-@by_type
+@by_type_outlined
 def _sweep(chain, law, kappas, k, x0, y0, z0, px, py, pz, c, x1, y1, z1, whole, ok):
     """One Gauss-Seidel sweep: each wall is solved with the reactions of the others held. (r1, solved)"""
     raise NotImplementedError
@@ -213,7 +213,7 @@ def _(chain, law, kappas, k, x0, y0, z0, px, py, pz, c, x1, y1, z1, whole, ok):
     return x1, y1, z1, ok
 
 
-@by_type
+@by_type_outlined
 def _add_impulses(chain, kappas, k, f, x0, y0, z0, x1, y1, z1, impulse, lane):
     """Add |2 kappa/h D| of each surface to its row."""
     raise NotImplementedError

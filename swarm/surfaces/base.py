@@ -144,6 +144,13 @@ def level_of(surface, q):
 
 
 @by_type
+def distance(surface, x, y, z):
+    """Signed distance outside, to first order: g/|grad g|."""
+    gx, gy, gz = gradient(surface, x, y, z)
+    return gap_of(surface, inner(surface, x, y, z)) / math.sqrt(gx * gx + gy * gy + gz * gz)
+
+
+@by_type
 def gap_slope(surface, q0, q1):
     """Divided difference g[q0, q1] = (g1 - g0)/(q1 - q0), without cancellation, and its derivative by q1.
 

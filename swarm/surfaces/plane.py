@@ -116,6 +116,11 @@ def _(surface, q):
     return q - surface.offset
 
 
+@base.distance.register(PlaneNumbers)
+def _(surface, x, y, z):
+    return base.gap_of(surface, base.inner(surface, x, y, z))
+
+
 @base.gap_slope.register(PlaneNumbers)
 def _(surface, q0, q1):
     return 1.0, 0.0

@@ -135,6 +135,11 @@ def _(surface, q):
     return surface.side * (q - surface.radius2)
 
 
+@base.distance.register(SphereNumbers)
+def _(surface, x, y, z):
+    return base.gap_of(surface, base.inner(surface, x, y, z))
+
+
 @base.gap_slope.register(SphereNumbers)
 def _(surface, q0, q1):
     # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1))

@@ -1,5 +1,7 @@
 """What every surface must be, whatever its formula: each fact runs over the table of conftest.py."""
 
+import functools
+import itertools
 import math
 
 import mpmath as mp
@@ -17,7 +19,7 @@ from conftest import (
     vectors,
     wall_point,
 )
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
@@ -41,23 +43,36 @@ def level_along(surface, position, velocity, acceleration=(0.0, 0.0, 0.0)):
     return base.level_of(surface, base.inner(surface, *flight))
 
 
-def noise(surface, level, position, time=0.0):
-    """The round-off of the level at a time of a flight: a few units in the last place of its largest term."""
-    slope = np.linalg.norm(np.multiply(call(base.inner_gradient, surface, position, position), 1.0))
-    terms = abs(call(base.inner, surface, position)) + abs(base.level_of(surface, 0.0)) + slope * max(abs(position))
-    return 16 * EPSILON * (terms + sum(abs(part) * mp.mpf(time) ** k for k, part in enumerate(level.coef) if k))
+def noise(surface, level, position, velocity, time=0.0):
+    """The round-off of the level at a time of a flight: a few units in the last place of its largest terms."""
+    slope = np.linalg.norm(call(base.inner_gradient, surface, position, position))
+    terms = abs(call(base.inner, surface, position)) + abs(base.level_of(surface, 0.0))
+    terms += slope * (np.linalg.norm(position) + np.linalg.norm(velocity) * time)
+    return 16 * EPSILON * (terms + sum(abs(part) * mp.mpf(float(time)) ** k for k, part in enumerate(level.coef) if k))
 
 
 def real_roots(polynomial):
-    """Real roots of a polynomial, sorted; coefficients that vanished in 50 digits do not count."""
+    """Real roots of a polynomial to 40 digits, sorted: between its turning points, by bisection."""
     coefficients = list(polynomial.coef)
     while coefficients and abs(coefficients[-1]) <= mp.mpf(10) ** -45 * max(map(abs, polynomial.coef)):
         coefficients.pop()
     if len(coefficients) < 2:
         return []
-    roots = mp.polyroots(coefficients[::-1], maxsteps=500, extraprec=400)
-    size = max(map(abs, roots)) or 1
-    return sorted(root.real for root in roots if abs(root.imag) <= mp.mpf(10) ** -18 * size)
+
+    def value(t):
+        return functools.reduce(lambda sum_, part: sum_ * t + part, coefficients[::-1])
+
+    far = 1 + max(abs(part / coefficients[-1]) for part in coefficients)
+    stops = [-far, *real_roots(Polynomial(np.array(coefficients)).deriv()), far]
+    roots = []
+    for low, high in itertools.pairwise(stops):
+        if (value(low) > 0) == (value(high) > 0):
+            continue
+        while high - low > mp.mpf(10) ** -40 * max(abs(low), abs(high)) and high - low > mp.mpf(10) ** -60:
+            middle = (low + high) / 2
+            low, high = (low, middle) if (value(low) > 0) != (value(middle) > 0) else (middle, high)
+        roots.append((low + high) / 2)
+    return roots
 
 
 def highest(level, end):
@@ -186,7 +201,7 @@ def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, 
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
     time = call(base.first_hit, surface, position, velocity)
     level = level_along(surface, position, velocity)
-    slack = noise(surface, level, position, time if time < math.inf else scale / np.linalg.norm(velocity))
+    slack = noise(surface, level, position, velocity, time if time < math.inf else scale / np.linalg.norm(velocity))
     outside_at_start = max(level(mp.mpf(0)), 0)
     assert time >= 0.0
     if time == math.inf:
@@ -196,7 +211,8 @@ def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, 
     assert highest(level, time) <= slack + outside_at_start
     assert abs(level(mp.mpf(float(time)))) <= slack + outside_at_start
     slope, bend = level.deriv()(mp.mpf(float(time))), abs(level.deriv(2)(mp.mpf(0)))
-    graze = 4 * mp.sqrt(bend * (slack + outside_at_start)) + 8 * EPSILON * sum(map(abs, level.deriv().coef))
+    steep = np.linalg.norm(call(base.inner_gradient, surface, position, position)) * np.linalg.norm(velocity)
+    graze = 4 * mp.sqrt(bend * (slack + outside_at_start)) + 16 * EPSILON * (steep + bend * mp.mpf(float(time)))
     assert slope >= -graze
     if slope > 100 * graze and time > 0.0:
         root = min(real_roots(level), key=lambda root: abs(root - time))
@@ -228,9 +244,9 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
     level = level_along(surface, position, velocity, pull)
     assert time >= 0.0
     if time == math.inf:
-        assert highest(level, 1e3 / (speed * math.sqrt(heavy))) <= noise(surface, level, position)
+        assert highest(level, 1e3 / (speed * math.sqrt(heavy))) <= noise(surface, level, position, velocity)
     elif time > 0.0:
-        slack = noise(surface, level, position, time)
+        slack = noise(surface, level, position, velocity, time)
         assert highest(level, time) <= slack
         assert all(level(mp.mpf(float(time)) * k / 20) <= slack for k in range(21))
     if depth >= 1e-3:
@@ -238,6 +254,7 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
 
 
 @every_surface
+@settings(max_examples=15)
 @given(point=directions, direction=directions, pull=directions, lean=st.floats(0.3, 1.0))
 def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
     """The same as the exact root of the quartic, after a few dozen safe steps."""
@@ -247,10 +264,11 @@ def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
     leaves = [root for root in exits if highest(level, root * (1 - mp.mpf(10) ** -12)) < 0]
     time = 0.0
     for _ in range(60):
+        if time == math.inf:
+            break
         now = position + velocity * time + 0.5 * pull * time * time
         time += call(base.safe_time, surface, now, velocity + pull * time, pull)
-    if leaves:
-        assert time == pytest.approx(float(leaves[0]), rel=1e-12)
+    assert time == pytest.approx(float(leaves[0]), rel=1e-12) if leaves else time > 0.0
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
@@ -329,7 +347,7 @@ def test_pushed_is_the_inner_function_of_push(name, point, free, strength, scale
 
 
 @every_surface
-@given(point=directions, direction=directions, length=st.floats(1e-9, 1.0), scale=scales)
+@given(point=directions, direction=directions, length=st.floats(1e-9, 0.3), scale=scales)
 def test_chord_normal_reflects_along_a_chord(name, point, direction, length, scale):
     """From the wall a step with the mean of the old and the reflected velocity ends on the wall; |v| is kept."""
     surface = numbers_of(name, scale)

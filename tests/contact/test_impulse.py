@@ -1,0 +1,153 @@
+"""The scalar equation (K) of a penalty step, kappa = c V[g0, g1] g[q0, q1], against 50 digits."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from conftest import EPSILON, LAWS, call, directions, every_surface, numbers_of, wall_point
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm.contact import impulse
+from swarm.contact import regularisation as laws
+from swarm.surfaces import base
+from swarm.surfaces.chain import Chain
+
+mp.mp.dps = 50
+some_laws = pytest.mark.parametrize("law", [LAWS["1.0"], LAWS["1.5"], LAWS["2.0"]], ids=["1", "1.5", "2"])
+
+steps = {
+    "point": directions,
+    "direction": directions,
+    "lean": st.floats(0.05, 1.0) | st.floats(-1.0, -0.05),
+    "depth": st.sampled_from([0.0, 1e-3, 0.02, 0.1, -1e-4, -1e-2, -0.05]),
+    "length": st.sampled_from([1e-4, 1e-2, 0.1, 0.2]),
+    "stiffness": st.sampled_from([1e-3, 1.0, 30.0, 1e3]),
+}
+
+
+class Step:
+    """One step next to the wall: where from, how far the free flight goes, how stiff the wall is for the mass."""
+
+    def __init__(self, name, law, point, direction, lean, depth, length, stiffness):
+        self.law, self.surface = law, numbers_of(name)
+        wall = wall_point(self.surface, point)
+        normal = np.array(call(base.unit_normal, self.surface, wall))
+        along = direction - (direction @ normal) * normal
+        along /= max(np.linalg.norm(along), 1e-3)
+        self.start = wall - depth * normal
+        self.free = length * (lean * normal + math.sqrt(1.0 - lean * lean) * along)
+        # c of (K) from c alpha/2 ~ stiffness where the slope of q is 1
+        self.c = stiffness / law.alpha / np.linalg.norm(self.inner_slope(self.start)) ** 2
+
+    def inner_slope(self, point):
+        return call(base.inner_gradient, self.surface, point, point)
+
+    def gap(self, point):
+        return getattr(self.surface, "side", 1.0) * base.phi(self.surface, *point)
+
+    def energy(self, point):
+        """V with 50 digits; its exponent from the law."""
+        a = {laws.Linear: 1, laws.Hertz: mp.mpf("1.5")}.get(type(self.law)) or mp.mpf(self.law.a)
+        return mp.mpf(self.law.alpha) * max(self.gap(point), 0) ** (a + 1) / (a + 1)
+
+    def end(self, kappa):
+        """r1 = r0 + p - kappa D(r0, r1), from D alone: in each component it is affine in r1."""
+        zero, one = (base.inner_gradient(self.surface, *map(mp.mpf, self.start), *([mp.mpf(k)] * 3)) for k in (0, 1))
+        return [
+            (mp.mpf(r) + mp.mpf(p) - kappa * a) / (1 + kappa * (b - a))
+            for r, p, a, b in zip(self.start, self.free, zero, one, strict=True)
+        ]
+
+    def residual(self, kappa):
+        """kappa - c (V1 - V0)/(q1 - q0)."""
+        start, end = list(map(mp.mpf, self.start)), self.end(mp.mpf(float(kappa)))
+        q0, q1 = base.inner(self.surface, *start), base.inner(self.surface, *end)
+        if q0 == q1:
+            return mp.mpf(float(kappa))
+        return mp.mpf(float(kappa)) - mp.mpf(self.c) * (self.energy(end) - self.energy(start)) / (q1 - q0)
+
+    def slack(self):
+        """How far kappa moves when positions move by round-off, in the stiffest place of the step."""
+        depth = max(call(base.gap_of, self.surface, call(base.inner, self.surface, r)) for r in (self.start, self.far))
+        reach = np.linalg.norm(self.start) + np.linalg.norm(self.free) + 1.0
+        force = self.c * call(laws.stiffness, self.law, max(depth, 1e-3)) * 2.0
+        return 64 * EPSILON * force * reach / np.linalg.norm(self.inner_slope(self.start))
+
+    @property
+    def far(self):
+        return self.start + self.free
+
+    def careful(self):
+        return call(impulse.careful, self.law, self.surface, self.start, self.free, self.c)
+
+
+@every_surface
+@some_laws
+@settings(max_examples=25)
+@given(**steps)
+def test_careful_solves_the_equation(name, law, **step):
+    step = Step(name, law, **step)
+    kappa, solved = step.careful()
+    assert solved
+    assert abs(step.residual(kappa)) <= 8 * EPSILON * abs(kappa) + step.slack()
+
+
+@every_surface
+@some_laws
+@settings(max_examples=10)
+@given(**steps)
+def test_careful_finds_the_smallest_root(name, law, **step):
+    """No change of sign of the residual between 0 and the root. A wall pushes: a cavity has kappa >= 0, a solid <= 0."""
+    step = Step(name, law, **step)
+    kappa, _ = step.careful()
+    assert kappa * getattr(step.surface, "side", 1.0) >= 0.0
+    sign = mp.sign(step.residual(0.0))
+    if abs(kappa) > 1e3 * step.slack():
+        assert sign != 0
+        assert all(mp.sign(step.residual(kappa * part)) == sign for part in np.linspace(0.01, 0.99, 25))
+
+
+@every_surface
+@some_laws
+@settings(max_examples=25)
+@given(**steps)
+def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
+    step = Step(name, law, **step)
+    chain = Chain(step.surface, None)
+    expected, _ = step.careful()
+    kappa, change = call(impulse.guess, chain, 0, law, step.start, step.free, step.c), math.inf
+    for _ in range(60):
+        if not impulse.unsolved(kappa, change):
+            break
+        change = call(impulse.improve, chain, 0, law, step.start, step.free, step.c, kappa)
+        kappa -= change
+    if expected != 0.0:
+        assert kappa == pytest.approx(expected, rel=1e-12, abs=step.slack())
+
+
+@every_surface
+@some_laws
+def test_a_free_step_has_no_impulse(name, law):
+    step = Step(name, law, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0]), -0.5, 0.05, 0.1, 30.0)
+    assert step.careful() == (0.0, True)
+
+
+@some_laws
+def test_a_head_on_plane_by_hand(law):
+    """Fully inside the wall at both ends (K) is kappa = c V[g0, g1] with g1 = g0 + p - kappa."""
+    numbers, c, g0, p = numbers_of("plane")._replace(nx=1.0, ny=0.0, nz=0.0, offset=0.0), 1e-4, 0.2, 0.1
+    kappa, solved = call(impulse.careful, law, numbers, np.array([g0, 0.0, 0.0]), np.array([p, 0.0, 0.0]), c)
+    assert solved
+    assert kappa == pytest.approx(c * call(laws.energy_slope, law, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
+    if law == LAWS["1.0"]:
+        half = 0.5 * law.alpha * c
+        assert kappa == pytest.approx(half * (2 * g0 + p) / (1 + half), rel=8 * EPSILON)
+
+
+@pytest.mark.parametrize(
+    ("kappa", "change", "more"), [(1.0, 1e-6, True), (1.0, 1e-9, False), (0.0, 0.0, False), (1.0, math.nan, True)]
+)
+def test_a_solve_ends_when_the_square_of_its_step_is_round_off(kappa, change, more):
+    assert impulse.unsolved(kappa, change) == more

@@ -1,0 +1,87 @@
+"""The folds over a chain are minima, sums and picks over the list of surfaces."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import SURFACES, call, directions, gap, vectors
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm.gravity import Gravity
+from swarm.surfaces import base, chain
+
+every_chain = pytest.mark.parametrize(
+    "names",
+    [(), ("sphere",), ("plane", "ellipsoid"), ("plane", "plane", "ball"), ("egg", "sphere", "plane", "ellipsoid")],
+    ids=", ".join,
+)
+
+
+def both(names):
+    """The chain, and the surfaces' numbers one by one."""
+    surfaces = tuple(SURFACES[name]() for name in names)
+    return chain.chain_of(surfaces), [surface.numbers() for surface in surfaces]
+
+
+def first_least(times):
+    """Least time and the first index that has it; infinity and 0 where there is none."""
+    return (min(times), float(np.argmin(times))) if times and min(times) < math.inf else (math.inf, 0.0)
+
+
+@every_chain
+@given(point=vectors, velocity=directions)
+def test_first_hit_is_the_least_of_all(names, point, velocity):
+    whole, single = both(names)
+    times = [call(base.first_hit, numbers, point, velocity) for numbers in single]
+    assert chain.length(whole) == len(names)
+    assert call(chain.first_hit, whole, point, velocity) == first_least(times)
+    for index, time in enumerate(times):
+        assert call(chain.hit_of, whole, index, point, velocity) == time
+        others = [math.inf if i == index else other for i, other in enumerate(times)]
+        least, found = call(chain.other_hit, whole, index, point, velocity)
+        assert least == min(others)
+        if least < math.inf:
+            assert found == first_least(others)[1]
+
+
+@every_chain
+@given(point=vectors, velocity=directions, pull=directions)
+def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
+    whole, single = both(names)
+    safe = [call(base.safe_time, numbers, point, velocity, pull) for numbers in single]
+    assert call(chain.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
+    assert call(chain.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
+    free = call(chain.free_time, None, whole, point, velocity)
+    if any(gap(numbers, point) > 0.0 for numbers in single):
+        assert free == 0.0
+    else:
+        assert free == call(chain.first_hit, whole, point, velocity)[0]
+
+
+@every_chain
+@given(point=directions, free=vectors, kappa=st.floats(-0.02, 0.02))
+def test_an_index_picks_its_surface(names, point, free, kappa):
+    whole, single = both(names)
+    for index, numbers in enumerate(single):
+        for pick, one, arguments in [
+            (chain.unit_normal, base.unit_normal, (point,)),
+            (chain.chord_normal, base.chord_normal, (point, 0.1 * free)),
+            (chain.settle, base.settle, (point,)),
+            (chain.push, base.push, (point, free, kappa)),
+            (chain.inner_gradient, base.inner_gradient, (point, free)),
+        ]:
+            assert call(pick, whole, index, *arguments) == call(one, numbers, *arguments), pick.__name__
+
+
+@every_chain
+@given(point=vectors, free=vectors)
+def test_who_is_outside_and_who_is_touched(names, point, free):
+    whole, single = both(names)
+    out = [gap(numbers, point) > 0.0 for numbers in single]
+    assert call(chain.outside, whole, -1.0, point) == any(out)
+    for index in range(len(single)):
+        assert call(chain.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
+    touched = [now or gap(numbers, point + free) > 0.0 for now, numbers in zip(out, single, strict=True)]
+    first = touched.index(True) if any(touched) else -1
+    assert call(chain.touched, whole, point, free) == (first, sum(touched))
