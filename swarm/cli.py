@@ -12,7 +12,7 @@ from .version import VERSION
 if TYPE_CHECKING:
     from .simulation import Result
 
-_DONE, _FAILED, _BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
+_FAILED, _BAD_INPUT, _INTERRUPTED = 1, 2, 130
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -63,18 +63,22 @@ def run(
 
     from .simulation import simulate
 
-    result = simulate(
-        job.scene,
-        job.particles(),
-        job.method,
-        until=job.run.until,
-        every=job.run.every,
-        trajectory=target,
-        threads=threads if threads is not None else job.run.threads,
-        progress=not quiet,
-        overwrite=overwrite,
-        scene_text=job.text,
-    )
+    try:
+        result = simulate(
+            job.scene,
+            job.particles(),
+            job.method,
+            until=job.run.until,
+            every=job.run.every,
+            trajectory=target,
+            threads=threads if threads is not None else job.run.threads,
+            progress=not quiet,
+            overwrite=overwrite,
+            scene_text=job.text,
+        )
+    except KeyboardInterrupt:
+        print(f"interrupted: {target} holds the frames that were finished", file=sys.stderr)
+        raise typer.Exit(_INTERRUPTED) from None
     if not quiet:
         _summary(result)
 
@@ -142,10 +146,7 @@ def _table(rows: dict[str, str]) -> None:
 def main() -> None:
     """Run the command line; the exit code is 0 done, 1 the run failed, 2 bad input, 130 interrupted."""
     try:
-        app(standalone_mode=True)
+        app()
     except SwarmError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(_BAD_INPUT if isinstance(error, SceneError) else _FAILED)
-    except KeyboardInterrupt:
-        print("interrupted: the trajectory holds the frames that were finished", file=sys.stderr)
-        sys.exit(_INTERRUPTED)

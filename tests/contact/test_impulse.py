@@ -114,17 +114,19 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 @settings(max_examples=25)
 @given(**steps)
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
+    """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""
     step = Step(name, law, **step)
     chain = Chain(step.surface, None)
     expected, _ = step.careful()
     kappa, change = call(impulse.guess, chain, 0, law, step.start, step.free, step.c), math.inf
-    for _ in range(60):
-        if not impulse.unsolved(kappa, change):
-            break
-        change = call(impulse.improve, chain, 0, law, step.start, step.free, step.c, kappa)
-        kappa -= change
-    if expected != 0.0:
+    for _ in range(impulse.NEWTON_STEPS):
+        if impulse.unsolved(kappa, change):
+            change = call(impulse.improve, chain, 0, law, step.start, step.free, step.c, kappa)
+            kappa -= change
+    if not impulse.unsolved(kappa, change):
         assert kappa == pytest.approx(expected, rel=1e-12, abs=step.slack())
+    else:
+        assert expected == 0.0 or step.c * law.alpha * np.linalg.norm(step.inner_slope(step.start)) ** 2 > 0.5
 
 
 @every_surface
@@ -141,7 +143,7 @@ def test_a_head_on_plane_by_hand(law):
     kappa, solved = call(impulse.careful, law, numbers, np.array([g0, 0.0, 0.0]), np.array([p, 0.0, 0.0]), c)
     assert solved
     assert kappa == pytest.approx(c * call(laws.energy_slope, law, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
-    if law == LAWS["1.0"]:
+    if isinstance(law, laws.Linear):
         half = 0.5 * law.alpha * c
         assert kappa == pytest.approx(half * (2 * g0 + p) / (1 + half), rel=8 * EPSILON)
 

@@ -65,7 +65,9 @@ def test_ellipsoid_keeps_joachimsthals_integral():
     assert np.abs(joachimsthal(result.particles) / joachimsthal(start) - 1.0).max() <= 1e-12
 
 
-@pytest.mark.parametrize(("name", "crossing"), [("sphere", 1.34), ("ellipsoid", 1.11), ("hemisphere", 0.89), ("box", 0.67)])
+@pytest.mark.parametrize(
+    ("name", "crossing"), [("sphere", 1.34), ("ellipsoid", 1.11), ("hemisphere", 0.89), ("box", 0.67)]
+)
 def test_run_back_finds_the_start(name, crossing):
     """Elastic impacts are reversible; in these integrable shapes round-off grows slowly: 100 impacts, 1e-10."""
     scene = scene_of(name)

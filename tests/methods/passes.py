@@ -1,0 +1,58 @@
+"""One pass of one particle in plain Python: what lanes.py does for a lane, in the one place that tests share."""
+
+from typing import NamedTuple
+
+import numpy as np
+from conftest import call
+
+from swarm.methods import base
+from swarm.status import Status
+
+
+class Pass(NamedTuple):
+    """The state after a pass. `surface` is the wall of the contact or -1, `hard` whether `hard_pass` did it."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    left: float
+    surface: float
+    hard: bool
+    impulse: np.ndarray  # per mass, one entry a surface
+    hits: float
+
+
+def one_pass(method, scene, position, velocity, left, mass=1.0):
+    """Flight and contact of one particle with `left` of its frame to go, in the method's unit."""
+    position, velocity = np.asarray(position, float), np.asarray(velocity, float)
+    numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
+    constants = call(base.lane_constants, numbers, mass, 0.5 * mass * velocity @ velocity, velocity)
+    *state, left, surface = call(base.flight, numbers, chain, gravity, position, velocity, left, *constants)
+    kappa = change = 0.0
+    if base.most_sweeps(numbers) > 0:
+        kappa, change = call(base.guess, numbers, chain, gravity, *state, constants[0], surface)
+    for _ in range(base.most_sweeps(numbers)):
+        kappa, change, _ = call(base.improve, numbers, chain, gravity, *state, constants[0], surface, kappa, change)
+    *state, left, surface, given, hits = call(
+        base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, change
+    )
+    impulse = np.zeros((len(scene.surfaces), 1))
+    hard = surface <= base.HARD
+    if hard:
+        surface = base.HARD - surface
+        with np.errstate(all="ignore"):
+            *state, left, hits, status = base.hard_pass(
+                numbers, chain, gravity, *state, left, *map(float, constants), surface, impulse, 0
+            )
+        assert status == Status.DONE
+    elif surface >= 0.0:
+        impulse[int(surface), 0] += given
+    return Pass(np.array(state[:3]), np.array(state[3:]), left, surface, hard, impulse[:, 0], hits)
+
+
+def run(method, scene, position, velocity, left, mass=1.0):
+    """Passes until nothing of the frame is left."""
+    passes = [Pass(np.asarray(position, float), np.asarray(velocity, float), left, -1.0, False, np.zeros(1), 0.0)]
+    while passes[-1].left > 0.0:
+        passes.append(one_pass(method, scene, passes[-1].position, passes[-1].velocity, passes[-1].left, mass))
+        assert len(passes) < 5000
+    return passes

@@ -1,0 +1,71 @@
+"""Grazing, corners, wedges and cusps: the run ends, cheaply, inside and with its energy."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from physics.billiards import EPSILON, run, scene_of
+from physics.hard_cases import CASES
+
+import swarm
+
+pytestmark = pytest.mark.physics
+
+# Seconds: none needs five, and compiling its kernels takes up to thirty.
+_HANGS = 90.0
+
+
+def _facts_of(name):
+    script = Path(__file__).with_name("hard_cases.py")
+    try:
+        done = subprocess.run(
+            [sys.executable, str(script), name], timeout=_HANGS, capture_output=True, text=True, check=False
+        )
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"{name} did not end within {_HANGS:g} s")
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_ends_inside_with_its_energy(name):
+    """No launch may hang, leave the volume or change its speed."""
+    for launch, facts in _facts_of(name).items():
+        assert facts["energy"] <= 1e-12, launch
+        assert facts["ulps"] <= 4.0, launch
+        if name.startswith("graze") and name != "graze_cusp":
+            assert facts["impacts"] <= 2.0 * facts["time"] / facts["shortest"] + 10.0, launch
+
+
+def test_whispering_gallery_runs_at_full_speed():
+    """Chords of length h turn a tangential launch by 2 atan(h|v|/2R): slower than the arc by (h|v|/R)^2/12 = 8.3e-10."""
+    start = swarm.Particles([0.5, 0.0, 0.0], [0.0, 1.0, 0.0])
+    end = run(scene_of("sphere"), start, swarm.Impact(), 1.5).particles
+    travelled = 0.5 * math.atan2(end.position[1, 0], end.position[0, 0]) + (
+        math.pi if end.position[1, 0] < 0.0 else 0.0
+    )
+    assert travelled == pytest.approx(1.5, rel=1e-9)
+    coarse = run(scene_of("sphere"), start, swarm.Impact(shortest_flight=5e-4), 1.5).particles
+    slower = 0.5 * math.atan2(coarse.position[1, 0], coarse.position[0, 0]) + (
+        math.pi if coarse.position[1, 0] < 0.0 else 0.0
+    )
+    assert 1.0 - slower / 1.5 == pytest.approx((5e-4 / 0.5) ** 2 / 12.0, rel=0.05)
+
+
+@pytest.mark.parametrize("angle", [1e-3, 1e-2, 0.1])
+def test_steep_whispering_is_the_exact_polygon(angle):
+    """Flights longer than the shortest are exact reflections: the polygon's corners turn by 2 angle each."""
+    start = swarm.Particles([0.5, 0.0, 0.0], [-math.sin(angle), math.cos(angle), 0.0])
+    chord = 2.0 * 0.5 * math.sin(angle)
+    corners = 20
+    result = run(scene_of("sphere"), start, swarm.Impact(), (corners + 0.5) * chord)
+    x, y, _z = result.particles.position[:, 0]
+    middle = (2 * corners + 1) * angle
+    assert result.observables["impacts"][-1] in (corners, corners + 1)  # the launch itself may count
+    assert np.hypot(x - 0.5 * math.cos(angle) * math.cos(middle), y - 0.5 * math.cos(angle) * math.sin(middle)) <= (
+        100.0 * EPSILON / angle
+    )

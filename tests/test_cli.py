@@ -1,0 +1,125 @@
+"""The commands as a user types them, in processes of their own."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import swarm
+from test_scene_file import GOOD
+
+pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
+
+
+def command(*args, cwd):
+    return subprocess.run([sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "scene.toml").write_text(GOOD)
+    return tmp_path
+
+
+def test_run_and_info(folder):
+    done = command("run", "scene.toml", cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    for word in ("impacts", "energy drift", "largest penetration", "wall time", "scene.h5 (3 frames)"):
+        assert word in done.stdout
+    with swarm.load(folder / "scene.h5") as trajectory:
+        assert trajectory.scene_text == GOOD
+    told = command("info", "scene.h5", cwd=folder)
+    assert told.returncode == 0
+    for word in ("3, 0 s to 1 s", "10", "Sphere(radius=0.5", "Impact("):
+        assert word in told.stdout
+
+
+def test_quiet_prints_nothing(folder):
+    done = command("run", "scene.toml", "--quiet", "-o", "other.h5", cwd=folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (folder / "other.h5").exists()
+
+
+def test_results_do_not_depend_on_threads(folder):
+    for threads in ("1", "2"):
+        assert command("run", "scene.toml", "--threads", threads, "-o", f"{threads}.h5", cwd=folder).returncode == 0
+    with swarm.load(folder / "1.h5") as one, swarm.load(folder / "2.h5") as two:
+        assert (one.frame(-1).position == two.frame(-1).position).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "args", "message"),
+    [
+        ("radius = 0.5", "radius = -1.0", [], "surface[0].radius must be above 0, got -1"),
+        ("until = 1.0", "until = -1.0", [], "until must be after the start, 0 s, got -1"),
+        ("every = 0.5", "every = 2.0", [], "every must be at most until = 1, got 2"),
+        ("", "", ["-o", "nowhere/out.h5"], "the folder nowhere does not exist"),
+        ("", "", ["--threads", "0"], "threads must be 1 or more, got 0"),
+    ],
+)
+def test_bad_input_is_exit_code_2_and_touches_no_file(folder, old, new, args, message):
+    (folder / "scene.toml").write_text(GOOD.replace(old, new))
+    done = command("run", "scene.toml", *args, cwd=folder)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in folder.iterdir()] == ["scene.toml"]
+
+
+def test_existing_output_asks_for_overwrite(folder):
+    (folder / "scene.h5").write_text("mine")
+    done = command("run", "scene.toml", cwd=folder)
+    assert done.returncode == 2
+    assert "--overwrite" in done.stderr
+    assert (folder / "scene.h5").read_text() == "mine"
+    assert command("run", "scene.toml", "--overwrite", cwd=folder).returncode == 0
+
+
+def test_version_and_help(folder):
+    assert command("--version", cwd=folder).stdout == f"swarm {swarm.__version__}\n"
+    told = command("--help", cwd=folder)
+    assert told.returncode == 0
+    assert "swarm run examples/scenes/cavity.toml" in told.stdout
+    for name in ("run", "info"):
+        assert "Example:" in command(name, "--help", cwd=folder).stdout
+
+
+def test_help_does_not_import_the_engine(folder):
+    """--help answers fast because neither Numba nor NumPy nor HDF5 is imported for it."""
+    code = (
+        "import sys, swarm.cli\n"
+        "try: swarm.cli.app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print([name for name in ('numba', 'numpy', 'h5py', 'rich', 'msgspec') if name in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    assert told.stdout.splitlines()[-1] == "[]"
+
+
+def test_interrupt_keeps_finished_frames(folder):
+    """SIGINT: exit code 130, and the file opens and holds whole frames."""
+    (folder / "scene.toml").write_text(GOOD.replace("until = 1.0", "until = 1e7"))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "swarm", "run", "scene.toml"],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+    deadline = time.monotonic() + 200.0
+    frames = 0
+    while frames < 5 and time.monotonic() < deadline:
+        time.sleep(0.2)
+        if (folder / "scene.h5").exists():
+            try:
+                with swarm.load(folder / "scene.h5") as trajectory:
+                    frames = len(trajectory)
+            except swarm.SceneError:
+                continue  # the very first moment, before the first flush
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert b"interrupted" in told
+    with swarm.load(folder / "scene.h5") as trajectory:
+        assert len(trajectory) >= frames >= 5
+        assert len(trajectory.frame(-1)) == 10

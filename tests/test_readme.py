@@ -1,0 +1,41 @@
+"""README: its first screen is examples/quickstart.py, which runs; its commands and files exist."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def test_first_screen_is_the_example():
+    block = re.search(r"```python\n(.*?)```", README, re.DOTALL)
+    assert block is not None
+    example = (ROOT / "examples" / "quickstart.py").read_text().split('"""\n\n', 1)[1]
+    assert block.group(1) == example
+
+
+@pytest.mark.physics
+def test_the_example_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = runpy.run_path(str(ROOT / "examples" / "quickstart.py"))
+    assert names["result"].particles.position.shape == (3, 10_000)
+    assert names["result"].observables["energy_error"].max() <= 1e-14
+    assert "impacts" in capsys.readouterr().out
+
+
+def test_files_named_in_the_readme_exist():
+    paths = set(re.findall(r"(?:examples|bench|tests|swarm)/[\w./-]+\.\w+", README))
+    assert paths
+    assert [path for path in sorted(paths) if not (ROOT / path).exists()] == []
+
+
+def test_ci_runs_the_readme_test_command():
+    """.ci/run calls what README tells a newcomer."""
+    ci = (ROOT / ".ci" / "run").read_text()
+    assert 'pip install -e ".[test]"' in README
+    assert "python -m pytest\n" in README
+    assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
+    assert "python -m pytest -q\n" in ci

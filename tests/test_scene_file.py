@@ -1,0 +1,120 @@
+"""Scene files: what they may say, and the sentence for everything else."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm import scene_file
+
+GOOD = """
+[particles]
+count = 10
+speed = 0.5
+
+[[surface]]
+kind = "sphere"
+radius = 0.5
+
+[method]
+kind = "impact"
+
+[run]
+until = 1.0
+every = 0.5
+"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return scene_file.read(path)
+
+
+def test_a_job(tmp_path):
+    job = read(tmp_path, GOOD)
+    assert job.scene == swarm.Scene(surfaces=[swarm.Sphere(0.5)])
+    assert job.method == swarm.Impact()
+    assert (job.run.until, job.run.every) == (1.0, 0.5)
+    assert job.text == GOOD
+    np.testing.assert_array_equal(job.particles().position, swarm.fill(job.scene, 10, speed=0.5).position)
+
+
+@pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
+def test_shipped_scenes_are_read(path):
+    job = scene_file.read(path)
+    assert (job.scene.gaps(job.particles().position) <= 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("count = 10", "", r"particles\.count: expected a whole number, got nothing"),
+        ("count = 10", "count = 0", r"n must be 1 or more, got 0"),
+        ("count = 10", "count = 1.5", r"particles\.count: expected int.*, got float \(in count = 1\.5\)"),
+        ("count = 10", "cuont = 10", r"particles\.cuont: unknown key.*did you mean 'count'"),
+        ("speed = 0.5", "", r"fill needs one of speed and temperature, got neither"),
+        ("speed = 0.5", "speed = 0.5\ntemperature = 1.0", r"got both"),
+        ("speed = 0.5", "speed = nan", r"speed must be a finite number, 0 or more, got nan"),
+        ("speed = 0.5", "speed = 0.5\nmass = -1.0", r"mass must be a finite number above 0, got -1"),
+        ("[particles]", "[partikles]", r"partikles: unknown key.*did you mean 'particles'"),
+        ('kind = "sphere"', 'kind = "sphree"', r"surface\[0\]\.kind must be one of .*'sphree'; did you mean 'sphere'"),
+        ('kind = "sphere"', "", r"surface\[0\]\.kind: expected one of"),
+        ("radius = 0.5", "radius = 0.0", r"surface\[0\]\.radius must be above 0, got 0"),
+        ("radius = 0.5", "radius = inf", r"surface\[0\]\.radius must be a finite number above 0, got inf"),
+        ("radius = 0.5", 'radius = "big"', r"surface\[0\]\.radius: expected float, got str \(in radius = 'big'\)"),
+        ("radius = 0.5", "radius = 0.5\ncenter = [0.0, 1.0]", r"surface\[0\]\.center: expected array of length 3"),
+        ("radius = 0.5", 'radius = 0.5\nside = "insde"', r"surface\[0\]\.side must be one of.*did you mean 'inside'"),
+        ("radius = 0.5", "radius = 0.5\nradios = 1.0", r"surface\[0\]\.radios: unknown key.*did you mean 'radius'"),
+        ("radius = 0.5", "", r"surface\[0\]\.radius: expected a number, got nothing"),
+        ("[[surface]]", "[surface]", r"surface: expected at least one \[\[surface\]\] table"),
+        ('kind = "impact"', 'kind = "impakt"', r"method\.kind must be one of .* did you mean 'impact'"),
+        ('kind = "impact"', 'kind = "penalty"\npenalty = 1.0\ndt = 0.0', r"method\.dt must be above 0, got 0"),
+        ('kind = "impact"', 'kind = "penalty"\npenalty = 1.0', r"method\.dt: expected a number, got nothing"),
+        (
+            'kind = "impact"',
+            'kind = "penalty"\npenalty = 1.0\ndt = 0.1\nexponent = 0.9',
+            r"method\.exponent must be 1 or more, got 0\.9",
+        ),
+        ("until = 1.0", "", r"run\.until: expected a number, got nothing"),
+        ("until = 1.0", "until = 1.0\nevry = 2", r"run\.evry: unknown key.*did you mean 'every'"),
+        ("every = 0.5", "gravity = [0, 0, -1]", r"run\.gravity: unknown key.*gravity stands at the top"),
+        ("[particles]", "gravity = [0, 0]\n[particles]", r"gravity must be three numbers, got 2"),
+        ("[particles]", "[particles", r"cannot read the scene file .*scene\.toml"),
+        (
+            "radius = 0.5",
+            'radius = 0.5\n[[surface]]\nkind = "plane"\nnormal = [1.0, 0.0, 0.0]\noffset = -2.0',
+            r"surfaces must leave a volume",
+        ),
+    ],
+)
+def test_bad_input_names_the_key(tmp_path, old, new, message):
+    assert old in GOOD
+    with pytest.raises(swarm.SceneError, match=message):
+        read(tmp_path, GOOD.replace(old, new)).particles()
+
+
+def test_particles_from_files(tmp_path):
+    csv = tmp_path / "start.csv"
+    csv.write_text("x,y,z,vx,vy,vz,mass\n0.1,0,0,1,0,0,2\n")
+    source = GOOD.replace("count = 10\nspeed = 0.5", 'from = "{}"')
+    particles = read(tmp_path, source.format("start.csv")).particles()
+    assert (particles.position[0, 0], particles.mass[0]) == (0.1, 2.0)
+
+    scene = swarm.Scene(surfaces=[swarm.Sphere(0.5)])
+    result = swarm.simulate(scene, particles, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "start.h5")
+    last = read(tmp_path, source.format("start.h5")).particles()
+    np.testing.assert_array_equal(last.position, result.particles.position)
+    first = read(tmp_path, source.format('start.h5"\nframe = 0 #')).particles()
+    np.testing.assert_array_equal(first.position, particles.position)
+
+    for text, message in (
+        ('start.csv"\nframe = 0 #', r"particles\.frame: only goes with from"),
+        ('start.csv"\ncount = 3 #', r"particles\.count: does not go with from = 'start\.csv'"),
+        ("start.txt", r"particles\.from: expected a \.csv or \.h5 file, got 'start\.txt'"),
+    ):
+        with pytest.raises(swarm.SceneError, match=message):
+            read(tmp_path, source.format(text))
+    with pytest.raises(swarm.SceneError, match=r"cannot read .*absent\.csv"):
+        read(tmp_path, source.format("absent.csv")).particles()

@@ -1,0 +1,212 @@
+"""Frames, blocks, threads, and what is refused."""
+
+import numpy as np
+import pytest
+
+import swarm
+
+SPHERE = swarm.Scene([swarm.Sphere(0.5)])
+NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
+NAMES = {
+    "time",
+    "kinetic_energy",
+    "potential_energy",
+    "contact_energy",
+    "total_energy",
+    "energy_error",
+    "momentum",
+    "angular_momentum",
+    "max_penetration",
+    "impacts",
+    "impulse",
+    "unconverged",
+}
+
+
+def _run(n=50, scene=SPHERE, method=None, until=2.0, **keywords):
+    particles = swarm.fill(scene, n, speed=1.0, seed=1)
+    return swarm.simulate(scene, particles, method or swarm.Impact(), until=until, **{"threads": 1, **keywords})
+
+
+@pytest.mark.parametrize(
+    ("until", "every", "times"),
+    [
+        (2.0, None, [0.0, 2.0]),
+        (2.0, 2.0, [0.0, 2.0]),
+        (2.0, 0.5, [0.0, 0.5, 1.0, 1.5, 2.0]),
+        (1.0, 0.4, [0.0, 0.4, 0.8, 1.0]),
+        (0.3, 0.1, [0.0, 0.1, 0.2, 0.3]),
+        (0.7, 0.1, [0.0, 0.1, 0.2, 3 * 0.1, 0.4, 0.5, 6 * 0.1, 0.7]),
+    ],
+)
+def test_frames_are_the_start_every_and_the_end(until, every, times):
+    """The last frame is `until` exactly; decimal times that miss it by round-off add no frame."""
+    assert _run(until=until, every=every).observables["time"].tolist() == times
+
+
+def test_simulate_does_not_change_its_argument():
+    particles = swarm.fill(SPHERE, 20, speed=1.0, seed=1)
+    before = [array.copy() for array in (particles.position, particles.velocity, particles.mass)]
+    result = swarm.simulate(SPHERE, particles, swarm.Impact(), until=5.0, threads=1)
+    for array, copy in zip((particles.position, particles.velocity, particles.mass), before, strict=True):
+        assert np.array_equal(array, copy)
+    assert not np.array_equal(result.particles.position, particles.position)
+
+
+def test_observables_have_one_entry_a_frame():
+    observables = _run(scene=NESTED, every=0.5).observables
+    assert set(observables) == NAMES
+    shapes = {"momentum": (5, 3), "angular_momentum": (5, 3), "impulse": (5, 2)}
+    assert {name: column.shape for name, column in observables.items()} == {
+        name: shapes.get(name, (5,)) for name in NAMES
+    }
+    assert observables["impacts"].dtype.kind == "i"
+    assert (np.diff(observables["impacts"]) >= 0).all()
+    assert observables["impacts"][0] == 0
+    assert (observables["impulse"][0] == 0.0).all()
+
+
+def test_result_arrays():
+    result = _run(n=7)
+    for array in (result.particles.position, result.particles.velocity):
+        assert (array.shape, array.dtype, array.flags.c_contiguous) == ((3, 7), np.float64, True)
+    assert result.particles.mass.tolist() == [1.0] * 7
+    assert result.trajectory is None
+    assert result.wall_time > 0.0
+
+
+def test_observables_are_sums_over_particles():
+    """What a frame reports is what the arrays say."""
+    mass = np.linspace(0.5, 2.0, 3000)
+    particles = swarm.fill(SPHERE, 3000, speed=0.7, mass=mass, seed=2)
+    result = swarm.simulate(SPHERE, particles, swarm.Impact(), until=3.0, threads=1)
+    r, v, seen = result.particles.position, result.particles.velocity, result.observables
+    assert seen["kinetic_energy"][-1] == pytest.approx(0.5 * (mass * v**2).sum(), rel=1e-13)
+    assert seen["total_energy"][-1] == pytest.approx(seen["total_energy"][0], rel=1e-13)
+    assert seen["momentum"][-1] == pytest.approx((mass * v).sum(axis=1), abs=1e-10)
+    assert seen["angular_momentum"][-1] == pytest.approx(np.cross(r, mass * v, axis=0).sum(axis=1), abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("scene", "method"),
+    [(SPHERE, swarm.Impact()), (NESTED, swarm.Impact()), (SPHERE, swarm.Penalty(dt=0.0625, penalty=1e3))],
+    ids=["sphere", "nested", "penalty"],
+)
+def test_threads_and_blocks_change_no_bit(scene, method):
+    """A particle's steps depend on itself alone, and sums run over fixed chunks in a fixed order."""
+    variants = [{"threads": 1}, {"threads": 2}, {"threads": 3, "block_size": 1}]
+    variants += [{"threads": 2, "block_size": size} for size in (100, 1024, 1025, 5000, 100_000)]
+    first, *others = [_run(5000, scene, method, until=4.0, every=1.0, **variant) for variant in variants]
+    for other in others:
+        assert np.array_equal(first.particles.position, other.particles.position)
+        assert np.array_equal(first.particles.velocity, other.particles.velocity)
+        for name in NAMES:
+            assert np.array_equal(first.observables[name], other.observables[name]), name
+
+
+def test_a_particle_does_not_depend_on_its_neighbours():
+    """Lanes share a loop, no number."""
+    all_of_them = swarm.fill(NESTED, 700, speed=1.0, seed=3)
+    together = swarm.simulate(NESTED, all_of_them, swarm.Impact(), until=9.0, threads=1).particles
+    for i in (0, 255, 256, 699):
+        alone = swarm.Particles(all_of_them.position[:, i], all_of_them.velocity[:, i])
+        end = swarm.simulate(NESTED, alone, swarm.Impact(), until=9.0, threads=1).particles
+        assert np.array_equal(end.position[:, 0], together.position[:, i])
+        assert np.array_equal(end.velocity[:, 0], together.velocity[:, i])
+
+
+def test_progress_is_called_with_every_frame():
+    seen = []
+    result = _run(every=0.5, progress=seen.append)
+    assert [frame.number for frame in seen] == [0, 1, 2, 3, 4]
+    assert [frame.time for frame in seen] == result.observables["time"].tolist()
+    assert {frame.until for frame in seen} == {2.0}
+    assert [frame.observables["impacts"] for frame in seen] == result.observables["impacts"].tolist()
+
+
+def test_an_error_in_progress_ends_the_run():
+    def stop(frame):
+        if frame.number == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _run(every=0.5, threads=2, progress=stop)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"until": 0.0}, "until must"),
+        ({"until": -1.0}, "until must"),
+        ({"until": float("nan")}, "until must be a finite number, got nan"),
+        ({"until": float("inf")}, "until must be a finite number, got inf"),
+        ({"until": "soon"}, "until must be a finite number, got 'soon'"),
+        ({"every": 0.0}, "every must be above 0, got 0"),
+        ({"every": -0.5}, "every must be above 0, got -0.5"),
+        ({"every": 3.0}, "every must be at most until = 2, got 3"),
+        ({"threads": 0}, "threads must be 1 or more, got 0"),
+        ({"threads": 1.5}, "threads must be a whole number, 1 or more, got 1.5"),
+        ({"threads": True}, "threads must be a whole number, 1 or more, got True"),
+        ({"block_size": 0}, "block_size must be 1 or more, got 0"),
+        ({"method": swarm.Penalty(dt=0.3, penalty=1e3)}, "until must be a whole number of steps, got until = 2 s"),
+        ({"method": swarm.Penalty(dt=0.5, penalty=1e3), "every": 0.75}, "every must be a whole number of steps"),
+        ({"method": swarm.Impact(contact_step=9.0)}, "contact_step must be at most the crossing time"),
+    ],
+)
+def test_bad_arguments_are_named(keywords, words):
+    with pytest.raises(swarm.SceneError) as caught:
+        _run(**keywords)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("argument", ["scene", "particles", "method"])
+def test_wrong_types_are_named(argument):
+    arguments = {"scene": SPHERE, "particles": swarm.fill(SPHERE, 2, speed=1.0), "method": swarm.Impact()}
+    arguments[argument] = "impact"
+    with pytest.raises(swarm.SceneError, match=f"{argument} must be a swarm.* got str"):
+        swarm.simulate(**arguments, until=1.0)
+
+
+def test_particles_outside_are_counted_and_the_first_is_named():
+    position = np.zeros((3, 5))
+    position[0] = [0.3, 0.75, 0.4, 0.1, 0.3]
+    with pytest.raises(swarm.SceneError) as caught:
+        swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
+    message = str(caught.value)
+    for words in ("2 of 5 outside", "particle 1 at (0.75, 0.0, 0.0)", "phi = 0.25 of surfaces[0] (Sphere)"):
+        assert words in message
+    position[0, 1] = 0.3
+    with pytest.raises(swarm.SceneError, match=r"1 of 5 .* particle 3 at \(0\.1, .* phi = -0\.1 of surfaces\[1\]"):
+        swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
+
+
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.125, penalty=1e3)], ids=["impact", "penalty"])
+def test_particles_on_the_wall_and_at_rest_are_valid(method):
+    """On a wall, moving out, in or along it, or at rest anywhere: all are states of a billiard."""
+    third = 0.5 / np.sqrt(3.0)
+    position = np.array([[0.5, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [third] * 3, [0.2, 0, 0], [0.3, 0, 0]]).T
+    velocity = np.array([[1.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]).T
+    result = swarm.simulate(NESTED, swarm.Particles(position, velocity), method, until=2.0, every=0.5, threads=1)
+    assert np.array_equal(result.particles.position[:, 3:], position[:, 3:])
+    assert (result.particles.velocity[:, 3:] == 0.0).all()
+    assert result.observables["energy_error"].max() <= 1e-12
+    if isinstance(method, swarm.Impact):
+        assert result.observables["max_penetration"].max() <= 4.0 * np.spacing(0.5)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "mass"])
+def test_numbers_spoiled_after_construction_are_refused(name):
+    """`Particles` checks its arrays, but they can be written to: `simulate` looks again."""
+    particles = swarm.fill(SPHERE, 5, speed=1.0)
+    getattr(particles, name)[..., 3] = np.nan
+    with pytest.raises(swarm.SceneError, match=rf"{name} must be .* particle 3"):
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
+
+
+def test_a_run_in_two_parts_is_the_run():
+    """The end of a run is a start: nothing is hidden in between that moves a particle."""
+    particles = swarm.fill(SPHERE, 300, speed=1.0, seed=4)
+    whole = swarm.simulate(SPHERE, particles, swarm.Impact(), until=4.0, every=2.0, threads=1).particles
+    half = swarm.simulate(SPHERE, particles, swarm.Impact(), until=2.0, threads=1).particles
+    rest = swarm.simulate(SPHERE, half, swarm.Impact(), until=2.0, threads=1).particles
+    assert rest.position == pytest.approx(whole.position, abs=1e-13)
