@@ -33,9 +33,11 @@ def _bar() -> Iterator[Callable[[Any], None]]:
     )
     recent: deque[tuple[float, float, int]] = deque()
     with Progress(*columns, transient=True) as bar:
-        task = bar.add_task("", total=1.0, line="compiling")
+        task = bar.add_task("", total=1.0, line="compiling (the next run will not)")
 
         def show(frame: Any) -> None:
+            if frame.number == 0:
+                return  # the first frame is the start: kernels compile after it
             now = time.perf_counter()
             recent.append((now, frame.time, frame.observables["impacts"]))
             while len(recent) > 2 and now - recent[0][0] > _WINDOW:

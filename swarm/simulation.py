@@ -195,7 +195,6 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
 
 def _distances_outside(scene: Scene, particles: Particles) -> NDArray[np.float64]:
     """Gap over its gradient for every surface and particle."""
-
     gaps = scene.gaps(particles.position)
     slopes = [np.sqrt((surface.gradient(particles.position) ** 2).sum(axis=0)) for surface in scene.surfaces]
     return np.asarray(gaps / np.maximum(slopes, np.finfo(np.float64).tiny))

@@ -72,7 +72,6 @@ def gap(surface, point):
     return float(call(base.gap_of, surface, call(base.inner, surface, point)))
 
 
-@pytest.fixture
-def scene():
-    """A factory of scenes from names of the table."""
-    return lambda *names, **keywords: swarm.Scene([SURFACES[name]() for name in names], **keywords)
+def scene_of(*names, **keywords):
+    """A scene of surfaces from the table."""
+    return swarm.Scene([SURFACES[name]() for name in names], **keywords)

@@ -12,6 +12,7 @@ from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..errors import SceneError
 from ..gravity import Nothing, accelerated, displacement
+from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import base as surfaces
@@ -41,8 +42,8 @@ class Penalty(base.Method):
 
     Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt. Walls give way by up to
     |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step
-    solves one scalar equation. Steps look at the gap at their ends only, so a solid thinner than |v| dt can be jumped
-    over when a flight starts in contact; free flights never do.
+    solves one scalar equation. Steps look at the gap at their ends only: a solid thinner than |v| dt is refused, but
+    a step can miss a chord through the edge of a solid that is shorter than |v| dt.
     Source: García Orden & Ortega 2007, eqs. (2)-(5); the composite gradient is DESIGN's.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
@@ -60,6 +61,17 @@ class Penalty(base.Method):
         object.__setattr__(self, "penalty", checks.positive("penalty", self.penalty))
         object.__setattr__(self, "exponent", checks.at_least("exponent", self.exponent, 1.0))
         checks.one_of("gradient", self.gradient, ["composite"])
+
+    def check(self, scene: Scene, particles: Particles) -> None:
+        step = particles.fastest() * self.dt
+        for i, surface in enumerate(scene.surfaces):
+            solid = getattr(surface, "side", "inside") == "outside"
+            if solid and step > 2.0 * surface.size():
+                raise SceneError(
+                    f"dt must be so small that no particle jumps over a solid in one step, got dt = {self.dt:g} s, in "
+                    f"which the fastest flies {step:.3g} m, and surfaces[{i}], {2.0 * surface.size():.3g} m thick; use "
+                    f"dt < {2.0 * surface.size() / particles.fastest():.2g} s, or Impact"
+                )
 
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
         return PenaltyNumbers(self.dt, self.law())

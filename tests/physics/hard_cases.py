@@ -146,11 +146,17 @@ def thin_cap():
 
 
 CASES = {
-    case.__name__: case
-    for case in (
-        graze_sphere, graze_ellipsoid, graze_floor, corner_circle, graze_ball, corners, wedge, cusp, graze_cusp, thin_cap
-    )
-}  # fmt: skip
+    "graze_sphere": graze_sphere,
+    "graze_ellipsoid": graze_ellipsoid,
+    "graze_floor": graze_floor,
+    "graze_ball": graze_ball,
+    "graze_cusp": graze_cusp,
+    "corner_circle": corner_circle,
+    "corners": corners,
+    "wedge": wedge,
+    "cusp": cusp,
+    "thin_cap": thin_cap,
+}
 
 if __name__ == "__main__":
     print(json.dumps(CASES[sys.argv[1]]()))

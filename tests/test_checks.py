@@ -1,0 +1,77 @@
+"""Every check returns its value in the final type, or names the argument, what came and what is expected."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarm import SceneError, SwarmError, checks
+
+
+@pytest.mark.parametrize("value", [2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0)])
+def test_numbers_become_floats(value):
+    for checked in (checks.number("n", value), checks.positive("n", value), checks.at_least("n", value, 2.0)):
+        assert type(checked) is float
+        assert checked == 2.0
+
+
+@pytest.mark.parametrize("value", ["2", b"2", None, True, [2.0], {}, 1j, object(), math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "check", [checks.number, checks.positive, lambda name, value: checks.at_least(name, value, 0.0)]
+)
+def test_what_is_not_a_finite_number(check, value):
+    with pytest.raises(SceneError, match=r"^mass must be a finite number.*, got "):
+        check("mass", value)
+
+
+@pytest.mark.parametrize(
+    ("check", "sentence"),
+    [
+        (lambda: checks.positive("radius", 0), "radius must be above 0, got 0"),
+        (lambda: checks.positive("radius", -1e-9), "radius must be above 0, got -1e-09"),
+        (lambda: checks.at_least("exponent", 0.5, 1.0), "exponent must be 1 or more, got 0.5"),
+        (lambda: checks.count("n", 0), "n must be 1 or more, got 0"),
+        (lambda: checks.count("n", 2.5), "n must be a whole number, 1 or more, got 2.5"),
+        (lambda: checks.count("n", True), "n must be a whole number, 1 or more, got True"),
+        (lambda: checks.count("seed", -1, least=0), "seed must be 0 or more, got -1"),
+        (lambda: checks.vector("center", (1, 2)), "center must be three numbers, got 2: (1, 2)"),
+        (lambda: checks.vector("center", "xyz"), "center must be three numbers, got 'xyz'"),
+        (lambda: checks.vector("center", 5.0), "center must be three numbers, got 5.0"),
+        (lambda: checks.vector("center", (1, math.nan, 3)), "center[1] must be a finite number, got nan"),
+        (
+            lambda: checks.one_of("side", "inner", ["inside", "outside"]),
+            "side must be one of 'inside' and 'outside', got 'inner'; did you mean 'inside'?",
+        ),
+        (lambda: checks.one_of("side", 3, ["inside", "outside"]), "side must be one of 'inside' and 'outside', got 3"),
+    ],
+)
+def test_sentences(check, sentence):
+    with pytest.raises(SceneError) as caught:
+        check()
+    assert str(caught.value) == sentence
+
+
+def test_a_bad_argument_is_a_swarm_error_and_a_value_error():
+    with pytest.raises(SwarmError):
+        checks.positive("radius", 0)
+    with pytest.raises(ValueError, match="radius"):
+        checks.positive("radius", 0)
+
+
+def test_values_pass():
+    assert checks.vector("v", np.array([1, 2, 3])) == (1.0, 2.0, 3.0)
+    assert checks.one_of("side", "inside", {"inside": 1.0}) == "inside"
+    assert checks.count("n", np.int32(3)) == 3
+    assert checks.count("seed", 0, least=0) == 0
+
+
+@pytest.mark.parametrize(
+    ("names", "text"), [([], ""), (["a"], "'a'"), (["a", "b"], "'a' and 'b'"), ("abc", "'a', 'b' and 'c'")]
+)
+def test_listed(names, text):
+    assert checks.listed(names) == text
+
+
+def test_closest():
+    assert checks.closest("raduis", ["radius", "center"]) == "; did you mean 'radius'?"
+    assert checks.closest("zzz", ["radius", "center"]) == ""

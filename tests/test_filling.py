@@ -1,0 +1,121 @@
+"""`fill`: uniform in the volume, isotropic or Maxwellian, and the same for the same seed."""
+
+import importlib
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+
+# The statistics of N points are off by a few 1/sqrt(N).
+N = 40_000
+FEW = 4.5 / math.sqrt(N)
+
+SPHERE = swarm.Scene([swarm.Sphere(2.0, (1.0, 0.0, -1.0))])
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [swarm.Sphere(2.0, (1.0, 0.0, -1.0)), swarm.Ellipsoid((0.3, 0.5, 2.0), (0.0, 1.0, 0.0))],
+    ids=["sphere", "ellipsoid"],
+)
+def test_uniform_in_the_volume(surface):
+    """With r scaled to the unit ball: <|r|^k> = 3/(3 + k), and no direction is preferred."""
+    particles = swarm.fill(swarm.Scene([surface]), N, speed=1.0, seed=3)
+    half = np.array(getattr(surface, "semi_axes", (2.0,) * 3))[:, None]
+    unit = (particles.position - np.array(surface.center)[:, None]) / half
+    radius = np.sqrt((unit**2).sum(axis=0))
+    assert radius.max() <= 1.0 + 1e-12
+    for k in (1, 2, 3, 6):
+        assert (radius**k).mean() == pytest.approx(3.0 / (3.0 + k), abs=FEW)
+    assert unit.mean(axis=1) == pytest.approx(np.zeros(3), abs=FEW)
+    assert unit @ unit.T / N == pytest.approx(np.eye(3) / 5.0, abs=FEW)
+
+
+def test_uniform_between_walls():
+    """In a box with a ball cut out the density is the same everywhere."""
+    walls = [swarm.Plane(sign * np.eye(3)[axis], 1.0) for axis in range(3) for sign in (1.0, -1.0)]
+    scene = swarm.Scene([*walls, swarm.Sphere(1.0, side="outside")])
+    points = swarm.fill(scene, N, speed=1.0).position
+    assert (scene.gaps(points) <= 0.0).all()
+    volume = 8.0 - 4.0 * math.pi / 3.0
+    corner = (points > 0.5).all(axis=0).mean()
+    # The whole of (0.5, 1)^3 but for what the ball takes, by the same count on a fine grid.
+    axis = 0.5 + (np.arange(200) + 0.5) / 400.0
+    kept = (axis[:, None, None] ** 2 + axis[:, None] ** 2 + axis**2 > 1.0).mean() * 0.125
+    assert corner == pytest.approx(kept / volume, abs=FEW)
+
+
+def test_speed_is_exact_and_isotropic():
+    velocity = swarm.fill(SPHERE, N, speed=3.0, seed=4).velocity
+    assert np.sqrt((velocity**2).sum(axis=0)) == pytest.approx(3.0, rel=1e-15)
+    assert velocity.mean(axis=1) == pytest.approx(np.zeros(3), abs=3.0 * FEW)
+    assert velocity @ velocity.T / N == pytest.approx(3.0 * np.eye(3), abs=9.0 * FEW)
+    # uniform on the sphere: each component is uniform in [-3, 3]
+    assert (velocity**4).mean(axis=1) == pytest.approx([81.0 / 5.0] * 3, abs=81.0 * FEW)
+
+
+def test_temperature_is_maxwellian_for_every_mass():
+    """<m v_i v_j> = T delta_ij and <(m v_i^2)^2> = 3 T^2, for the light and the heavy."""
+    mass = np.where(np.arange(N) % 2, 4.0, 0.25)
+    particles = swarm.fill(SPHERE, N, temperature=1.5, mass=mass, seed=5)
+    assert (particles.mass == mass).all()
+    for group in (mass == 4.0, mass == 0.25):
+        scaled = particles.velocity[:, group] * np.sqrt(mass[group])
+        assert scaled @ scaled.T / group.sum() == pytest.approx(1.5 * np.eye(3), abs=4.0 * FEW)
+        assert (scaled**4).mean(axis=1) == pytest.approx([6.75] * 3, abs=40.0 * FEW)
+
+
+def test_velocity_does_not_know_the_position():
+    particles = swarm.fill(SPHERE, N, temperature=1.0, seed=6)
+    centred = particles.position - particles.position.mean(axis=1, keepdims=True)
+    assert centred @ particles.velocity.T / N == pytest.approx(np.zeros((3, 3)), abs=FEW)
+
+
+def test_the_seed_decides():
+    first, same, other = (swarm.fill(SPHERE, 100, speed=1.0, seed=seed) for seed in (7, 7, 8))
+    assert (first.position == same.position).all()
+    assert (first.velocity == same.velocity).all()
+    assert not (first.position == other.position).any()
+    assert not (first.velocity == other.velocity).any()
+
+
+@pytest.mark.parametrize("keyword", ["speed", "temperature"])
+def test_nothing_moves_at_zero(keyword):
+    assert (swarm.fill(SPHERE, 10, **{keyword: 0.0}).velocity == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        ({"n": 0, "speed": 1.0}, ["n must be 1 or more", "got 0"]),
+        ({"n": 10.0, "speed": 1.0}, ["n must be a whole number", "10.0"]),
+        ({"n": 10}, ["speed and temperature", "neither"]),
+        ({"n": 10, "speed": 1.0, "temperature": 1.0}, ["speed and temperature", "both"]),
+        ({"n": 10, "speed": -1.0}, ["speed must be 0 or more", "got -1"]),
+        ({"n": 10, "speed": math.nan}, ["speed", "finite", "nan"]),
+        ({"n": 10, "temperature": -1.0}, ["temperature must be 0 or more", "got -1"]),
+        ({"n": 10, "speed": 1.0, "seed": -1}, ["seed must be 0 or more", "got -1"]),
+        ({"n": 10, "speed": 1.0, "mass": 0.0}, ["mass", "above 0"]),
+        ({"n": 10, "speed": 1.0, "mass": [1.0, 2.0]}, ["mass", "(10,)", "(2,)"]),
+    ],
+    ids=repr,
+)
+def test_errors_name_the_argument(arguments, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        swarm.fill(SPHERE, **arguments)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+@pytest.mark.parametrize("surface", [swarm.Sphere(1.0, side="outside"), swarm.Plane((0, 0, 1))], ids=["ball", "plane"])
+def test_an_open_volume_is_refused(surface):
+    with pytest.raises(swarm.SceneError, match="bounded volume.*open to infinity.*closes it"):
+        swarm.fill(swarm.Scene([surface]), 10, speed=1.0)
+
+
+def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
+    monkeypatch.setattr(importlib.import_module("swarm.filling"), "_TRIES", 1_000_000)
+    scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])
+    with pytest.raises(swarm.SceneError, match="admissible points in .* tries.*below 1e-6"):
+        swarm.fill(scene, 1000, speed=1.0)

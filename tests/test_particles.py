@@ -1,0 +1,130 @@
+"""Particles: what they hold, what they refuse, and CSV files."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+
+GOOD = np.arange(6.0).reshape(3, 2)
+
+
+def test_arrays_are_copied_in_c_order():
+    position = np.asfortranarray(GOOD)
+    particles = swarm.Particles(position, GOOD, mass=[1.0, 2.0])
+    assert particles.position.flags.c_contiguous
+    assert particles.velocity.flags.c_contiguous
+    particles.position[0, 0] = particles.velocity[0, 0] = particles.mass[0] = 99.0
+    assert position[0, 0] == GOOD[0, 0] == 0.0
+    assert len(particles) == 2
+
+
+@pytest.mark.parametrize("mass", [3, 3.0, [3.0, 3.0], np.float32(3.0)])
+def test_one_mass_is_for_all(mass):
+    particles = swarm.Particles(GOOD, GOOD, mass)
+    assert (particles.mass == [3.0, 3.0]).all()
+    particles.mass[0] = 1.0
+    assert particles.mass[1] == 3.0
+
+
+def test_one_particle_as_three_numbers():
+    particles = swarm.Particles((1, 2, 3), (3.0, 0.0, 4.0))
+    assert particles.position.shape == (3, 1)
+    assert particles.fastest() == 5.0
+
+
+def changed(value, mass=1.0):
+    position = GOOD.copy()
+    position[1, 1] = value
+    return lambda: swarm.Particles(position, GOOD, mass)
+
+
+@pytest.mark.parametrize(
+    ("build", "parts"),
+    [
+        (lambda: swarm.Particles(np.zeros((3, 0)), np.zeros((3, 0))), ["position", "at least one particle", "(3, 0)"]),
+        (lambda: swarm.Particles(np.zeros((4, 3)), GOOD), ["position", "(3, N)", "(4, 3)", "transpose"]),
+        (lambda: swarm.Particles(GOOD, np.zeros((2, 3))), ["velocity", "(3, N)", "(2, 3)", "transpose"]),
+        (lambda: swarm.Particles(np.zeros((2, 2)), GOOD), ["position", "(3, N)", "(2, 2)"]),
+        (lambda: swarm.Particles(np.zeros((3, 2, 2)), GOOD), ["position", "(3, N)", "(3, 2, 2)"]),
+        (lambda: swarm.Particles(1.0, GOOD), ["position", "(3, N)", "()"]),
+        (lambda: swarm.Particles(GOOD, np.zeros((3, 3))), ["velocity", "shape of position, (3, 2)", "(3, 3)"]),
+        (lambda: swarm.Particles([["a"], ["b"], ["c"]], GOOD), ["position", "array of numbers"]),
+        (lambda: swarm.Particles([[1.0], [1.0, 2.0], [3.0]], GOOD), ["position", "array of numbers"]),
+        (changed(math.nan), ["position", "finite", "nan", "particle 1", "1 such"]),
+        (changed(-math.inf), ["position", "finite", "-inf", "particle 1"]),
+        (lambda: swarm.Particles(GOOD, GOOD * math.nan), ["velocity", "particle 0", "2 such"]),
+        (lambda: swarm.Particles(GOOD, GOOD, 0.0), ["mass", "above 0", "got 0", "particle 0"]),
+        (lambda: swarm.Particles(GOOD, GOOD, [1.0, -2.0]), ["mass", "above 0", "got -2", "particle 1"]),
+        (lambda: swarm.Particles(GOOD, GOOD, [1.0, math.nan]), ["mass", "finite", "nan", "particle 1"]),
+        (lambda: swarm.Particles(GOOD, GOOD, [1.0, 2.0, 3.0]), ["mass", "shape (2,)", "(3,)"]),
+        (lambda: swarm.Particles(GOOD, GOOD, np.ones((2, 1))), ["mass", "shape (2,)", "(2, 1)"]),
+        (lambda: swarm.Particles(GOOD, GOOD, "heavy"), ["mass", "number"]),
+    ],
+)
+def test_errors_name_the_argument(build, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+# --- CSV -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Write a CSV file and read it as particles."""
+
+    def read(text, **options):
+        path = tmp_path / "start.csv"
+        path.write_text(text, **({"encoding": "utf-8"} | options))
+        return swarm.Particles.from_csv(path)
+
+    return read
+
+
+def test_columns_may_have_any_order(table):
+    particles = table(" vx,vy,vz,mass, x,y,z\n4,5,6,7,1,2,3\n\n.4,.5,.6,.7,.1,.2,1e-3\n")
+    assert (particles.position == [[1.0, 0.1], [2.0, 0.2], [3.0, 1e-3]]).all()
+    assert (particles.velocity == [[4.0, 0.4], [5.0, 0.5], [6.0, 0.6]]).all()
+    assert (particles.mass == [7.0, 0.7]).all()
+
+
+def test_mass_is_one_where_there_is_no_column(table):
+    assert (table("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n").mass == [1.0]).all()
+
+
+@pytest.mark.parametrize("options", [{"encoding": "utf-8-sig"}, {"newline": "\r\n"}], ids=repr)
+def test_files_from_spreadsheets(table, options):
+    assert len(table("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n", **options)) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("", ["x, y, z, vx, vy, vz", "'x' is missing"]),
+        ("x,y,z,vx,vy\n1,2,3,4,5\n", ["'vz' is missing"]),
+        ("x,y,z,vx,vy,vz,charge\n1,2,3,4,5,6,7\n", ["charge", "optionally mass"]),
+        ("x,y,z,vx,vy,vz,x\n1,2,3,4,5,6,7\n", ["columns are x, y, z, vx, vy, vz, x"]),
+        ("x,y,z,vx,vy,vz\n", ["at least one particle", "none"]),
+        ("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n1,2,3,4,fast,6\n", ["row 3", "column 'vy'", "finite number", "'fast'"]),
+        ("x,y,z,vx,vy,vz\n1,2,,4,5,6\n", ["row 2", "column 'z'", "''"]),
+        ("x,y,z,vx,vy,vz\n1,2,3,4,5,inf\n", ["row 2", "column 'vz'", "'inf'"]),
+        ("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n\n1,2,3\n", ["row 4", "6 cells", "got 3"]),
+        ("x,y,z,vx,vy,vz,mass\n1,2,3,4,5,6,-1\n", ["mass", "above 0", "-1"]),
+    ],
+)
+def test_errors_name_file_row_and_column(table, text, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        table(text)
+    found = parts if "mass" in parts else ["start.csv", *parts]
+    assert all(part in str(caught.value) for part in found), str(caught.value)
+
+
+def test_a_file_that_cannot_be_read(tmp_path):
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
+    for path in (tmp_path / "none.csv", tmp_path, tmp_path / "binary.csv"):
+        with pytest.raises(swarm.FileError) as caught:
+            swarm.Particles.from_csv(path)
+        assert str(path) in str(caught.value)

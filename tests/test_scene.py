@@ -1,0 +1,136 @@
+"""Scenes: which volumes they accept, their bounds and size."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import SURFACES, scene_of
+
+from swarm import Ellipsoid, Plane, Scene, SceneError, Sphere
+from swarm.gravity import Gravity
+from swarm.surfaces import base
+
+
+def cube(half=1.0):
+    return [Plane(sign * np.eye(3)[axis], half) for axis in range(3) for sign in (1.0, -1.0)]
+
+
+BALL = Sphere(1.0, side="outside")
+
+VOLUMES = {
+    "a cavity": [Sphere(1.0)],
+    "around a solid": [BALL],
+    "a half-space": [Plane((0, 0, 1), -5.0)],
+    "a cube": cube(),
+    "a slab": cube()[:2],
+    "a slab of 1e-6": [Plane((0, 0, 1), 1e-6), Plane((0, 0, -1), 0.0)],
+    "a cap": [Sphere(1.0), Plane((0, 0, 1), -0.999)],
+    "a shell": [Sphere(1.0), Sphere(0.9, side="outside")],
+    "a shell of 1e-6": [Sphere(1.0), Sphere(1.0 - 1e-6, side="outside")],
+    "a shell next to one side": [Sphere(1.0), Sphere(0.9, (0.1, 0.0, 0.0), side="outside")],
+    "a solid that cuts the wall": [Sphere(1.0), Sphere(1.0, (0.5, 0.0, 0.0), side="outside")],
+    "an ellipsoidal shell of 1e-6": [Ellipsoid((1, 2, 3)), Ellipsoid((1 - 1e-6, 2 - 1e-6, 3 - 1e-6), side="outside")],
+    "a lens of 1e-6": [Sphere(1.0), Sphere(1.0, (2.0 - 1e-6, 0.0, 0.0))],
+    "a small cavity far away": [Sphere(1e-6, (1e3, -1e3, 1e3))],
+    "a solid far away": [Sphere(1.0, (1e6, 0.0, 0.0), side="outside"), Plane((1.0, 0.0, 0.0), 0.0)],
+    "large": [Sphere(1e6), Sphere(0.5e6, side="outside")],
+    "between balls": [*cube(), *(Sphere(0.4, c, side="outside") for c in ((0, 0, 0), (0.9, 0.9, 0.9)))],
+}
+EMPTY = {
+    "a plane beyond the sphere": [Sphere(1.0), Plane((0, 0, 1), -2.0)],
+    "a solid larger than its cavity": [Sphere(1.0), Sphere(1.1, side="outside")],
+    "a solid ellipsoid around a cavity": [Sphere(0.5), Ellipsoid((1, 2, 3), side="outside")],
+    "planes back to back": [Plane((0, 0, 1), -1.0), Plane((0, 0, -1), -1.0)],
+    "planes back to back, tilted": [Plane((1, 1, 1), -1e-3), Plane((-1, -1, -1), 0.0)],
+    "two cavities apart": [Sphere(1.0), Sphere(1.0, (2.5, 0.0, 0.0))],
+    "two cavities apart, their boxes not": [Sphere(1.0), Sphere(1.0, (1.3, 1.3, 1.3))],
+    "a cube in a solid": [*cube(), Sphere(1.8, side="outside")],
+}
+
+
+@pytest.mark.parametrize("surfaces", VOLUMES.values(), ids=VOLUMES)
+def test_a_volume_is_accepted(surfaces):
+    assert Scene(surfaces).surfaces == tuple(surfaces)
+
+
+@pytest.mark.parametrize("surfaces", EMPTY.values(), ids=EMPTY)
+def test_no_volume_is_refused(surfaces):
+    with pytest.raises(SceneError) as caught:
+        Scene(surfaces)
+    assert f"must leave a volume for particles, got {len(surfaces)} surfaces" in str(caught.value)
+    assert "side" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("build", "parts"),
+    [
+        (lambda: Scene([]), ["surfaces", "at least one surface", "none"]),
+        (lambda: Scene([BALL, "ball"]), ["surfaces[1]", "surface", "'ball'"]),
+        (lambda: Scene([BALL], gravity=9.81), ["gravity", "three numbers", "9.81"]),
+        (lambda: Scene([BALL], gravity=(0, 0)), ["gravity", "three numbers", "got 2"]),
+        (lambda: Scene([BALL], gravity=(0, 0, math.nan)), ["gravity[2]", "finite", "nan"]),
+    ],
+)
+def test_errors_name_the_argument(build, parts):
+    with pytest.raises(SceneError) as caught:
+        build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_gravity_of_nothing_is_none():
+    assert Scene([BALL], gravity=(0, 0, 0)).gravity is None
+    assert Scene([BALL]).pull() is None
+    assert Scene([BALL], gravity=(0, 0, -9.81)).pull() == Gravity(0.0, 0.0, -9.81)
+
+
+def test_one_surface_need_not_be_a_list():
+    assert Scene(BALL) == Scene([BALL])
+
+
+def test_gaps_have_the_sign_of_each_side():
+    points = np.random.default_rng(3).normal(size=(3, 50))
+    gaps = scene_of("ball", "plane").gaps(points)
+    assert gaps.shape == (2, 50)
+    for row, name in zip(gaps, ("ball", "plane"), strict=True):
+        numbers = SURFACES[name]().numbers()
+        levels = base.level_of(numbers, np.array([base.inner(numbers, *point) for point in points.T]))
+        assert (np.sign(row) == np.sign(levels)).all()
+
+
+INF = math.inf
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "low", "high"),
+    [
+        ([Sphere(2.0, (1, 0, 0))], (-1, -2, -2), (3, 2, 2)),
+        ([Ellipsoid((1, 2, 3)), Sphere(2.0, (1, 0, 0))], (-1, -2, -2), (1, 2, 2)),
+        ([BALL], (-INF,) * 3, (INF,) * 3),
+        (cube(0.5), (-0.5,) * 3, (0.5,) * 3),
+        (cube()[:2], (-1, -INF, -INF), (1, INF, INF)),
+        ([Sphere(1.0), Plane((0, 0, 1), 0.5)], (-1, -1, -1), (1, 1, 0.5)),
+        # x + y + z <= 1 in the first octant
+        ([Plane((1, 1, 1), 1 / math.sqrt(3)), *(Plane(-axis, 0.0) for axis in np.eye(3))], (0, 0, 0), (1, 1, 1)),
+        # the wedge |x| <= -y is open along -y and z
+        ([Plane((1, 1, 0)), Plane((-1, 1, 0))], (-INF, -INF, -INF), (INF, 0, INF)),
+    ],
+    ids=lambda part: None,
+)
+def test_bounds_by_hand(surfaces, low, high):
+    for corner, expected in zip(Scene(surfaces).bounds(), (low, high), strict=True):
+        assert corner == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "size"),
+    [
+        ([Sphere(2.0), Sphere(0.5, side="outside")], 0.5),
+        ([Ellipsoid((1, 2, 3))], 1.0),
+        (cube(0.25), 0.25),
+        (cube()[:2], 1.0),
+        ([Plane((0, 0, 1))], INF),
+    ],
+    ids=repr,
+)
+def test_size_by_hand(surfaces, size):
+    assert Scene(surfaces).size() == pytest.approx(size)
