@@ -120,8 +120,14 @@ _PARTS = ("position", "velocity")
 
 
 def _append(dataset: Any, value: Any) -> None:
-    dataset.resize(dataset.shape[0] + 1, axis=0)
-    dataset[-1] = value
+    """One more entry. h5py's indexing takes four times as long, and a frame appends to some fifteen datasets."""
+    handle = dataset.id
+    count, *shape = handle.shape
+    handle.set_extent((count + 1, *shape))
+    space = handle.get_space()
+    space.select_hyperslab((count, *(0 for _ in shape)), (1, *shape))
+    entry = np.ascontiguousarray(value, dtype=dataset.dtype).reshape(1, *shape)
+    handle.write(h5py.h5s.create_simple((1, *shape)), space, entry)
 
 
 def check_target(path: Path, overwrite: bool) -> None:
