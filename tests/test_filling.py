@@ -110,12 +110,12 @@ def test_errors_name_the_argument(arguments, parts):
 
 @pytest.mark.parametrize("surface", [swarm.Sphere(1.0, side="outside"), swarm.Plane((0, 0, 1))], ids=["ball", "plane"])
 def test_an_open_volume_is_refused(surface):
-    with pytest.raises(swarm.SceneError, match="bounded volume.*open to infinity.*closes it"):
+    with pytest.raises(swarm.SceneError, match=r"bounded volume.*open to infinity.*closes it"):
         swarm.fill(swarm.Scene([surface]), 10, speed=1.0)
 
 
 def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
     monkeypatch.setattr(importlib.import_module("swarm.filling"), "_TRIES", 1_000_000)
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])
-    with pytest.raises(swarm.SceneError, match="admissible points in .* tries.*below 1e-6"):
+    with pytest.raises(swarm.SceneError, match=r"admissible points in .* tries.*below 1e-6"):
         swarm.fill(scene, 1000, speed=1.0)

@@ -125,6 +125,6 @@ def test_errors_name_file_row_and_column(table, text, parts):
 def test_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
     for path in (tmp_path / "none.csv", tmp_path, tmp_path / "binary.csv"):
-        with pytest.raises(swarm.FileError) as caught:
+        with pytest.raises(swarm.SwarmError, match="cannot read") as caught:
             swarm.Particles.from_csv(path)
         assert str(path) in str(caught.value)

@@ -30,7 +30,7 @@ VOLUMES = {
     "a shell next to one side": [Sphere(1.0), Sphere(0.9, (0.1, 0.0, 0.0), side="outside")],
     "a solid that cuts the wall": [Sphere(1.0), Sphere(1.0, (0.5, 0.0, 0.0), side="outside")],
     "an ellipsoidal shell of 1e-6": [Ellipsoid((1, 2, 3)), Ellipsoid((1 - 1e-6, 2 - 1e-6, 3 - 1e-6), side="outside")],
-    "a lens of 1e-6": [Sphere(1.0), Sphere(1.0, (2.0 - 1e-6, 0.0, 0.0))],
+    "a lens of 1e-3": [Sphere(1.0), Sphere(1.0, (2.0 - 1e-3, 0.0, 0.0))],
     "a small cavity far away": [Sphere(1e-6, (1e3, -1e3, 1e3))],
     "a solid far away": [Sphere(1.0, (1e6, 0.0, 0.0), side="outside"), Plane((1.0, 0.0, 0.0), 0.0)],
     "large": [Sphere(1e6), Sphere(0.5e6, side="outside")],

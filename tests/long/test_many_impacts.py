@@ -38,7 +38,7 @@ def test_chords_over_1e5_impacts(name, part):
     """The chord step reflects too: the same bar for every contact step, from 1e-9 to 0.1 of the crossing time."""
     scene = scene_of(name)
     start = swarm.fill(scene, 100, speed=0.5, seed=21)
-    result = run(scene, start, swarm.Impact(contact_step=part * scene.size() / 0.5), 150_000.0, 1000.0)
+    result = run(scene, start, swarm.Impact(contact_step=part * scene.size() / 0.5), 160_000.0, 1000.0)
     assert result.observables["impacts"][-1] >= 100 * IMPACTS
     assert result.observables["energy_error"].max() <= 1e-12
     assert ulps_outside(scene, result) <= 4.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from conftest import EPSILON, call, directions, every_surface, numbers_of, scene_of, vectors, wall_point
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from passes import one_pass, run
 
@@ -35,6 +35,7 @@ def slack(method, scene, mass, before, after):
 
 @every_surface
 @exponents
+@settings(max_examples=15)
 @given(
     point=directions,
     velocity=directions,

@@ -195,6 +195,7 @@ flights = {
 
 
 @every_surface
+@settings(max_examples=25)
 @given(**flights)
 def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
     """Against the exact quadratic: nothing outside before the hit, on the wall and on the way out at it."""
@@ -236,6 +237,7 @@ def test_from_the_wall_the_direction_decides(name, depth):
 
 
 @every_surface
+@settings(max_examples=25)
 @given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)

@@ -1,0 +1,273 @@
+"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and who may import whom."""
+
+import ast
+import graphlib
+import importlib.util
+import math
+import shutil
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from conftest import LAWS, call, every_surface, numbers_of, scene_of
+
+import swarm
+from swarm import _jit
+from swarm.contact import regularisation
+from swarm.gravity import Gravity, Nothing, accelerated, displacement, potential
+from swarm.surfaces import base, chain
+
+PACKAGE = Path(swarm.__file__).parent
+compiled_only = pytest.mark.skipif(
+    bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing is compiled that could be compared"
+)
+compiled = numba.njit(error_model="numpy")
+
+
+# --- The same in Python and in kernels -------------------------------------------------------------------
+
+
+def every_function_of_a_surface(surface, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
+    q0, q1 = base.inner(surface, x, y, z), base.inner(surface, vx, vy, vz)
+    return (
+        base.phi(surface, x, y, z),
+        base.gradient(surface, x, y, z),
+        base.first_hit(surface, x, y, z, vx, vy, vz),
+        base.first_hit(surface, x, y, z, 0.0 * vx, 0.0 * vy, 0.0 * vz),
+        base.safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz),
+        base.unit_normal(surface, x, y, z),
+        base.chord_normal(surface, x, y, z, 0.1 * vx, 0.1 * vy, 0.1 * vz),
+        (q0, q1, base.gap_of(surface, q0), base.level_of(surface, q1)),
+        base.gap_slope(surface, q0, q1),
+        base.inner_gradient(surface, x, y, z, vx, vy, vz),
+        base.push(surface, x, y, z, vx, vy, vz, kappa),
+        base.pushed(surface, x, y, z, vx, vy, vz, kappa),
+        base.settle(surface, x, y, z),
+    )
+
+
+def every_function_of_a_chain(whole, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
+    return (
+        chain.length(whole),
+        chain.first_hit(whole, x, y, z, vx, vy, vz),
+        chain.hit_of(whole, 1.0, x, y, z, vx, vy, vz),
+        chain.other_hit(whole, 0.0, x, y, z, vx, vy, vz),
+        chain.unit_normal(whole, 2.0, x, y, z),
+        chain.outside(whole, 1.0, x, y, z),
+        chain.push(whole, 1.0, x, y, z, vx, vy, vz, kappa),
+        chain.free_time(None, whole, x, y, z, vx, vy, vz),
+        chain.free_time(Gravity(gx, gy, gz), whole, x, y, z, vx, vy, vz),
+        chain.touched(whole, x, y, z, vx, vy, vz),
+    )
+
+
+def every_function_of_gravity(pull, x, y, z, t):
+    return displacement(pull, x, y, z, t), accelerated(pull, x, y, z, t), potential(pull, x, y, z)
+
+
+def every_function_of_a_law(law, g0, g1):
+    return (
+        regularisation.stored_energy(law, g0),
+        regularisation.stiffness(law, g1),
+        regularisation.energy_slope(law, g0, g1),
+        regularisation.energy_slope(law, g1, g1 * 1.001),
+        regularisation.energy_slope(law, -g1, g1),
+    )
+
+
+def flat(nested):
+    return [part for one in nested for part in flat(one)] if isinstance(nested, tuple) else [float(nested)]
+
+
+def assert_the_same(function, first, *arguments):
+    """Bit for bit: strict arithmetic has one answer."""
+    in_kernel, in_python = compiled(function)(first, *map(float, arguments)), call(function, first, *arguments)
+    assert flat(in_kernel) == flat(in_python)
+
+
+NUMBERS = (0.3, -0.1, 0.4, 0.5, -0.7, 0.2, 0.1, -0.3, 0.9, 0.02)
+
+
+@compiled_only
+@every_surface
+def test_surfaces_are_the_same_compiled(name):
+    assert_the_same(every_function_of_a_surface, numbers_of(name), *NUMBERS)
+
+
+@compiled_only
+def test_chains_are_the_same_compiled():
+    assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").chain(), *NUMBERS)
+
+
+@compiled_only
+@pytest.mark.parametrize("pull", [None, Gravity(0.1, -0.2, 0.3)], ids=["none", "some"])
+def test_gravity_is_the_same_compiled(pull):
+    assert_the_same(every_function_of_gravity, pull, *NUMBERS[:4])
+
+
+@compiled_only
+@pytest.mark.parametrize("exponent", ["1.0", "1.5"])
+def test_laws_are_the_same_compiled(exponent):
+    assert_the_same(every_function_of_a_law, LAWS[exponent], -0.1, 0.3)
+
+
+@compiled_only
+def test_the_power_law_is_nearly_the_same_compiled():
+    """`pow` is the one function whose last bit may differ."""
+    law = LAWS["3.5"]
+    in_kernel = flat(compiled(every_function_of_a_law)(law, 0.1, 0.3))
+    assert in_kernel == pytest.approx(flat(call(every_function_of_a_law, law, 0.1, 0.3)), rel=1e-13)
+
+
+# --- Dispatch --------------------------------------------------------------------------------------------
+
+
+@_jit.by_type
+def kind_of(thing, number):
+    return -1.0
+
+
+@kind_of.register(Gravity)
+def _(thing, number):
+    return thing.x + number
+
+
+@kind_of.register(Nothing)
+def _(thing, number):
+    return 2.0
+
+
+@kind_of.register(float)
+def _(thing, number):
+    return 3.0
+
+
+DISPATCH = [(Gravity(4.0, 0.0, 0.0), 14.0), (None, 2.0), (1.5, 3.0), (regularisation.Linear(1.0), -1.0)]
+
+
+@pytest.mark.parametrize(("thing", "answer"), DISPATCH, ids=repr)
+def test_by_type_in_python(thing, answer):
+    assert kind_of(thing, 10.0) == answer
+
+
+@compiled_only
+@pytest.mark.parametrize(("thing", "answer"), DISPATCH, ids=repr)
+def test_by_type_in_kernels(thing, answer):
+    assert compiled(lambda thing, number: kind_of(thing, number))(thing, 10.0) == answer
+
+
+def select_all(a, b):
+    return _jit.select(a > b, a, b), _jit.select(a > b, 1.0, a / (b - b)), _jit.select((a > b) & (a > 0.0), -a, a)
+
+
+@pytest.mark.parametrize("first", [1.0, 3.0])
+def test_select(first):
+    """Both sides are evaluated, one is taken; an infinity on the other side does no harm."""
+    expected = (max(first, 2.0), 1.0 if first > 2.0 else math.inf, -first if first > 2.0 else first)
+    assert call(select_all, first, 2.0) == expected
+    assert (
+        compiled(select_all)(np.float64(first), np.float64(2.0)) == expected if not numba.config.DISABLE_JIT else True
+    )
+
+
+# --- The cache -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """A copy of the package, and the cache folder that its `_jit` names."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def folder():
+        spec = importlib.util.spec_from_file_location("copied_jit", tmp_path / "swarm" / "_jit.py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.cache_folder()
+
+    return tmp_path / "swarm", folder
+
+
+@pytest.mark.parametrize("edited", ["surfaces/sphere.py", "lanes.py", "_jit.py", "methods/base.py"])
+def test_an_edit_anywhere_names_another_cache(copied, edited):
+    """Numba looks at the file of the kernel only; an old answer must not come back."""
+    package, folder = copied
+    before = folder()
+    assert folder() == before
+    source = (package / edited).read_text()
+    (package / edited).write_text(source + "\n# edited\n")
+    assert folder() != before
+    (package / edited).write_text(source)
+    assert folder() == before
+
+
+def test_a_new_and_a_renamed_file_name_another_cache(copied):
+    package, folder = copied
+    names = {folder()}
+    (package / "surfaces" / "torus.py").write_text("x = 1\n")
+    names.add(folder())
+    (package / "surfaces" / "torus.py").rename(package / "surfaces" / "cone.py")
+    names.add(folder())
+    assert len(names) == 3
+
+
+def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
+    assert _jit.cache_folder().parent == tmp_path / "numba"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert _jit.cache_folder().parent == tmp_path / "xdg" / "swarm"
+
+
+# --- Who may import whom ---------------------------------------------------------------------------------
+
+# DESIGN section 3, from the top down; a module imports only from layers below its own, or from its own package.
+# What DESIGN leaves open: `check` and `numbers` of a method take the Scene and the Particles, so these are below.
+LAYERS = [
+    ["__init__"],
+    ["__main__"],
+    ["cli"],
+    ["scene_file"],
+    ["simulation"],
+    ["output", "progress"],
+    ["tables", "filling"],
+    ["observables", "lanes"],
+    ["methods"],
+    ["scene", "particles"],
+    ["contact"],
+    ["surfaces"],
+    ["gravity", "checks"],
+    ["status", "_jit", "errors", "version"],
+]
+LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
+
+
+def modules():
+    """Every module of the package as its path of names."""
+    return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
+
+
+def imported(parts, path):
+    """The modules of the package that a module imports, at its top or inside a function."""
+    known = modules()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
+        if isinstance(node, ast.ImportFrom) and node.level:
+            home = (*parts[: len(parts) - node.level], *(node.module.split(".") if node.module else ()))
+            for alias in node.names:
+                targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
+                yield next(target for target in targets if target in known)
+
+
+@pytest.mark.parametrize("parts", modules(), ids=".".join)
+def test_a_module_imports_only_from_below(parts):
+    for target in imported(parts, modules()[parts]):
+        below = LAYER[target[0]] > LAYER[parts[0]]
+        assert below or (len(target) > 1 and target[0] == parts[0]), f"{'.'.join(parts)} imports {'.'.join(target)}"
+
+
+def test_no_imports_go_in_circles():
+    graph = {parts: set(imported(parts, path)) for parts, path in modules().items()}
+    assert len(list(graphlib.TopologicalSorter(graph).static_order())) >= len(modules())

@@ -1,0 +1,121 @@
+"""What is measured at a frame, against NumPy over the whole array."""
+
+import numpy as np
+import pytest
+from conftest import EPSILON, call, numbers_of, scene_of, wall_point
+
+import swarm
+from swarm import observables
+from swarm.contact.regularisation import regularisation
+from swarm.particles import State
+from swarm.surfaces import base
+
+# Not a whole number of chunks, nor of the columns of a chunk.
+N = observables.CHUNK + 301
+
+
+def state_of(n, surfaces, seed=1, reach=1.0):
+    random = np.random.default_rng(seed)
+    return State(
+        random.uniform(-reach, reach, (3, n)),
+        random.normal(size=(3, n)),
+        random.uniform(0.5, 2.0, n),
+        np.zeros(n),
+        np.zeros(n),
+        random.integers(0, 5, n),
+        random.uniform(size=(surfaces, n)),
+    )
+
+
+def observe(law, scene, state, blocks=1):
+    """The observables, from this many blocks."""
+    n = len(state.mass)
+    partial = np.zeros((-(-n // observables.CHUNK), observables.ROWS))
+    edges = range(0, n, n if blocks == 1 else observables.CHUNK)
+    for start in edges:
+        stop = n if blocks == 1 else min(start + observables.CHUNK, n)
+        observables.observe_block(law, scene.chain(), scene.pull(), state, start, stop, partial)
+    return observables.summary(partial, state.impacts, state.impulse)
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """A scene with every term, its state, and what is seen of it."""
+    scene, law = scene_of("sphere", "plane", gravity=(0.5, -1.0, 2.0)), regularisation(30.0, 1.5)
+    state = state_of(N, 2)
+    observables.start_energies(law, scene.chain(), scene.pull(), 0.7, state)
+    return scene, law, state, observe(law, scene, state)
+
+
+def test_energies_and_momenta_are_sums(seen):
+    scene, law, state, found = seen
+    r, v, m = state.position, state.velocity, state.mass
+    gaps = np.maximum(scene.gaps(r), 0.0)
+    expected = {
+        "kinetic_energy": (0.5 * m * (v**2).sum(axis=0)).sum(),
+        "potential_energy": -(m * (np.array(scene.gravity) @ r)).sum(),
+        "contact_energy": (law.alpha * gaps**2.5 / 2.5).sum(),
+        "momentum": (m * v).sum(axis=1),
+        "angular_momentum": (m * np.cross(r, v, axis=0)).sum(axis=1),
+        "impulse": state.impulse.sum(axis=1),
+        "impacts": state.impacts.sum(),
+    }
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=1e-12, abs=1e-12 * N), name
+    parts = ("kinetic_energy", "potential_energy", "contact_energy")
+    assert found["total_energy"] == pytest.approx(sum(found[part] for part in parts), rel=1e-15)
+    assert found["unconverged"] == 0
+
+
+def test_energy_error_is_that_of_the_worst_particle(seen):
+    """0 at the start; then |E - E0| over kinetic + contact + m |G| size at the start."""
+    scene, law, state, found = seen
+    assert found["energy_error"] <= 8 * EPSILON
+    worst = 321
+    faster = state.velocity.copy()
+    faster[:, worst] *= 2.0
+    after = observe(law, scene, state._replace(velocity=faster))
+    m, kinetic = state.mass[worst], 0.5 * state.mass[worst] * (state.velocity[:, worst] ** 2).sum()
+    stored = call(observables.contact_energy, law, scene.chain(), state.position[:, worst])
+    scale = kinetic + stored + m * 0.7 * np.abs(scene.gravity).sum()
+    assert after["energy_error"] == pytest.approx(3.0 * kinetic / scale, rel=1e-12)
+
+
+def test_max_penetration_is_the_largest_distance_outside(seen):
+    """max(g, 0)/|grad g| over particles and surfaces."""
+    scene, _, state, found = seen
+    gaps = scene.gaps(state.position)
+    slopes = [np.sqrt((surface.gradient(state.position) ** 2).sum(axis=0)) for surface in scene.surfaces]
+    assert found["max_penetration"] == pytest.approx((np.maximum(gaps, 0.0) / slopes).max(), rel=1e-12)
+
+
+def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
+    scene, state = scene_of("sphere"), state_of(10, 1, reach=0.2)
+    observables.start_energies(None, scene.chain(), None, 0.7, state)
+    found = observe(None, scene, state)
+    assert found["contact_energy"] == found["potential_energy"] == found["max_penetration"] == 0.0
+    assert (state.inverse_scale > 0.0).all()
+
+
+def test_at_rest_the_energy_error_has_no_scale():
+    scene, state = scene_of("sphere"), state_of(3, 1, reach=0.2)
+    state.velocity[:] = 0.0
+    observables.start_energies(None, scene.chain(), None, 0.7, state)
+    assert (state.inverse_scale == 0.0).all()
+    assert observe(None, scene, state)["energy_error"] == 0.0
+
+
+def test_blocks_do_not_change_a_bit(seen):
+    scene, law, state, found = seen
+    again = observe(law, scene, state, blocks=2)
+    assert all(np.array_equal(found[name], again[name]) for name in found)
+
+
+@pytest.mark.parametrize("name", ["sphere", "ball", "ellipsoid", "egg", "plane"])
+def test_penetration_is_the_depth_next_to_the_wall(name):
+    surface = numbers_of(name)
+    wall = wall_point(surface, np.array([0.3, 0.5, -0.4]))
+    normal = np.array(call(base.unit_normal, surface, wall))
+    chain = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).chain()
+    assert call(observables.penetration, chain, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
+    assert call(observables.penetration, chain, wall - 1e-6 * normal) == 0.0
