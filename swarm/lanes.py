@@ -19,6 +19,8 @@ from .surfaces import chain as walls
 _LANES = 256
 # The row stride is not a power of two, so that the rows of a lane do not share a cache set.
 _STRIDE = 264
+# Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
+_MOST_HITS = 1e8
 
 _X, _Y, _Z, _VX, _VY, _VZ, _LEFT, _K0, _K1, _K2, _HITS, _ROWS = range(12)
 
@@ -227,6 +229,8 @@ def _hard_passes(method, chain, gravity, lanes, live):
             rows[_LEFT, i] = left
             rows[_HITS, i] += hits
             retired += not (left > 0.0)
+            if rows[_HITS, i] > _MOST_HITS:
+                status = Status.STALLED.value
             if status > worst:
                 worst, where = status, i
     return retired, worst, where

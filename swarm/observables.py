@@ -78,9 +78,9 @@ def _(chain, x, y, z):
 
 @inlined
 def _energy(law, chain, gravity, m, x, y, z, vx, vy, vz):
-    """Kinetic, potential and contact energy of one particle."""
-    kinetic = 0.5 * m * (vx * vx + vy * vy + vz * vz)
-    return kinetic, m * potential(gravity, x, y, z), contact_energy(law, chain, x, y, z)
+    """Kinetic, potential and contact energy per mass of one particle."""
+    kinetic = 0.5 * (vx * vx + vy * vy + vz * vz)
+    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, x, y, z) / m
 
 
 @kernel
@@ -95,7 +95,7 @@ def start_energies(law, chain, gravity, size, state):
             position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i],
         )  # fmt: skip
         state.energy[i] = kinetic + fall + stored
-        scale = kinetic + stored + mass[i] * weight
+        scale = kinetic + stored + weight
         state.inverse_scale[i] = 1.0 / scale if scale > 0.0 else 0.0
 
 
@@ -117,9 +117,9 @@ def observe_block(law, chain, gravity, state, start, stop, partial):
                 px, py, pz = m * vx, m * vy, m * vz
                 error = abs(kinetic + fall + stored - energy[i]) * inverse_scale[i]
                 depth = penetration(chain, x, y, z)
-                sums[_KINETIC, j] += kinetic
-                sums[_POTENTIAL, j] += fall
-                sums[_CONTACT, j] += stored
+                sums[_KINETIC, j] += m * kinetic
+                sums[_POTENTIAL, j] += m * fall
+                sums[_CONTACT, j] += m * stored
                 sums[_PX, j] += px
                 sums[_PY, j] += py
                 sums[_PZ, j] += pz

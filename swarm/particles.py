@@ -88,13 +88,16 @@ class Particles:
 
 
 class State(NamedTuple):
-    """The arrays that kernels advance. Energies are per particle, at the start of the run."""
+    """The arrays that kernels advance.
+
+    Energies are per mass, so that the mass of a particle does not change a bit of its flight.
+    """
 
     position: Floats  # (3, N)
     velocity: Floats  # (3, N)
     mass: Floats  # (N,)
-    energy: Floats  # (N,) total energy at the start
-    inverse_scale: Floats  # (N,) 1/energy scale, what energy errors are relative to
+    energy: Floats  # (N,) total energy per mass at the start [J/kg]
+    inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
     impacts: NDArray[np.int64]  # (N,) since the start
     impulse: Floats  # (surfaces, N) normal impulse since the start [N s]
 

@@ -20,6 +20,8 @@ from .surfaces.plane import Plane
 # The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
 _STARTS = 512
 _MOVES = 200
+# Surfaces whose admissible sides are further apart than this part of the smallest of them leave no volume.
+_TOUCHING = 0.01
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6
 
@@ -75,6 +77,11 @@ class Scene:
         low, high = self.bounds()
         return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
 
+    def finite_size(self) -> float:
+        """`size`, or the extent of the surfaces where the volume is open."""
+        size = self.size()
+        return size if math.isfinite(size) else self._extent()
+
     def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N), shape (surfaces, N); admissible is <= 0 for all."""
         rows = np.asarray(points, dtype=np.float64)
@@ -108,7 +115,10 @@ class Scene:
                 slope = np.maximum((gradient**2).sum(axis=0), np.finfo(np.float64).tiny)
                 # A little past the surface: thin volumes need not be hit exactly.
                 points[:, outside] -= 1.05 * gaps[i, outside] / slope * gradient
-        return False
+        # Surfaces that all but touch converge slowly: only a clear distance is no volume. `fill` finds out about the rest.
+        slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
+        distances = (self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0)
+        return bool(distances.min() <= _TOUCHING * min(reach, *(surface.size() for surface in self.surfaces)))
 
     def _extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""

@@ -202,8 +202,7 @@ def _distances_outside(scene: Scene, particles: Particles) -> NDArray[np.float64
 
 def _magnitude(scene: Scene, particles: Particles) -> float:
     """The size whose round-off a position on a wall has."""
-    size = scene.size()
-    return max(float(np.abs(particles.position).max()), size if math.isfinite(size) else 0.0)
+    return max(float(np.abs(particles.position).max()), scene.finite_size())
 
 
 def _output(
@@ -242,10 +241,7 @@ class Run:
         )
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
-        size = scene.size()
-        observables.start_energies(
-            self._law, self._chain, self._gravity, size if math.isfinite(size) else 0.0, self.state
-        )
+        observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
         blocks = math.ceil(n / (_BLOCKS * threads)) if threads > 1 else n
         # Whole chunks of observables, so that a block observes what it has just advanced.
         chunk = observables.CHUNK

@@ -10,6 +10,7 @@ class Status(IntEnum):
     INTERRUPTED = 1
     UNSOLVED = 2
     NOT_FINITE = 3
+    STALLED = 4
 
     @property
     def sentence(self) -> str:
@@ -21,5 +22,7 @@ _SENTENCES = {
     Status.DONE: "the block reached the frame time",
     Status.INTERRUPTED: "the run was interrupted",
     Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
+    Status.STALLED: "the particle met its walls 100 million times within one frame, as in a cusp or in a gap that is "
+    "thin beyond measure; start it elsewhere, or observe more often",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
 }

@@ -12,7 +12,7 @@ from swarm.surfaces import base
 settings.register_profile(
     "swarm",
     derandomize=True,
-    max_examples=40,
+    max_examples=25,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
     phases=[Phase.explicit, Phase.generate, Phase.shrink],

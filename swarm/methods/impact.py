@@ -71,8 +71,7 @@ class Impact(base.Method):
                 )
 
     def numbers(self, scene: Scene) -> "ImpactNumbers":
-        size = scene.size()
-        length = _SHORTEST * size if self.shortest_flight is None and math.isfinite(size) else 0.0
+        length = _SHORTEST * scene.finite_size() if self.shortest_flight is None else 0.0
         return ImpactNumbers(self.contact_step or None, self.shortest_flight or 0.0, length)
 
 
@@ -90,7 +89,7 @@ class ImpactNumbers(NamedTuple):
 @base.lane_constants.register(ImpactNumbers)
 def _(method, mass, energy, vx, vy, vz):
     # |v|^2 and 1/(2 |v|^2) at the start of the run, and the shortest flight of this particle
-    speed2 = 2.0 * energy / mass
+    speed2 = 2.0 * energy
     moving = speed2 > 0.0
     safe = select(moving, speed2, 1.0)
     shortest = method.shortest_flight + method.shortest_length / math.sqrt(safe)
@@ -203,6 +202,9 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
         # Half way to the other wall at most: the chord bends towards the inside, and what is left halves.
         h = min(k2, left, 0.5 * cut)
         x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1)
+        if used == 0.0:
+            # The wall curves away from the flight (a solid that is only touched), and the sign of v.n is round-off.
+            x, y, z, used = x + h * wx, y + h * wy, z + h * wz, h
     else:
         x, y, z, wx, wy, wz, used, given = _contact(
             method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1

@@ -90,7 +90,6 @@ class Step:
 
 @every_surface
 @some_laws
-@settings(max_examples=25)
 @given(**steps)
 def test_careful_solves_the_equation(name, law, **step):
     step = Step(name, law, **step)
@@ -116,7 +115,6 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 
 @every_surface
 @some_laws
-@settings(max_examples=25)
 @given(**steps)
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
     """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""

@@ -121,28 +121,39 @@ def cusp():
     return facts
 
 
-def graze_cusp():
-    """Along the wall into the cusp: the hardest of all, both walls are tangent to the flight."""
-    facts = {}
+def _graze_cusp(gap):
     angle = np.linspace(0.9, 2.0, 8)
     wall = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0 * angle])
     along = np.array([np.sin(angle), -np.cos(angle), 0.0 * angle])
-    for gap in (1e-3, 1e-6, 0.0):
-        scene = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, (0.3 - gap, 0.0, 0.0), side="outside")])
-        facts[str(gap)] = _facts(scene, swarm.Particles(wall, along), 5.0)
-    return facts
+    scene = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, (0.3 - gap, 0.0, 0.0), side="outside")])
+    return _facts(scene, swarm.Particles(wall, along), 5.0)
+
+
+def graze_slit():
+    """Along the wall through the slit between it and a solid ball: both are tangent to the flight."""
+    return {str(gap): _graze_cusp(gap) for gap in (1e-3, 1e-6, 1e-10)}
+
+
+def graze_cusp():
+    """The same where the ball touches the wall, so that the slit is closed: the hardest of all."""
+    return {"closed": _graze_cusp(0.0)}
+
+
+def _cap(depth):
+    scene = swarm.Scene([swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, -1.0), depth - 0.5)])
+    start = [[0.0] * 3, [0.0] * 3, [0.5 - 0.5 * depth] * 3]
+    velocity = [[1.0, 0.9, 0.6], [0.0, 0.1, 0.0], [0.0, 0.1, 0.8]]
+    return _facts(scene, swarm.Particles(start, velocity), 2.0)
 
 
 def thin_cap():
-    """A cap 1e-3 and 1e-6 of the radius thick between sphere and plane."""
-    facts = {}
-    for depth in (1e-1, 1e-3, 1e-6):
-        scene = swarm.Scene([swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, -1.0), depth - 0.5)])
-        start = [[0.0] * 3, [0.0] * 3, [0.5 - 0.5 * depth] * 3]
-        facts[str(depth)] = _facts(
-            scene, swarm.Particles(start, [[1.0, 0.9, 0.6], [0.0, 0.1, 0.0], [0.0, 0.1, 0.8]]), 2.0
-        )
-    return facts
+    """A cap between sphere and plane, 1e-3 thick: 1e3 impacts a crossing, and a sharp rim."""
+    return {str(depth): _cap(depth) for depth in (1e-1, 1e-3)}
+
+
+def thinner_cap():
+    """A cap 1e-6 thick holds particles too."""
+    return {"1e-6": _cap(1e-6)}
 
 
 CASES = {
@@ -150,12 +161,14 @@ CASES = {
     "graze_ellipsoid": graze_ellipsoid,
     "graze_floor": graze_floor,
     "graze_ball": graze_ball,
+    "graze_slit": graze_slit,
     "graze_cusp": graze_cusp,
     "corner_circle": corner_circle,
     "corners": corners,
     "wedge": wedge,
     "cusp": cusp,
     "thin_cap": thin_cap,
+    "thinner_cap": thinner_cap,
 }
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import swarm
 pytestmark = pytest.mark.physics
 
 # Seconds: none needs five, and compiling its kernels takes up to thirty.
-_HANGS = 90.0
+_HANGS = 60.0
 
 
 def _facts_of(name):
@@ -31,14 +31,20 @@ def _facts_of(name):
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if name != "graze_cusp"])
 def test_it_ends_inside_with_its_energy(name):
     """No launch may hang, leave the volume or change its speed."""
     for launch, facts in _facts_of(name).items():
         assert facts["energy"] <= 1e-12, launch
         assert facts["ulps"] <= 4.0, launch
-        if name.startswith("graze") and name != "graze_cusp":
+        if name.startswith("graze"):
             assert facts["impacts"] <= 2.0 * facts["time"] / facts["shortest"] + 10.0, launch
+
+
+def test_sliding_into_a_cusp_is_given_up_by_name():
+    """Along the wall into a cusp the number of impacts has no bound: an error that names the particle, not a hang."""
+    with pytest.raises(swarm.RunError, match=r"failed at particle \d: .*cusp"):
+        CASES["graze_cusp"]()
 
 
 def test_whispering_gallery_runs_at_full_speed():
