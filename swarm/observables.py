@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import by_type, inlined, kernel, select
-from .contact import regularisation
+from .contact.energy import contact_energy
 from .gravity import Nothing, potential
 from .surfaces import base as surfaces
 from .surfaces import chain as walls
@@ -22,40 +22,6 @@ _COLUMNS = 128
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
 Floats = NDArray[np.float64]
-
-
-@by_type
-def contact_energy(law, chain, x, y, z):
-    """Energy stored in the walls by one particle; rigid walls (None) store none."""
-    raise NotImplementedError
-
-
-@contact_energy.register(Nothing)
-def _(law, chain, x, y, z):
-    return 0.0
-
-
-@by_type
-def _stored(chain, law, x, y, z):
-    raise NotImplementedError
-
-
-@_stored.register(walls.Chain)
-def _(chain, law, x, y, z):
-    g = surfaces.gap_of(chain.first, surfaces.inner(chain.first, x, y, z))
-    return regularisation.stored_energy(law, g) + _stored(chain.rest, law, x, y, z)
-
-
-@_stored.register(Nothing)
-def _(chain, law, x, y, z):
-    return 0.0
-
-
-@contact_energy.register(regularisation.Linear)
-@contact_energy.register(regularisation.Hertz)
-@contact_energy.register(regularisation.Power)
-def _(law, chain, x, y, z):
-    return _stored(chain, law, x, y, z)
 
 
 @by_type

@@ -115,7 +115,7 @@ class Scene:
                 slope = np.maximum((gradient**2).sum(axis=0), np.finfo(np.float64).tiny)
                 # A little past the surface: thin volumes need not be hit exactly.
                 points[:, outside] -= 1.05 * gaps[i, outside] / slope * gradient
-        # Surfaces that all but touch converge slowly: only a clear distance is no volume. `fill` finds out about the rest.
+        # Surfaces that all but touch converge slowly: only a clear distance is no volume; `fill` finds out the rest.
         slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
         distances = (self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0)
         return bool(distances.min() <= _TOUCHING * min(reach, *(surface.size() for surface in self.surfaces)))

@@ -202,9 +202,11 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
         # Half way to the other wall at most: the chord bends towards the inside, and what is left halves.
         h = min(k2, left, 0.5 * cut)
         x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1)
-        if used == 0.0:
-            # The wall curves away from the flight (a solid that is only touched), and the sign of v.n is round-off.
-            x, y, z, used = x + h * wx, y + h * wy, z + h * wz, h
+        ex, ey, ez = x + h * wx, y + h * wy, z + h * wz
+        cut, other = walls.other_hit(chain, surface, x, y, z, wx, wy, wz)
+        if used == 0.0 and cut > h and not walls.outside(chain, -1.0, ex, ey, ez):
+            # The wall curves away from the flight (a solid that is only touched): the sign of v.n is round-off.
+            x, y, z, used = ex, ey, ez, h
     else:
         x, y, z, wx, wy, wz, used, given = _contact(
             method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import SURFACES, call, directions, gap, vectors
+from conftest import SURFACES, call, directions, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,6 +22,11 @@ def both(names):
     """The chain, and the surfaces' numbers one by one."""
     surfaces = tuple(SURFACES[name]() for name in names)
     return chain.chain_of(surfaces), [surface.numbers() for surface in surfaces]
+
+
+def is_out(numbers, point):
+    """Outside one surface, by its level."""
+    return call(base.level_of, numbers, call(base.inner, numbers, point)) > 0.0
 
 
 def first_least(times):
@@ -53,7 +58,7 @@ def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
     assert call(chain.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
     assert call(chain.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
     free = call(chain.free_time, None, whole, point, velocity)
-    if any(gap(numbers, point) > 0.0 for numbers in single):
+    if any(is_out(numbers, point) for numbers in single):
         assert free == 0.0
     else:
         assert free == call(chain.first_hit, whole, point, velocity)[0]
@@ -78,10 +83,10 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
 @given(point=vectors, free=vectors)
 def test_who_is_outside_and_who_is_touched(names, point, free):
     whole, single = both(names)
-    out = [gap(numbers, point) > 0.0 for numbers in single]
+    out = [is_out(numbers, point) for numbers in single]
     assert call(chain.outside, whole, -1.0, point) == any(out)
     for index in range(len(single)):
         assert call(chain.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
-    touched = [now or gap(numbers, point + free) > 0.0 for now, numbers in zip(out, single, strict=True)]
+    touched = [now or is_out(numbers, point + free) for now, numbers in zip(out, single, strict=True)]
     first = touched.index(True) if any(touched) else -1
     assert call(chain.touched, whole, point, free) == (first, sum(touched))
