@@ -266,7 +266,9 @@ class Run:
 
         def block(start: int, stop: int) -> tuple[int, int]:
             args = self._method, self._chain, self._gravity, self.state, span, start, stop, self._halt
-            status, particle = lanes.advance_block(*args)
+            # Without the compiler too, a division by zero is an infinity that a select throws away.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                status, particle = lanes.advance_block(*args)
             return status, particle
 
         began = time.perf_counter()

@@ -7,9 +7,9 @@ import sys
 import time
 
 import pytest
+from test_scene_file import GOOD
 
 import swarm
-from test_scene_file import GOOD
 
 pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 

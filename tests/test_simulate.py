@@ -1,5 +1,6 @@
 """Frames, blocks, threads, and what is refused."""
 
+import numba
 import numpy as np
 import pytest
 
@@ -87,6 +88,7 @@ def test_observables_are_sums_over_particles():
     assert seen["angular_momentum"][-1] == pytest.approx(np.cross(r, mass * v, axis=0).sum(axis=1), abs=1e-10)
 
 
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes in plain Python; which lane is which is the same there")
 @pytest.mark.parametrize(
     ("scene", "method"),
     [(SPHERE, swarm.Impact()), (NESTED, swarm.Impact()), (SPHERE, swarm.Penalty(dt=0.0625, penalty=1e3))],

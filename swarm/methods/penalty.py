@@ -120,7 +120,8 @@ def _restored(method, chain, gravity, x, y, z, vx, vy, vz, c, energy):
     # V/m, with 1/m = 2 c/h^2
     stored = contact_energy(method.law, chain, x, y, z) * (2.0 * c / (method.dt * method.dt))
     missing = 2.0 * (energy - potential(gravity, x, y, z) - stored) - speed2
-    return 1.0 + select(abs(missing) <= _ROUND_OFF * speed2, 0.5 * missing / speed2, 0.0)
+    rounding = (speed2 > 0.0) & (abs(missing) <= _ROUND_OFF * speed2)
+    return 1.0 + select(rounding, 0.5 * missing / speed2, 0.0)
 
 
 @base.flight.register(PenaltyNumbers)

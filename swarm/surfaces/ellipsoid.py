@@ -24,7 +24,7 @@ class Ellipsoid(base.Surface):
     Raises:
         SceneError: an argument is out of its range.
 
-    >>> Ellipsoid(semi_axes=(0.3, 0.3, 0.6)).phi([[0.0], [0.0], [0.6]])
+    >>> Ellipsoid(semi_axes=(0.5, 1.0, 2.0)).phi([[0.0], [0.0], [2.0]])
     array([0.])
     """
 
