@@ -222,8 +222,8 @@ def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
 
 # --- Who may import whom ---------------------------------------------------------------------------------
 
-# DESIGN section 3, from the top down; a module imports only from layers below its own, or from its own package.
-# What DESIGN leaves open: `check` and `numbers` of a method take the Scene and the Particles, so these are below.
+# The architecture, from the top down; a module imports only from layers below its own, or from its own package.
+# `check` and `numbers` of a method take the Scene and the Particles, so these are below.
 LAYERS = [
     ["__init__"],
     ["__main__"],

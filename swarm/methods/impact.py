@@ -32,7 +32,7 @@ class Impact(base.Method):
         shortest_flight: flights that return to the same wall sooner [s] (grazing, whispering gallery) become
             chord steps of this length, so a particle launched along the wall costs a bounded number of steps.
             None: 1e-4 of the crossing time, which costs a tangential launch 1e4 steps a crossing and its speed
-            along the wall a relative error (h |v|/R)^2/24 of 4e-10.
+            along the wall a relative error (h |v|/R)^2/12 of 8e-10.
 
     Raises:
         SceneError: an argument is out of its range, or the scene has gravity (not yet supported).

@@ -47,7 +47,7 @@ class Penalty(base.Method):
     |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step
     solves one scalar equation. Steps look at the gap at their ends only: a solid thinner than |v| dt is refused, but
     a step can miss a chord through the edge of a solid that is shorter than |v| dt.
-    Source: García Orden & Ortega 2007, eqs. (2)-(5); the composite gradient is DESIGN's.
+    Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/base.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
     Traceback (most recent call last):

@@ -4,9 +4,9 @@ A surface is an implicit function phi(r): below 0 inside, 0 on it, above 0 outsi
 is admissible, as a sign in the numbers: +1 for a cavity (phi <= 0), -1 for a solid (phi >= 0). The *gap* is
 g = side * phi, admissible where g <= 0.
 
-phi is a function of a smooth inner function q(r), phi = phi(q(r)), so that the composite discrete gradient
-(DESIGN: contact/discrete_gradient.py) exists even where phi has a corner. The functions below are what
-flights, contact and drawing need; a further surface is one more file that registers them.
+phi is a function of a smooth inner function q(r), phi = phi(q(r)). A divided difference times a discrete gradient of
+q is then a discrete gradient of anything built on phi (the composite gradient), even where the penalty has a corner.
+The functions below are what flights, contact and drawing need; a further surface is one more file that registers them.
 """
 
 import math
