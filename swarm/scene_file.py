@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from . import tables
-from .checks import closest, listed
+from .checks import closest, count, listed
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
@@ -52,7 +52,17 @@ class Job:
     path: Path
 
     def particles(self) -> Particles:
-        """The particles at the start, filled or read."""
+        """The particles at the start, filled or read.
+
+        Raises:
+            SceneError: a value of [particles] is out of its range, or the file it names cannot be used.
+        """
+        try:
+            return self._particles()
+        except SceneError as error:
+            raise SceneError(f"{self.path}, [particles]: {error}") from None
+
+    def _particles(self) -> Particles:
         table = self.source
         if table.source is None:
             assert table.count is not None
@@ -117,6 +127,7 @@ def _check_source(table: ParticlesTable) -> None:
             raise SceneError('particles.frame: only goes with from = "FILE.h5"')
         if table.count is None:
             raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
+        count("particles.count", table.count)
         return
     both = [name for name in filled if getattr(table, name) is not None]
     if both:

@@ -104,7 +104,7 @@ def test_careful_solves_the_equation(name, law, **step):
 @given(**steps)
 def test_careful_finds_the_smallest_root(name, law, **step):
     """No change of sign of the residual before the root; a wall pushes, a cavity with kappa >= 0, a solid <= 0."""
-    step = Step(name, law, **step)
+    step = Step(name, law, **step, reachable=True)
     kappa, _ = step.careful()
     assert kappa * getattr(step.surface, "side", 1.0) >= 0.0
     sign = mp.sign(step.residual(0.0))

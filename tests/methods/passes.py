@@ -1,10 +1,13 @@
 """One pass of one particle in plain Python: what lanes.py does for a lane, in the one place that tests share."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from conftest import call
 
+from swarm.contact.energy import contact_energy
+from swarm.gravity import potential
 from swarm.methods import base
 from swarm.status import Status
 
@@ -21,11 +24,21 @@ class Pass(NamedTuple):
     hits: float
 
 
-def one_pass(method, scene, position, velocity, left, mass=1.0):
-    """Flight and contact of one particle with `left` of its frame to go, in the method's unit."""
+def energy_of(method, scene, position, velocity, mass=1.0):
+    """Kinetic, potential and stored energy of one particle."""
+    fall = mass * call(potential, scene.pull(), position)
+    return 0.5 * mass * velocity @ velocity + fall + call(contact_energy, method.law(), scene.chain(), position)
+
+
+def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
+    """Flight and contact of one particle with `left` of its frame to go, in the method's unit.
+
+    `energy` is its energy at the start of the run, to which a contact restores it from round-off; NaN restores nothing.
+    """
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
+    energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
-    constants = call(base.lane_constants, numbers, mass, 0.5 * mass * velocity @ velocity, velocity)
+    constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
     *state, left, surface = call(base.flight, numbers, chain, gravity, position, velocity, left, *constants)
     kappa = change = 0.0
     if base.most_sweeps(numbers) > 0:
@@ -49,10 +62,12 @@ def one_pass(method, scene, position, velocity, left, mass=1.0):
     return Pass(np.array(state[:3]), np.array(state[3:]), left, surface, hard, impulse[:, 0], hits)
 
 
-def run(method, scene, position, velocity, left, mass=1.0):
+def run(method, scene, position, velocity, left, mass=1.0, restores=True):
     """Passes until nothing of the frame is left."""
-    passes = [Pass(np.asarray(position, float), np.asarray(velocity, float), left, -1.0, False, np.zeros(1), 0.0)]
+    position, velocity = np.asarray(position, float), np.asarray(velocity, float)
+    energy = energy_of(method, scene, position, velocity, mass) if restores else math.nan
+    passes = [Pass(position, velocity, left, -1.0, False, np.zeros(len(scene.surfaces)), 0.0)]
     while passes[-1].left > 0.0:
-        passes.append(one_pass(method, scene, passes[-1].position, passes[-1].velocity, passes[-1].left, mass))
+        passes.append(one_pass(method, scene, passes[-1].position, passes[-1].velocity, passes[-1].left, mass, energy))
         assert len(passes) < 5000
     return passes
