@@ -46,7 +46,7 @@ def _(chain, x, y, z):
 def _energy(law, chain, gravity, m, x, y, z, vx, vy, vz):
     """Kinetic, potential and contact energy per mass of one particle."""
     kinetic = 0.5 * (vx * vx + vy * vy + vz * vz)
-    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, x, y, z) / m
+    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, m, x, y, z)
 
 
 @kernel
@@ -112,15 +112,16 @@ def summary(partial: Floats, impacts: NDArray[np.int64], impulse: Floats) -> dic
     """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise."""
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
+    energy_error, depth = partial[:, _ENERGY_ERROR:].max(axis=0).tolist()
     return {
         "kinetic_energy": kinetic,
         "potential_energy": fall,
         "contact_energy": stored,
         "total_energy": kinetic + fall + stored,
-        "energy_error": float(partial[:, _ENERGY_ERROR].max()),
+        "energy_error": energy_error,
         "momentum": totals[_PX : _PZ + 1],
         "angular_momentum": totals[_LX : _LZ + 1],
-        "max_penetration": float(partial[:, _PENETRATION].max()),
+        "max_penetration": depth,
         "impacts": int(impacts.sum()),
         "impulse": impulse.sum(axis=1),
         "unconverged": 0,

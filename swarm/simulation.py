@@ -288,7 +288,8 @@ class Run:
 
     def require_finite(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite."""
-        if math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all():
+        # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
+        if math.isfinite(seen["total_energy"] + seen["angular_momentum"].sum()):
             return
         good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
         raise RunError(

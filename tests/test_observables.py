@@ -76,7 +76,7 @@ def test_energy_error_is_that_of_the_worst_particle(seen):
     faster[:, worst] *= 2.0
     after = observe(law, scene, state._replace(velocity=faster))
     m, kinetic = state.mass[worst], 0.5 * state.mass[worst] * (state.velocity[:, worst] ** 2).sum()
-    stored = call(observables.contact_energy, law, scene.chain(), state.position[:, worst])
+    stored = call(observables.contact_energy, law, scene.chain(), 1.0, state.position[:, worst])
     scale = kinetic + stored + m * 0.7 * np.abs(scene.gravity).sum()
     assert after["energy_error"] == pytest.approx(3.0 * kinetic / scale, rel=1e-12)
 

@@ -8,13 +8,13 @@ from . import regularisation as law_of
 
 
 @by_type
-def contact_energy(law, chain, x, y, z):
-    """Energy stored in the walls by one particle; rigid walls (None) store none."""
+def contact_energy(law, chain, mass, x, y, z):
+    """Energy per mass that one particle stores in the walls; rigid walls (None) store none."""
     raise NotImplementedError
 
 
 @contact_energy.register(Nothing)
-def _(law, chain, x, y, z):
+def _(law, chain, mass, x, y, z):
     return 0.0
 
 
@@ -37,5 +37,5 @@ def _(chain, law, x, y, z):
 @contact_energy.register(law_of.Linear)
 @contact_energy.register(law_of.Hertz)
 @contact_energy.register(law_of.Power)
-def _(law, chain, x, y, z):
-    return _stored(chain, law, x, y, z)
+def _(law, chain, mass, x, y, z):
+    return _stored(chain, law, x, y, z) / mass

@@ -117,8 +117,8 @@ def _restored(method, chain, gravity, x, y, z, vx, vy, vz, c, energy):
     larger difference than round-off is not touched: it would be an error of the solve, and must show.
     """
     speed2 = vx * vx + vy * vy + vz * vz
-    # V/m, with 1/m = 2 c/h^2
-    stored = contact_energy(method.law, chain, x, y, z) * (2.0 * c / (method.dt * method.dt))
+    # c = h^2/(2m)
+    stored = contact_energy(method.law, chain, 0.5 * method.dt * method.dt / c, x, y, z)
     missing = 2.0 * (energy - potential(gravity, x, y, z) - stored) - speed2
     rounding = (speed2 > 0.0) & (abs(missing) <= _ROUND_OFF * speed2)
     return 1.0 + select(rounding, 0.5 * missing / speed2, 0.0)

@@ -27,7 +27,7 @@ class Pass(NamedTuple):
 def energy_of(method, scene, position, velocity, mass=1.0):
     """Kinetic, potential and stored energy of one particle."""
     fall = mass * call(potential, scene.pull(), position)
-    return 0.5 * mass * velocity @ velocity + fall + call(contact_energy, method.law(), scene.chain(), position)
+    return 0.5 * mass * velocity @ velocity + fall + call(contact_energy, method.law(), scene.chain(), 1.0, position)
 
 
 def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):

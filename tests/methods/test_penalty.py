@@ -16,14 +16,17 @@ from swarm.surfaces import base as surfaces
 exponents = pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
 
 
-def slack(method, scene, mass, before, after):
+def slack(method, scene, mass, *steps):
     """Round-off of the energy: of its terms, and of the stored energy for positions rounded in their last place."""
-    reach = 1.0 + np.linalg.norm(before.position)
-    force = max(before.impulse.sum(), after.impulse.sum()) * mass / method.dt
-    kinetic = 0.5 * mass * max(before.velocity @ before.velocity, after.velocity @ after.velocity)
-    stored = max(call(contact_energy, method.law(), scene.chain(), step.position) for step in (before, after))
-    gravity = np.linalg.norm(scene.gravity or (0.0, 0.0, 0.0))
-    return 64 * EPSILON * (kinetic + stored + (force + mass * gravity) * reach)
+    terms = 0.0
+    for step in steps:
+        stored = call(contact_energy, method.law(), scene.chain(), 1.0, step.position)
+        depth = scene.gaps(step.position[:, None]).max()
+        # V' = (a + 1) V/g; no gap of the table is steeper than 5.
+        force = 5.0 * (method.exponent + 1.0) * stored / depth if depth > 0.0 else 0.0
+        force += mass * np.linalg.norm(scene.gravity or (0.0, 0.0, 0.0)) + step.impulse.sum() * mass / method.dt
+        terms += 0.5 * mass * step.velocity @ step.velocity + stored + force * (1.0 + np.linalg.norm(step.position))
+    return 16 * EPSILON * terms
 
 
 @every_surface
@@ -84,7 +87,7 @@ def test_a_step_is_the_papers(name, point, velocity, pull):
     assert after.position - start == pytest.approx(0.5 * h * (velocity + after.velocity), abs=64 * EPSILON)
     gravity = np.zeros(3) if pull is None else np.array(scene.gravity)
     q0, q1 = (call(surfaces.inner, numbers, r) for r in (start, after.position))
-    rise = np.subtract(*(call(contact_energy, method.law(), scene.chain(), r) for r in (after.position, start)))
+    rise = np.subtract(*(call(contact_energy, method.law(), scene.chain(), 1.0, r) for r in (after.position, start)))
     discrete = np.array(call(surfaces.inner_gradient, numbers, start, after.position))
     force = -rise / (q1 - q0) * discrete
     given_ = mass * (after.velocity - velocity - h * gravity)
