@@ -15,7 +15,7 @@ from .surfaces import base as surfaces
 from .surfaces import chain as walls
 
 # Particles a partial sum: a constant of the results, unlike the block size.
-CHUNK = 1024
+CHUNK = 2048
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 128
 
