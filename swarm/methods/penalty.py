@@ -43,8 +43,8 @@ class Penalty(base.Method):
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
-    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, for steps |v| dt short of the cavity's size.
-    A longer one may be solved wrongly; `energy_error` shows it. Walls give way by up to
+    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, for steps |v| dt short of the
+    cavity's size. A longer one may be solved wrongly; `energy_error` shows it. Walls give way by up to
     |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step
     solves one scalar equation. Steps look at the gap at their ends only: a solid thinner than |v| dt is refused, but
     a step can miss a chord through the edge of a solid that is shorter than |v| dt.
