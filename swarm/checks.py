@@ -5,9 +5,14 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from .errors import SceneError
 
 Vector = tuple[float, float, float]
+# Lengths whose squares and inverse squares are numbers.
+_SHORTEST, _LONGEST = 1e-100, 1e100
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
@@ -39,6 +44,14 @@ def at_least(name: str, value: Any, bound: float) -> float:
     return result
 
 
+def length(name: str, value: Any) -> float:
+    """`value` as a length [m] above zero whose square is a number too."""
+    result = positive(name, value)
+    if not _SHORTEST <= result <= _LONGEST:
+        raise SceneError(f"{name} must be between {_SHORTEST:g} and {_LONGEST:g} m, got {result:g}")
+    return result
+
+
 def count(name: str, value: Any, least: int = 1) -> int:
     """`value` as an integer not below `least`."""
     if isinstance(value, bool) or not hasattr(value, "__index__"):
@@ -61,6 +74,14 @@ def vector(name: str, value: Any) -> Vector:
         raise SceneError(f"{name} must be three numbers, got {len(parts)}: {value!r}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(parts))
     return x, y, z
+
+
+def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """`value` as an array of floats."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} must be an array of numbers, got {type(value).__name__}") from None
 
 
 def one_of(name: str, value: Any, choices: Iterable[str]) -> str:

@@ -62,3 +62,19 @@ def _(gravity, x, y, z):
 @potential.register(Nothing)
 def _(gravity, x, y, z):
     return 0.0
+
+
+@by_type
+def weight(gravity, sx, sy, sz):
+    """How far the potential energy per mass moves at most when the coordinates move by (sx, sy, sz)."""
+    raise NotImplementedError
+
+
+@weight.register(Gravity)
+def _(gravity, sx, sy, sz):
+    return abs(gravity.x) * sx + abs(gravity.y) * sy + abs(gravity.z) * sz
+
+
+@weight.register(Nothing)
+def _(gravity, sx, sy, sz):
+    return 0.0

@@ -32,7 +32,7 @@ class Lanes(NamedTuple):
     impulse: Array  # (surfaces, stride) normal impulse per mass
     surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
-    change: Array  # its last Newton step
+    unsolved: Array  # bool, whether its solve goes on
     particle: Array  # int64, the particle in the lane
 
 
@@ -47,7 +47,7 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         np.empty((walls.length(chain), _STRIDE)),
         np.empty(_STRIDE),
         np.zeros(_STRIDE),
-        np.zeros(_STRIDE),
+        np.zeros(_STRIDE, np.bool_),
         np.empty(_STRIDE, np.int64),
     )
     live = min(_LANES, stop - start)
@@ -150,24 +150,24 @@ def _fly(method, chain, gravity, lanes, live):
 @inlined
 def _solve(method, chain, gravity, lanes, live):
     """The contact's unknown of every lane; sweeps end when the last lane is solved."""
-    rows, surface, kappa, change = lanes.rows, lanes.surface, lanes.kappa, lanes.change
+    rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
     if methods.most_sweeps(method) > 0:
         for i in range(live):
-            kappa[i], change[i] = methods.guess(
+            kappa[i], unsolved[i] = methods.guess(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
                 rows[_K0, i], surface[i],
             )  # fmt: skip
     for _sweep in range(methods.most_sweeps(method)):
-        unsolved = 0
+        remaining = 0
         for i in range(live):
-            kappa[i], change[i], more = methods.improve(
+            kappa[i], unsolved[i] = methods.improve(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_K0, i], surface[i], kappa[i], change[i],
+                rows[_K0, i], surface[i], kappa[i], unsolved[i],
             )  # fmt: skip
-            unsolved += more
-        if unsolved == 0:
+            remaining += unsolved[i]
+        if remaining == 0:
             break
 
 
@@ -175,13 +175,13 @@ def _solve(method, chain, gravity, lanes, live):
 def _contact(method, chain, gravity, lanes, live):
     """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
     rows, surface = lanes.rows, lanes.surface
-    impulse, kappa, change = lanes.impulse, lanes.kappa, lanes.change
+    impulse, kappa, unsolved = lanes.impulse, lanes.kappa, lanes.unsolved
     retired, hard_lanes = 0, 0
     for i in range(live):
         x, y, z, vx, vy, vz, left, wall, given, hits = methods.contact(
             method, chain, gravity,
             rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-            rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], kappa[i], change[i],
+            rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], kappa[i], unsolved[i],
         )  # fmt: skip
         rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
         rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import checks
 from .errors import SceneError
 
 Floats = NDArray[np.float64]
@@ -37,7 +38,7 @@ class Particles:
         n = self.position.shape[1]
         if self.velocity.shape[1] != n:
             raise SceneError(f"velocity must have the shape of position, (3, {n}), got {self.velocity.shape}")
-        masses = _array("mass", mass)
+        masses = checks.array("mass", mass)
         if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
             raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
         self.mass: Floats = np.ascontiguousarray(np.broadcast_to(masses, (n,))).copy()
@@ -67,7 +68,7 @@ class Particles:
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
                 table = list(csv.reader(file))
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise SceneError(f"cannot read {path}: {error}") from error
         header = [name.strip() for name in table[0]] if table else []
         missing = [name for name in _COLUMNS if name not in header]
@@ -112,20 +113,15 @@ def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str])
         except ValueError:
             value = np.nan
         if not np.isfinite(value):
-            raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell!r}")
+            raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell[:40]!r}")
+        if name == "mass" and value <= 0.0:
+            raise SceneError(f"{path}, row {number}, column 'mass': expected a number above 0, got {cell!r}")
         values.append(value)
     return values
 
 
-def _array(name: str, value: ArrayLike) -> Floats:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{name} must be an array of numbers, got {type(value).__name__}") from None
-
-
 def _rows(name: str, value: ArrayLike) -> Floats:
-    rows = _array(name, value)
+    rows = checks.array(name, value)
     if rows.shape == (3,):
         rows = rows.reshape(3, 1)
     if rows.ndim != 2 or rows.shape[0] != 3:

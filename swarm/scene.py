@@ -19,9 +19,12 @@ from .surfaces.plane import Plane
 
 # The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
 _STARTS = 512
-_MOVES = 200
-# Surfaces whose admissible sides are further apart than this part of the smallest of them leave no volume.
-_TOUCHING = 0.01
+_MOVES = 30
+# Then this many of the nearest are moved onto all surfaces that they violate at once.
+_NEAREST = 32
+_STEPS = 100
+# Each move aims this far, relative to the gap: a little past the surface, so that thin volumes are hit.
+_PAST = 1.05
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6
 
@@ -84,7 +87,7 @@ class Scene:
 
     def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N), shape (surfaces, N); admissible is <= 0 for all."""
-        rows = np.asarray(points, dtype=np.float64)
+        rows = checks.array("points", points)
         return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
 
     def bounds(self) -> Box:
@@ -113,12 +116,21 @@ class Scene:
                 outside = worst == i
                 gradient = _side(surface) * surface.gradient(points[:, outside])
                 slope = np.maximum((gradient**2).sum(axis=0), np.finfo(np.float64).tiny)
-                # A little past the surface: thin volumes need not be hit exactly.
-                points[:, outside] -= 1.05 * gaps[i, outside] / slope * gradient
-        # Surfaces that all but touch converge slowly: only a clear distance is no volume; `fill` finds out the rest.
-        slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
-        distances = (self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0)
-        return bool(distances.min() <= _TOUCHING * min(reach, *(surface.size() for surface in self.surfaces)))
+                points[:, outside] -= _PAST * gaps[i, outside] / slope * gradient
+        points = points[:, np.argsort(self.gaps(points).max(axis=0))[:_NEAREST]]
+        for _ in range(_STEPS):
+            # One surface after the other creeps along a sharp edge; Newton's step for all that are near does not.
+            gradients = np.array([_side(surface) * surface.gradient(points) for surface in self.surfaces])
+            lengths = np.maximum(np.sqrt((gradients**2).sum(axis=1)), np.finfo(np.float64).tiny)
+            gaps = self.gaps(points) / lengths
+            worst = gaps.max(axis=0)
+            if (worst <= 0.0).any():
+                return True
+            near = gaps > -worst
+            normals = (gradients / lengths[:, None] * near[:, None]).transpose(2, 0, 1)
+            wanted = ((gaps + (_PAST - 1.0) * worst) * near).T[:, :, None]
+            points = points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T
+        return False
 
     def _extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""

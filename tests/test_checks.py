@@ -30,6 +30,8 @@ def test_what_is_not_a_finite_number(check, value):
         (lambda: checks.positive("radius", 0), "radius must be above 0, got 0"),
         (lambda: checks.positive("radius", -1e-9), "radius must be above 0, got -1e-09"),
         (lambda: checks.at_least("exponent", 0.5, 1.0), "exponent must be 1 or more, got 0.5"),
+        (lambda: checks.length("radius", 1e101), "radius must be between 1e-100 and 1e+100 m, got 1e+101"),
+        (lambda: checks.array("points", "abc"), "points must be an array of numbers, got str"),
         (lambda: checks.count("n", 0), "n must be 1 or more, got 0"),
         (lambda: checks.count("n", 2.5), "n must be a whole number, 1 or more, got 2.5"),
         (lambda: checks.count("n", True), "n must be a whole number, 1 or more, got True"),

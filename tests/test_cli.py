@@ -99,13 +99,14 @@ def test_help_does_not_import_the_engine(folder):
     assert told.stdout.splitlines()[-1] == "[]"
 
 
-def test_interrupt_keeps_finished_frames(folder):
+def test_interrupt_keeps_finished_frames(folder, request):
     """SIGINT: exit code 130, and the file opens and holds whole frames."""
     (folder / "scene.toml").write_text(GOOD.replace("until = 1.0", "until = 1e7"))
     process = subprocess.Popen(
         [sys.executable, "-m", "swarm", "run", "scene.toml"],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
+    request.addfinalizer(process.kill)
     deadline = time.monotonic() + 200.0
     frames = 0
     while frames < 5 and time.monotonic() < deadline:

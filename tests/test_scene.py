@@ -32,6 +32,8 @@ VOLUMES = {
     "an ellipsoidal shell of 1e-6": [Ellipsoid((1, 2, 3)), Ellipsoid((1 - 1e-6, 2 - 1e-6, 3 - 1e-6), side="outside")],
     "a lens of 1e-6": [Sphere(1.0), Sphere(1.0, (2.0 - 1e-6, 0.0, 0.0))],
     "a cap of 1e-6": [Sphere(1.0), Plane((0, 0, 1), 1e-6 - 1.0)],
+    "a lens of 1e-12": [Sphere(1.0), Sphere(1.0, (2.0 - 1e-12, 0.0, 0.0))],
+    "a cap of 1e-12 of an ellipsoid": [Ellipsoid((1.0, 2.0, 3.0)), Plane((1.0, 0.0, 0.0), 1e-12 - 1.0)],
     "a wedge far away": [Plane((0, 0, 1), 0.0), Plane((0.01, 0.0, -1.0), -1.0)],
     "a small cavity far away": [Sphere(1e-6, (1e3, -1e3, 1e3))],
     "a solid far away": [Sphere(1.0, (1e6, 0.0, 0.0), side="outside"), Plane((1.0, 0.0, 0.0), 0.0)],
@@ -46,6 +48,9 @@ EMPTY = {
     "planes back to back, tilted": [Plane((1, 1, 1), -1e-3), Plane((-1, -1, -1), 0.0)],
     "two cavities apart": [Sphere(1.0), Sphere(1.0, (2.5, 0.0, 0.0))],
     "two cavities apart, their boxes not": [Sphere(1.0), Sphere(1.0, (1.3, 1.3, 1.3))],
+    "a shell of less than nothing": [Sphere(1.0), Sphere(1.0 + 1e-9, side="outside")],
+    "spheres that miss by 1e-9": [Sphere(1.0), Sphere(1.0, (2.0 + 1e-9, 0.0, 0.0))],
+    "a plane that misses by 1e-9": [Ellipsoid((1.0, 2.0, 3.0)), Plane((1.0, 0.0, 0.0), -1.0 - 1e-9)],
     "a cube in a solid": [*cube(), Sphere(1.8, side="outside")],
 }
 

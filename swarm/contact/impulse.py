@@ -15,24 +15,26 @@ from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
 from . import regularisation as law_of
 
-# A Newton step this small, relative to kappa, is the last: its square is below round-off.
-_NEWTON_TOLERANCE = 1e-7
+# A Newton step that moves the gap by this part of itself is the last: its square is below round-off.
+_NEWTON_TOLERANCE = 1e-8
 # Steps of the vectorised solve; what needs more goes the careful way.
 NEWTON_STEPS = 8
 _CAREFUL_ITERATIONS = 200
+# Doublings of a bracket: from the smallest number to the largest.
+_DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
 
 
 @inlined
 def _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, kappa):
-    """F(kappa) = kappa - c V[g0, g1] g[q0, q1] and its derivative, c = h^2/(2m)."""
+    """F(kappa) = kappa - c V[g0, g1] g[q0, q1], c = h^2/(2m); its derivative; g1 and its derivative."""
     q1, dq1 = surfaces.pushed(surface, x, y, z, px, py, pz, kappa)
     slope, dslope = surfaces.gap_slope(surface, q0, q1)
     g1 = surfaces.gap_of(surface, q1)
     force, dforce = law_of.energy_slope(law, g0, g1)
-    # dg1/dq1 from g1 - g0 = g[q0, q1] (q1 - q0)
-    dg1 = slope + dslope * (q1 - q0)
-    return kappa - c * force * slope, 1.0 - c * dq1 * (dforce * dg1 * slope + force * dslope)
+    # from g1 - g0 = g[q0, q1] (q1 - q0)
+    dg1 = dq1 * (slope + dslope * (q1 - q0))
+    return kappa - c * force * slope, 1.0 - c * (dforce * dg1 * slope + force * dslope * dq1), g1, dg1
 
 
 @by_type
@@ -75,7 +77,11 @@ def _(chain, index, law, x, y, z, px, py, pz, c):
 
 @by_type
 def improve(chain, index, law, x, y, z, px, py, pz, c, kappa):
-    """The Newton step of kappa for surface `index`."""
+    """The Newton step of kappa for surface `index`, and whether it was so large that another is needed.
+
+    What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1 is
+    a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
+    """
     raise NotImplementedError
 
 
@@ -84,20 +90,19 @@ def _(chain, index, law, x, y, z, px, py, pz, c, kappa):
     surface = chain.first
     q0 = surfaces.inner(surface, x, y, z)
     g0 = surfaces.gap_of(surface, q0)
-    f, df = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, kappa)
-    other = improve(chain.rest, index - 1.0, law, x, y, z, px, py, pz, c, kappa)
-    return select(index == 0.0, f / df, other)
+    f, df, g1, dg1 = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, kappa)
+    step = f / df
+    depth = select(g0 > abs(g1), g0, abs(g1))
+    # True for NaN.
+    more = not (abs(step * dg1) <= _NEWTON_TOLERANCE * depth)
+    other, other_more = improve(chain.rest, index - 1.0, law, x, y, z, px, py, pz, c, kappa)
+    here = index == 0.0
+    return select(here, step, other), (here & more) | ((not here) & other_more)
 
 
 @improve.register(Nothing)
 def _(chain, index, law, x, y, z, px, py, pz, c, kappa):
-    return 0.0
-
-
-@inlined
-def unsolved(kappa, change):
-    """Whether the last Newton step was so large that another is needed. True for NaN."""
-    return not (abs(change) <= _NEWTON_TOLERANCE * abs(kappa))
+    return 0.0, False
 
 
 @outlined
@@ -105,27 +110,38 @@ def careful(law, surface, x, y, z, px, py, pz, c):
     """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
     q0 = surfaces.inner(surface, x, y, z)
     g0 = surfaces.gap_of(surface, q0)
-    f, _df = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, 0.0)
+    f, _df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, 0.0)
     if f == 0.0:
         return 0.0, True
-    # At kappa = 0 the right side of (K) is largest, so its value there is past the root. A solid pushes with
-    # kappa < 0: `sign` mirrors it.
+    # A cavity pushes with kappa > 0, a solid with kappa < 0 short of the pole of `push`: `sign` mirrors it.
     sign = -1.0 if f > 0.0 else 1.0
-    low, high = 0.0, abs(f)
-    k = low
+    farthest = abs(surfaces.farthest_push(surface))
+    # While g1 falls with kappa the right side of (K) is largest at 0, so its value there is past the root; on a chord
+    # across an ellipsoid g1 may rise first. The doubling ends: (K) has F > 0 both far out and before the pole.
+    low, high = 0.0, min(abs(f), 0.5 * farthest)
+    bracketed = False
+    for _i in range(_DOUBLINGS):
+        f, _df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, sign * high)
+        if sign * f >= 0.0:
+            bracketed = True
+            break
+        low, high = high, min(2.0 * high, 0.5 * (high + farthest))
+    k, previous = low, math.inf
     for _i in range(_CAREFUL_ITERATIONS):
-        f, df = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, sign * k)
+        f, df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, sign * k)
         f = sign * f
         if f == 0.0:
-            return sign * k, True
+            return sign * k, bracketed
         if f < 0.0:
             low = k
         else:
             high = k
         trial = k - f / df
-        if not low < trial < high:
+        # Newton's steps that do not shrink have reached the noise of g1: halving the bracket ends.
+        if not (low < trial < high and abs(trial - k) <= 0.5 * previous):
             trial = 0.5 * (low + high)
-        if abs(trial - k) <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
-            return sign * trial, True
+        previous = abs(trial - k)
+        if previous <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
+            return sign * trial, bracketed
         k = trial
     return sign * k, False

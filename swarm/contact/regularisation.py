@@ -134,8 +134,8 @@ def _(law, g0, g1):
 _NODE = 0.5 * math.sqrt(0.6)
 _THETA = (0.5 - _NODE, 0.5, 0.5 + _NODE)
 _WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-# Its error is of the sixth order in |g1 - g0|/g; below this ratio it is under round-off.
-_CLOSE = 1.0 / 32.0
+# Its error is of the sixth order in (a + 1)|g1 - g0|/g; below this ratio it is under round-off.
+_CLOSE = 1.0 / 16.0
 
 
 @stored_energy.register(Power)
@@ -151,7 +151,7 @@ def _(law, g):
 @energy_slope.register(Power)
 def _(law, g0, g1):
     d = g1 - g0
-    if g0 > 0.0 and g1 > 0.0 and abs(d) < _CLOSE * g0:
+    if g0 > 0.0 and g1 > 0.0 and abs(d) * (law.a + 1.0) < _CLOSE * g0:
         # V[g0, g1] is the mean of the force alpha g^a between the two gaps.
         slope, curvature = 0.0, 0.0
         for i in range(3):

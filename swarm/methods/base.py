@@ -61,18 +61,18 @@ def most_sweeps(method):
 
 @by_type
 def guess(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface):
-    """First guess of the contact's unknown kappa, and how far off it may be."""
-    return 0.0, 0.0
+    """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
+    return 0.0, False
 
 
 @by_type
-def improve(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, change):
-    """One sweep of the solve: (kappa, change, unsolved). A lane that is solved stays as it is, bit by bit."""
-    return kappa, change, False
+def improve(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, unsolved):
+    """One sweep of the solve: (kappa, unsolved). A lane that is solved stays as it is, bit by bit."""
+    return kappa, False
 
 
 @by_type
-def contact(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, change):
+def contact(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
     """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits).
 
     `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts. A `surface` that is HARD

@@ -160,7 +160,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
 
 
 @base.contact.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, change):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
     sx, sy, sz, wx, wy, wz, used, impulse = _contact(
         method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1
     )

@@ -10,9 +10,9 @@ from .. import checks
 from .._jit import by_type_outlined, inlined, outlined, select
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
-from ..contact.energy import contact_energy
+from ..contact.energy import contact_energy, energy_doubt
 from ..errors import SceneError
-from ..gravity import Nothing, accelerated, displacement, potential
+from ..gravity import Nothing, accelerated, displacement, potential, weight
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
@@ -22,11 +22,13 @@ from . import base
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
 _WHOLE = 1e-6
+# More steps than this are not counted exactly.
+_MOST_STEPS = 2.0**53
 # Gauss-Seidel sweeps over the walls that hold one particle at once; a corner of 90 degrees takes three.
 _SWEEPS = 500
-# Energy that goes missing in one contact, relative to v^2, if all steps were solved.
-_ROUND_OFF = 1e-9
 _EPSILON = float(np.finfo(np.float64).eps)
+# Units of round-off by which a contact that is solved may miss its energy.
+_ROUND_OFF = 64.0 * _EPSILON
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,12 @@ class Penalty(base.Method):
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
-    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, for steps |v| dt short of the
-    cavity's size. A longer one may be solved wrongly; `energy_error` shows it. Walls give way by up to
-    |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step
-    solves one scalar equation. Steps look at the gap at their ends only: a solid thinner than |v| dt is refused, but
-    a step can miss a chord through the edge of a solid that is shorter than |v| dt.
+    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt: a contact step counts only
+    if its energy balances, and one that cannot be solved (a step longer than the cavity into several walls at once)
+    ends the run with an error. Walls give way by up to |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free
+    steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps look at the gap at their
+    ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the edge of a solid that is
+    shorter than |v| dt.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/base.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
@@ -81,6 +84,10 @@ class Penalty(base.Method):
         return PenaltyNumbers(self.dt, self.law())
 
     def span(self, name: str, duration: float) -> float:
+        if duration / self.dt > _MOST_STEPS:
+            raise SceneError(
+                f"{name} must be at most {_MOST_STEPS:g} steps, got {name} = {duration:g} s with dt = {self.dt:g} s"
+            )
         steps = round(duration / self.dt)
         if abs(duration / self.dt - steps) > _WHOLE:
             raise SceneError(
@@ -110,19 +117,26 @@ def _(method, mass, energy, vx, vy, vz):
 
 
 @inlined
-def _restored(method, chain, gravity, x, y, z, vx, vy, vz, c, energy):
-    """Factor of v after a contact step that gives the particle its first energy back.
+def _restored(method, chain, gravity, x0, y0, z0, x, y, z, vx, vy, vz, c, energy):
+    """Factor of v after a contact step that gives the particle its first energy back, and whether it is that near to 1.
 
     Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
     energy, and over many contacts the errors add up (measured: 2e-10 after 10 000 steps at dt sqrt(alpha/m) = 100). A
-    larger difference than round-off is not touched: it would be an error of the solve, and must show.
+    larger difference than round-off is not touched: it is an equation that was not solved.
     """
-    speed2 = vx * vx + vy * vy + vz * vz
+    h = method.dt
     # c = h^2/(2m)
-    stored = contact_energy(method.law, chain, 0.5 * method.dt * method.dt / c, x, y, z)
+    mass = 0.5 * h * h / c
+    speed2 = vx * vx + vy * vy + vz * vz
+    stored = contact_energy(method.law, chain, mass, x, y, z)
     missing = 2.0 * (energy - potential(gravity, x, y, z) - stored) - speed2
-    rounding = (speed2 > 0.0) & (abs(missing) <= _ROUND_OFF * speed2)
-    return 1.0 + select(rounding, 0.5 * missing / speed2, 0.0)
+    # Where the coordinates of the step have their last bits.
+    sx, sy, sz = abs(x0) + abs(x) + h * abs(vx), abs(y0) + abs(y) + h * abs(vy), abs(z0) + abs(z) + h * abs(vz)
+    doubt = energy_doubt(chain, method.law, mass, x0, y0, z0, sx, sy, sz)
+    doubt += energy_doubt(chain, method.law, mass, x, y, z, sx, sy, sz)
+    doubt += speed2 + abs(energy) + weight(gravity, sx, sy, sz)
+    balanced = abs(missing) <= _ROUND_OFF * doubt
+    return 1.0 + select(balanced & (speed2 > 0.0), 0.5 * missing / speed2, 0.0), balanced
 
 
 @base.flight.register(PenaltyNumbers)
@@ -151,20 +165,18 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface):
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
     kappa = contact_impulse.guess(chain, surface, method.law, x, y, z, px, py, pz, k0)
     touching = surface >= 0.0
-    return select(touching, kappa, 0.0), select(touching, math.inf, 0.0)
+    return select(touching, kappa, 0.0), touching
 
 
 @base.improve.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, change):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, unsolved):
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    step = contact_impulse.improve(chain, surface, method.law, x, y, z, px, py, pz, k0, kappa)
-    going = contact_impulse.unsolved(kappa, change)
-    kappa, change = select(going, kappa - step, kappa), select(going, step, change)
-    return kappa, change, contact_impulse.unsolved(kappa, change)
+    step, more = contact_impulse.improve(chain, surface, method.law, x, y, z, px, py, pz, k0, kappa)
+    return select(unsolved, kappa - step, kappa), unsolved & more
 
 
 @base.contact.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, change):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
     h = method.dt
     px, py, pz = displacement(gravity, vx, vy, vz, h)
@@ -177,10 +189,12 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
     wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
 
-    # A push into another wall, or a slow solve: the careful way.
-    solved = (not contact_impulse.unsolved(kappa, change)) & (not walls.outside(chain, surface, x1, y1, z1))
+    # A push into another wall, or an equation that is not solved yet: the careful way.
+    factor, balanced = _restored(method, chain, gravity, x, y, z, x1, y1, z1, wx, wy, wz, k0, k1)
+    solved = balanced & (not unsolved) & walls.pushes(chain, surface, kappa)
+    solved = solved & (not walls.outside(chain, surface, x1, y1, z1))
     step = (left > 0.0) & select(touching, solved, surface > base.HARD)
-    e = select(touching, _restored(method, chain, gravity, x1, y1, z1, wx, wy, wz, k0, k1), 1.0)
+    e = select(touching, factor, 1.0)
     new = step & touching & (not walls.outside(chain, -1.0, x, y, z))
     return (
         select(step, x1, x),
@@ -284,7 +298,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
     _add_impulses(chain, kappas, 0, f, x, y, z, x1, y1, z1, impulse, lane)
     new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
-    status = Status.DONE.value if solved else Status.UNSOLVED.value
     wx, wy, wz = wx - f * sx, wy - f * sy, wz - f * sz
-    e = _restored(method, chain, gravity, x1, y1, z1, wx, wy, wz, k0, k1)
+    e, balanced = _restored(method, chain, gravity, x, y, z, x1, y1, z1, wx, wy, wz, k0, k1)
+    status = Status.DONE.value if solved and balanced else Status.UNSOLVED.value
     return x1, y1, z1, wx * e, wy * e, wz * e, left - 1.0, new, status

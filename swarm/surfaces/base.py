@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._jit import by_type, inlined, select
-from ..checks import Vector, one_of
+from ..checks import Vector, array, one_of
 from ..errors import SceneError
 
 SIDES = {"inside": 1.0, "outside": -1.0}
@@ -53,7 +53,7 @@ class Surface:
 
 
 def _rows(points: ArrayLike) -> NDArray[np.float64]:
-    rows = np.asarray(points, dtype=np.float64)
+    rows = array("points", points)
     if rows.ndim not in (1, 2) or rows.shape[0] != 3:
         raise SceneError(f"points must have shape (3, N), got {rows.shape}")
     return rows
@@ -174,6 +174,12 @@ def push(surface, x0, y0, z0, px, py, pz, kappa):
 @by_type
 def pushed(surface, x0, y0, z0, px, py, pz, kappa):
     """q(r1) and its derivative by kappa for the r1 of `push`."""
+    raise NotImplementedError
+
+
+@by_type
+def farthest_push(surface):
+    """The kappa up to which `push` is continuous from 0 on, with the sign in which the surface pushes."""
     raise NotImplementedError
 
 

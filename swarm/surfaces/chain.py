@@ -189,6 +189,25 @@ def _(chain, index, x0, y0, z0, px, py, pz, kappa):
 
 
 @by_type
+def pushes(chain, index, kappa):
+    """Whether surface `index` can push with kappa: in its direction and short of the pole."""
+    raise NotImplementedError
+
+
+@pushes.register(Chain)
+def _(chain, index, kappa):
+    farthest = base.farthest_push(chain.first)
+    here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
+    other = pushes(chain.rest, index - 1.0, kappa)
+    return ((index == 0.0) & here) | ((index != 0.0) & other)
+
+
+@pushes.register(Nothing)
+def _(chain, index, kappa):
+    return False
+
+
+@by_type
 def inner_gradient(chain, index, x0, y0, z0, x1, y1, z1):
     """Discrete gradient of the inner function of surface `index`."""
     raise NotImplementedError

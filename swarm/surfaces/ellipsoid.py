@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .._jit import inlined
-from ..checks import Vector, positive, vector
+from .._jit import inlined, select
+from ..checks import Vector, length, vector
 from . import base
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error.
@@ -35,7 +35,7 @@ class Ellipsoid(base.Surface):
     def __post_init__(self) -> None:
         axes = vector("semi_axes", self.semi_axes)
         for i, axis in enumerate(axes):
-            positive(f"semi_axes[{i}]", axis)
+            length(f"semi_axes[{i}]", axis)
         object.__setattr__(self, "semi_axes", axes)
         object.__setattr__(self, "center", vector("center", self.center))
         base.side_sign(self.side)
@@ -201,6 +201,11 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     y1, sy = _pushed(surface.ay, y0 - surface.cy, py, kappa)
     z1, sz = _pushed(surface.az, z0 - surface.cz, pz, kappa)
     return _dot(surface, x1, y1, z1, x1, y1, z1), 2.0 * _dot(surface, x1, y1, z1, sx, sy, sz)
+
+
+@base.farthest_push.register(EllipsoidNumbers)
+def _(surface):
+    return select(surface.side > 0.0, math.inf, -1.0 / max(surface.ax, surface.ay, surface.az))
 
 
 @base.settle.register(EllipsoidNumbers)

@@ -30,10 +30,13 @@ class Plane(base.Surface):
 
     def __post_init__(self) -> None:
         normal = vector("normal", self.normal)
-        length = math.hypot(*normal)
-        if length == 0.0:
+        largest = max(abs(part) for part in normal)
+        if largest == 0.0:
             raise SceneError("normal must not be the zero vector, got (0, 0, 0)")
-        object.__setattr__(self, "normal", tuple(part / length for part in normal))
+        # Scaled first: the length of the vector itself may not be a number.
+        scaled = [part / largest for part in normal]
+        length = math.hypot(*scaled)
+        object.__setattr__(self, "normal", tuple(part / length for part in scaled))
         object.__setattr__(self, "offset", number("offset", self.offset))
 
     def numbers(self) -> "PlaneNumbers":
@@ -139,6 +142,11 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
 @base.pushed.register(PlaneNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     return base.inner(surface, x0, y0, z0) + (base.inner(surface, px, py, pz) - kappa), -1.0
+
+
+@base.farthest_push.register(PlaneNumbers)
+def _(surface):
+    return math.inf
 
 
 @base.settle.register(PlaneNumbers)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import Vector, positive, vector
+from .._jit import select
+from ..checks import Vector, length, vector
 from . import base
 
 
@@ -31,7 +32,7 @@ class Sphere(base.Surface):
     side: str = "inside"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive("radius", self.radius))
+        object.__setattr__(self, "radius", length("radius", self.radius))
         object.__setattr__(self, "center", vector("center", self.center))
         base.side_sign(self.side)
 
@@ -177,6 +178,11 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     u = (1.0 - kappa) * w
     q1 = u * u * q0 + 2.0 * u * w * rp + w * w * pp
     return q1, -2.0 * w * (u * q0 + w * rp + q1)
+
+
+@base.farthest_push.register(SphereNumbers)
+def _(surface):
+    return select(surface.side > 0.0, math.inf, -1.0)
 
 
 @base.settle.register(SphereNumbers)

@@ -1,11 +1,13 @@
 """The energy that walls store is the sum over the walls."""
 
+import numpy as np
 import pytest
-from conftest import call, directions, every_law, gap, numbers_of, scene_of
+from conftest import call, directions, every_law, exponent_of, gap, numbers_of, scene_of
 from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm.contact import regularisation
-from swarm.contact.energy import contact_energy
+from swarm.contact.energy import contact_energy, energy_doubt
 
 NAMES = ("sphere", "egg", "plane")
 
@@ -20,3 +22,14 @@ def test_energy_is_the_sum_over_walls(law, point):
 @given(point=directions)
 def test_rigid_walls_store_none(point):
     assert call(contact_energy, None, scene_of(*NAMES).chain(), 1.0, point) == 0.0
+
+
+@every_law
+@given(point=directions, shift=st.tuples(*[st.floats(-1e-7, 1e-7)] * 3).map(np.array))
+def test_doubt_bounds_the_change_of_the_energy(law, point, shift):
+    """Up to (a + 1)/2, for the shift of a point, at the centre of a sphere too."""
+    chain, size = scene_of(*NAMES).chain(), np.abs(shift) + 1e-12
+    for place in (point, np.array([0.2, -0.3, 0.1])):
+        change = call(contact_energy, law, chain, 2.0, place + shift) - call(contact_energy, law, chain, 2.0, place)
+        doubt = call(energy_doubt, chain, law, 2.0, place, size)
+        assert abs(change) <= 1.01 * 0.5 * (exponent_of(law) + 1.0) * doubt + 1e-9

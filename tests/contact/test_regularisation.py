@@ -3,7 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from conftest import EPSILON, LAWS, call, every_law
+from conftest import EPSILON, LAWS, call, every_law, exponent_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,20 +18,16 @@ gaps = st.one_of(st.floats(-1.0, 1.0), st.sampled_from([0.0, 1e-9, -1e-9, 1e-3, 
 nearness = st.sampled_from([0.0, 1e-15, -1e-12, 1e-9, -1e-6, 1e-3, -0.01, 0.031, -0.0312, 0.04, -0.2])
 
 
-def exponent(law):
-    return {laws.Linear: 1.0, laws.Hertz: 1.5}.get(type(law)) or law.a
-
-
 def energy(law, g):
     """V with 50 digits: alpha g^(a+1)/(a+1)."""
-    a = mp.mpf(exponent(law))
+    a = mp.mpf(exponent_of(law))
     return mp.mpf(law.alpha) * max(mp.mpf(float(g)), 0) ** (a + 1) / (a + 1)
 
 
 def divided(law, g0, g1):
     """V[g0, g1] with 50 digits; the force alpha g^a where both gaps are the same."""
     if g0 == g1:
-        return mp.mpf(law.alpha) * max(mp.mpf(float(g0)), 0) ** mp.mpf(exponent(law))
+        return mp.mpf(law.alpha) * max(mp.mpf(float(g0)), 0) ** mp.mpf(exponent_of(law))
     return (energy(law, g1) - energy(law, g0)) / (mp.mpf(float(g1)) - mp.mpf(float(g0)))
 
 
@@ -40,14 +36,14 @@ def test_each_exponent_gets_its_cheapest_law(a, kind):
     law = laws.regularisation(7.0, a)
     assert type(law) is kind
     assert law.alpha == 7.0
-    assert exponent(law) == a
+    assert exponent_of(law) == a
 
 
 @every_law
 @given(g=gaps)
 def test_stored_energy_is_the_papers(law, g):
     """V = alpha Phi^2/2 with Phi = sqrt(2/(a+1)) max(g, 0)^((a+1)/2), eq. (2)."""
-    a = exponent(law)
+    a = exponent_of(law)
     phi = np.sqrt(2.0 / (a + 1.0)) * max(g, 0.0) ** ((a + 1.0) / 2.0)
     assert call(laws.stored_energy, law, g) == pytest.approx(0.5 * law.alpha * phi * phi, rel=1e-14, abs=1e-300)
     if g > 0.0:
@@ -93,7 +89,7 @@ def test_derivative_next_to_equal_gaps(law, g, near):
     """Half the slope of the force there: d V[g0, g1]/d g1 = alpha a g^(a-1)/2."""
     if abs(near) > 1e-5:
         near = 1e-7
-    a = exponent(law)
+    a = exponent_of(law)
     curvature = call(laws.energy_slope, law, g, g * (1.0 + near))[1]
     assert curvature == pytest.approx(0.5 * law.alpha * a * g ** (a - 1.0), rel=1e-4)
 
@@ -104,7 +100,7 @@ def test_divided_difference_is_continuous(law, g0):
     """Across 0, across g0, and across the switch from one form to the other."""
     for g1 in (0.0, g0, g0 * (1.0 + 1.0 / 32.0), g0 * (1.0 - 1.0 / 32.0)):
         below, above = (call(laws.energy_slope, law, g0, g1 + step)[0] for step in (-1e-9, 1e-9))
-        assert below == pytest.approx(above, abs=4e-9 * law.alpha * exponent(law))
+        assert below == pytest.approx(above, abs=4e-9 * law.alpha * exponent_of(law))
 
 
 @given(g0=gaps, g1=gaps)

@@ -73,6 +73,16 @@ def test_round_off_does_not_add_up(exponent):
     assert errors[False] <= 1e-9
 
 
+def test_a_contact_that_does_not_balance_is_not_accepted():
+    """Energy that is missing by more than round-off is left to the careful solve, and then reported."""
+    scene, start, velocity = scene_of("sphere"), np.array([0.2, -0.3, 0.799]), np.array([0.0, 0.0, 1.0])
+    method = swarm.Penalty(dt=0.01, penalty=1e4)
+    right = energy_of(method, scene, start, velocity)
+    assert not one_pass(method, scene, start, velocity, 1.0, energy=right).hard
+    with pytest.raises(AssertionError, match="UNSOLVED"):
+        one_pass(method, scene, start, velocity, 1.0, energy=right * (1.0 + 1e-10))
+
+
 @every_surface
 @given(point=directions, velocity=directions, pull=st.none() | directions)
 def test_a_step_is_the_papers(name, point, velocity, pull):
@@ -178,3 +188,5 @@ def test_frames_fall_on_whole_steps():
     assert method.span("until", 0.3) == 300.0
     with pytest.raises(swarm.SceneError, match=r"every must be a whole number of steps.*every = 0\.0015.*dt = 0\.001"):
         method.span("every", 1.5e-3)
+    with pytest.raises(swarm.SceneError, match=r"until must be at most .* steps, got until = 1e\+300 s.*dt = 1e-300"):
+        swarm.Penalty(dt=1e-300, penalty=1.0).span("until", 1e300)

@@ -389,12 +389,19 @@ def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
 # --- Descriptions ----------------------------------------------------------------------------------------
 
 
+def test_a_normal_of_any_length_is_scaled_to_one():
+    for length in (1e-320, 1e-200, 1.0, 1.7e308):
+        assert swarm.Plane((length, 0.0, -length)).normal == pytest.approx((0.5**0.5, 0.0, -(0.5**0.5)), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("build", "parts"),
     [
         (lambda: swarm.Sphere(0.0), ["radius", "above 0", "got 0"]),
         (lambda: swarm.Sphere(-1.0), ["radius", "got -1"]),
         (lambda: swarm.Sphere(math.nan), ["radius", "finite", "nan"]),
+        (lambda: swarm.Sphere(1e-200), ["radius", "between 1e-100 and 1e+100 m", "got 1e-200"]),
+        (lambda: swarm.Ellipsoid((1e-170, 1.0, 1.0)), ["semi_axes[0]", "between 1e-100", "got 1e-170"]),
         (lambda: swarm.Sphere("big"), ["radius", "finite number", "'big'"]),
         (lambda: swarm.Sphere(1.0, center=(0.0, 0.0)), ["center", "three numbers", "got 2"]),
         (lambda: swarm.Sphere(1.0, center=(0.0, math.inf, 0.0)), ["center[1]", "finite", "inf"]),
@@ -405,6 +412,7 @@ def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
         (lambda: swarm.Plane((0.0, 0.0, 0.0)), ["normal", "zero vector"]),
         (lambda: swarm.Plane((0.0, 0.0, 1.0), offset=math.nan), ["offset", "finite", "nan"]),
         (lambda: swarm.Sphere(1.0).phi(np.zeros((2, 3))), ["points", "(3, N)", "(2, 3)"]),
+        (lambda: swarm.Sphere(1.0).phi("abc"), ["points", "array of numbers", "got str"]),
         (lambda: swarm.Plane((0, 0, 1)).gradient(np.zeros((5, 3))), ["points", "(3, N)", "(5, 3)"]),
     ],
 )
