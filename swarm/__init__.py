@@ -11,7 +11,8 @@ from .version import VERSION
 if TYPE_CHECKING:
     from .errors import FileError, RunError, SceneError, SwarmError
     from .filling import fill
-    from .methods import Impact, Penalty
+    from .history import ContactHistory, contact_history
+    from .methods import AugmentedLagrangian, Impact, Penalty
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .scene import Scene
@@ -23,7 +24,8 @@ __version__ = VERSION
 _HOMES = {
     "errors": ("FileError", "RunError", "SceneError", "SwarmError"),
     "filling": ("fill",),
-    "methods": ("Impact", "Penalty"),
+    "history": ("ContactHistory", "contact_history"),
+    "methods": ("AugmentedLagrangian", "Impact", "Penalty"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -33,6 +35,8 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AugmentedLagrangian",
+    "ContactHistory",
     "Ellipsoid",
     "FileError",
     "Frame",
@@ -48,6 +52,7 @@ __all__ = [
     "SwarmError",
     "Trajectory",
     "__version__",
+    "contact_history",
     "fill",
     "load",
     "simulate",

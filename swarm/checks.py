@@ -62,6 +62,13 @@ def count(name: str, value: Any, least: int = 1) -> int:
     return result
 
 
+def flag(name: str, value: Any) -> bool:
+    """`value` as true or false."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise SceneError(f"{name} must be true or false, got {value!r}")
+    return bool(value)
+
+
 def vector(name: str, value: Any) -> Vector:
     """`value` as three finite floats."""
     try:

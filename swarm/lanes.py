@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import Array, by_type, inlined, kernel, select
+from ._jit import Array, by_type, by_type_outlined, inlined, kernel, select
+from .contact.uzawa import BEFORE, GAIN, MEAN, MISS, MULTIPLIER, RECORDS, STORED, SWEEPS, UNCONVERGED
 from .gravity import Nothing
 from .methods import base as methods
+from .particles import Multipliers
 from .status import Status
 from .surfaces import chain as walls
 
@@ -33,6 +35,8 @@ class Lanes(NamedTuple):
     surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     unsolved: Array  # bool, whether its solve goes on
+    sweeping: Array  # bool, whether the loop of its multiplier goes on
+    record: Array  # (RECORDS, stride) the loop of its multiplier
     particle: Array  # int64, the particle in the lane
 
 
@@ -48,6 +52,8 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         np.empty(_STRIDE),
         np.zeros(_STRIDE),
         np.zeros(_STRIDE, np.bool_),
+        np.zeros(_STRIDE, np.bool_),
+        np.zeros((RECORDS, _STRIDE)),
         np.empty(_STRIDE, np.int64),
     )
     live = min(_LANES, stop - start)
@@ -63,8 +69,10 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         if hard > 0:
             finished, status, lane = _hard_passes(method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
+                _keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane]
             retired += finished
+        _count_sweeps(state.multipliers, lanes, live)
         lane = 0
         while retired > 0:
             if lanes.rows[_LEFT, lane] > 0.0:
@@ -149,26 +157,113 @@ def _fly(method, chain, gravity, lanes, live):
 
 @inlined
 def _solve(method, chain, gravity, lanes, live):
-    """The contact's unknown of every lane; sweeps end when the last lane is solved."""
+    """The contact's unknown of every lane, and its multiplier where the method has one."""
     rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
-    if methods.most_sweeps(method) > 0:
+    record, sweeping = lanes.record, lanes.sweeping
+    if methods.most_sweeps(method, chain) > 0:
         for i in range(live):
             kappa[i], unsolved[i] = methods.guess(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_K0, i], surface[i],
+                rows[_LEFT, i], rows[_K0, i], surface[i],
             )  # fmt: skip
-    for _sweep in range(methods.most_sweeps(method)):
-        remaining = 0
+    if methods.has_multiplier(method):
         for i in range(live):
-            kappa[i], unsolved[i] = methods.improve(
+            record[MULTIPLIER, i], kappa[i] = methods.first_multiplier(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_K0, i], surface[i], kappa[i], unsolved[i],
+                rows[_LEFT, i], rows[_K0, i], surface[i], kappa[i],
             )  # fmt: skip
+            sweeping[i] = unsolved[i]
+            record[BEFORE, i], record[MISS, i] = np.nan, np.nan
+            record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
+    _newton(method, chain, gravity, lanes, live)
+    if methods.has_multiplier(method):
+        for _sweep in range(methods.multiplier_sweeps(method)):
+            if _update_multipliers(method, lanes, live) == 0:
+                break
+            _newton(method, chain, gravity, lanes, live)
+        for i in range(live):
+            unsolved[i] = unsolved[i] | sweeping[i]
+
+
+@inlined
+def _update_multipliers(method, lanes, live):
+    """The end of a sweep of the loop (8): how many lanes need another."""
+    rows, record, kappa, unsolved, sweeping = lanes.rows, lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
+    remaining = 0
+    for i in range(live):
+        old = record[MULTIPLIER, i]
+        new, miss, more = methods.next_multiplier(
+            method, rows[_LEFT, i], old, record[MEAN, i], record[STORED, i], record[BEFORE, i], record[MISS, i]
+        )
+        going = sweeping[i]
+        record[BEFORE, i] = select(going, old, record[BEFORE, i])
+        record[MISS, i] = select(going, miss, record[MISS, i])
+        record[SWEEPS, i] += select(going, 1.0, 0.0)
+        # What the inner solve left unsolved is for the careful way, at once.
+        going = going & more & (not unsolved[i])
+        # The first Newton step for the new multiplier needs no evaluation.
+        kappa[i] += select(going, record[GAIN, i] * (new - old), 0.0)
+        record[MULTIPLIER, i] = select(going, new, old)
+        unsolved[i] = unsolved[i] | going
+        sweeping[i] = going
+        remaining += going
+    return remaining
+
+
+@inlined
+def _newton(method, chain, gravity, lanes, live):
+    """Sweeps of the inner solve, until the last lane is solved."""
+    rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
+    record = lanes.record
+    for _sweep in range(methods.most_sweeps(method, chain)):
+        remaining = 0
+        for i in range(live):
+            going = unsolved[i]
+            kappa[i], unsolved[i], mean, stored, gain = methods.improve(
+                method, chain, gravity,
+                rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+                rows[_LEFT, i], rows[_K0, i], surface[i], kappa[i], going, record[MULTIPLIER, i],
+            )  # fmt: skip
+            if methods.has_multiplier(method):
+                record[MEAN, i] = select(going, mean, record[MEAN, i])
+                record[STORED, i] = select(going, stored, record[STORED, i])
+                record[GAIN, i] = select(going, gain, record[GAIN, i])
             remaining += unsolved[i]
         if remaining == 0:
             break
+
+
+@by_type_outlined
+def _count_sweeps(multipliers, lanes, live):
+    """Add the records of the lanes that had a contact to their particles; nothing where there are no multipliers."""
+
+
+@_count_sweeps.register(Multipliers)
+def _(multipliers, lanes, live):
+    record = lanes.record
+    for i in range(live):
+        if record[SWEEPS, i] > 0.0:
+            particle = lanes.particle[i]
+            multipliers.sweeps[particle] += np.int64(record[SWEEPS, i])
+            multipliers.contacts[particle] += 1
+            multipliers.unconverged[particle] += np.int64(record[UNCONVERGED, i])
+            multipliers.stored_energy[particle] = max(multipliers.stored_energy[particle], record[STORED, i])
+            record[SWEEPS, i] = 0.0
+
+
+@by_type_outlined
+def _keep_failure(multipliers, lanes, lane):
+    """Keep the record of the lane that failed, for the error."""
+
+
+@_keep_failure.register(Multipliers)
+def _(multipliers, lanes, lane):
+    particle = lanes.particle[lane]
+    multipliers.sweeps[particle] = np.int64(lanes.record[SWEEPS, lane])
+    multipliers.stored_energy[particle] = lanes.record[STORED, lane]
+    multipliers.left[particle] = lanes.rows[_LEFT, lane]
 
 
 @inlined
@@ -222,7 +317,8 @@ def _hard_passes(method, chain, gravity, lanes, live):
             x, y, z, vx, vy, vz, left, hits, status = methods.hard_pass(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], methods.HARD - surface[i], lanes.impulse, i,
+                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], methods.HARD - surface[i],
+                lanes.impulse, lanes.record, i,
             )  # fmt: skip
             rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
             rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz

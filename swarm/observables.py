@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ._jit import by_type, inlined, kernel, select
 from .contact.energy import contact_energy
 from .gravity import Nothing, potential
+from .particles import State
 from .surfaces import base as surfaces
 from .surfaces import chain as walls
 
@@ -108,8 +109,10 @@ def observe_block(law, chain, gravity, state, start, stop, partial):
             partial[begin // CHUNK, row] = sums[row, 0]
 
 
-def summary(partial: Floats, impacts: NDArray[np.int64], impulse: Floats) -> dict[str, Any]:
+def summary(partial: Floats, state: State) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise."""
+    multipliers = state.multipliers
+    loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
     energy_error, depth = partial[:, _ENERGY_ERROR:].max(axis=0).tolist()
@@ -122,7 +125,8 @@ def summary(partial: Floats, impacts: NDArray[np.int64], impulse: Floats) -> dic
         "momentum": totals[_PX : _PZ + 1],
         "angular_momentum": totals[_LX : _LZ + 1],
         "max_penetration": depth,
-        "impacts": int(impacts.sum()),
-        "impulse": impulse.sum(axis=1),
-        "unconverged": 0,
+        "impacts": int(state.impacts.sum()),
+        "impulse": state.impulse.sum(axis=1),
+        **loops,
+        "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }

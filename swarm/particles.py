@@ -88,6 +88,24 @@ class Particles:
         )
 
 
+class Multipliers(NamedTuple):
+    """What a method with multipliers tells of each particle's Uzawa loops, since the start.
+
+    Attributes:
+        sweeps: (N,) sweeps of all its contact steps together.
+        contacts: (N,) contact steps.
+        unconverged: (N,) contact steps whose loop did not reach the tolerance.
+        stored_energy: (N,) the largest V that a loop left [J].
+        left: (N,) what was left of the frame, in the method's unit, where a loop failed.
+    """
+
+    sweeps: NDArray[np.int64]
+    contacts: NDArray[np.int64]
+    unconverged: NDArray[np.int64]
+    stored_energy: Floats
+    left: Floats
+
+
 class State(NamedTuple):
     """The arrays that kernels advance.
 
@@ -101,6 +119,7 @@ class State(NamedTuple):
     inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
     impacts: NDArray[np.int64]  # (N,) since the start
     impulse: Floats  # (surfaces, N) normal impulse since the start [N s]
+    multipliers: Multipliers | None
 
 
 def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from . import checks, lanes, observables
 from .errors import RunError, SceneError
 from .methods.base import Method
-from .particles import Particles, State
+from .particles import Multipliers, Particles, State
 from .scene import Scene
 from .status import Status
 
@@ -52,12 +52,14 @@ class Result:
             (frames, surfaces).
         wall_time: seconds the run took, compilation included.
         trajectory: the file that was written, or None.
+        multipliers: for a method with multipliers, what their loops took of each particle; else None.
     """
 
     particles: Particles
     observables: dict[str, NDArray[Any]]
     wall_time: float
     trajectory: Path | None
+    multipliers: Multipliers | None
 
 
 def simulate(
@@ -144,6 +146,7 @@ def simulate(
         columns,
         time.perf_counter() - started,
         None if trajectory is None else Path(trajectory),
+        run.state.multipliers,
     )
 
 
@@ -223,6 +226,11 @@ def _output(
     return TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text)
 
 
+def _no_sweeps(n: int) -> Multipliers:
+    counts = np.zeros((3, n), np.int64)
+    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))
+
+
 class Run:
     """The state of a run and the threads that advance it."""
 
@@ -238,7 +246,9 @@ class Run:
             np.empty(n),
             np.zeros(n, np.int64),
             np.zeros((len(scene.surfaces), n)),
+            _no_sweeps(n) if method.has_multipliers() else None,
         )
+        self._failure = method.failure
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
@@ -275,7 +285,12 @@ class Run:
         status, particle = max(self._for_blocks(block))
         self._frame_seconds = time.perf_counter() - began
         if status != Status.DONE:
-            raise RunError(f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}")
+            told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
+            multipliers = self.state.multipliers
+            if status == Status.UNCONVERGED and multipliers is not None:
+                left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
+                told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
+            raise RunError(told)
 
     def observe(self) -> dict[str, Any]:
         """The observables now."""
@@ -284,7 +299,7 @@ class Run:
             observables.observe_block(self._law, self._chain, self._gravity, self.state, start, stop, self._partial)
 
         self._for_blocks(block)
-        return observables.summary(self._partial, self.state.impacts, self.state.impulse)
+        return observables.summary(self._partial, self.state)
 
     def require_finite(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite."""

@@ -11,6 +11,7 @@ class Status(IntEnum):
     UNSOLVED = 2
     NOT_FINITE = 3
     STALLED = 4
+    UNCONVERGED = 5
 
     @property
     def sentence(self) -> str:
@@ -24,5 +25,6 @@ _SENTENCES = {
     Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
     Status.STALLED: "the particle met its walls 100 million times within one frame, as in a cusp or in a gap that is "
     "thin beyond measure; start it elsewhere, or observe more often",
+    Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
 }

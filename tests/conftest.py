@@ -6,8 +6,10 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 
 import swarm
+from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
 from swarm.surfaces import base
+from swarm.surfaces.chain import Chain
 
 settings.register_profile(
     "swarm",
@@ -33,6 +35,7 @@ METHODS = {
     "impact": swarm.Impact(),
     "impact, chord": swarm.Impact(contact_step=1e-3),
     "penalty": swarm.Penalty(dt=1e-3, penalty=1e4),
+    "augmented Lagrangian": swarm.AugmentedLagrangian(dt=1e-3, penalty=1e6, tolerance=1e-28, adaptive=True),
 }
 LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 4.0, 12.0)}
 
@@ -48,6 +51,11 @@ scales = st.sampled_from([1e-6, 1e-3, 1.0, 1e3, 1e6])
 def numbers_of(name, scale=1.0):
     """The tuple of numbers of a surface of the table."""
     return SURFACES[name](scale).numbers()
+
+
+def chord_of(surface, point, free):
+    """kappa of the step from a point on the surface that ends on it."""
+    return call(reflection.chord, Chain(surface, None), 0.0, point, free)
 
 
 def exponent_of(law):

@@ -37,12 +37,12 @@ def every_function_of_a_surface(surface, x, y, z, vx, vy, vz, gx, gy, gz, kappa)
         base.first_hit(surface, x, y, z, 0.0 * vx, 0.0 * vy, 0.0 * vz),
         base.safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz),
         base.unit_normal(surface, x, y, z),
-        base.chord_normal(surface, x, y, z, 0.1 * vx, 0.1 * vy, 0.1 * vz),
+        base.chord_normal(surface, x, y, z, 0.1 * vx, 0.1 * vy, 0.1 * vz, kappa),
         (q0, q1, base.gap_of(surface, q0), base.level_of(surface, q1)),
         base.gap_slope(surface, q0, q1),
         base.inner_gradient(surface, x, y, z, vx, vy, vz),
         base.push(surface, x, y, z, vx, vy, vz, kappa),
-        base.pushed(surface, x, y, z, vx, vy, vz, kappa),
+        base.rise(surface, x, y, z, vx, vy, vz, kappa),
         base.settle(surface, x, y, z),
     )
 
@@ -232,7 +232,7 @@ LAYERS = [
     ["simulation"],
     ["output", "progress"],
     ["tables", "filling"],
-    ["observables", "lanes"],
+    ["observables", "lanes", "history"],
     ["methods"],
     ["scene", "particles"],
     ["contact"],

@@ -24,6 +24,7 @@ def state_of(n, surfaces, seed=1, reach=1.0):
         np.zeros(n),
         random.integers(0, 5, n),
         random.uniform(size=(surfaces, n)),
+        None,
     )
 
 
@@ -35,7 +36,7 @@ def observe(law, scene, state, blocks=1):
     for start in edges:
         stop = n if blocks == 1 else min(start + observables.CHUNK, n)
         observables.observe_block(law, scene.chain(), scene.pull(), state, start, stop, partial)
-    return observables.summary(partial, state.impacts, state.impulse)
+    return observables.summary(partial, state)
 
 
 @pytest.fixture(scope="module")

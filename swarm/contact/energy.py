@@ -1,10 +1,13 @@
 """The energy that the walls store, summed over all surfaces of a scene, and how well it is known."""
 
-from .._jit import by_type, select
-from ..gravity import Nothing
+from .._jit import by_type, inlined, select
+from ..gravity import Nothing, potential, weight
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import regularisation as law_of
+
+# Units of round-off by which a contact that is solved may miss its energy.
+_ROUND_OFF = 64.0 * 2.220446049250313e-16
 
 
 @by_type
@@ -64,3 +67,24 @@ def _(chain, law, mass, x, y, z, sx, sy, sz):
 @energy_doubt.register(Nothing)
 def _(chain, law, mass, x, y, z, sx, sy, sz):
     return 0.0
+
+
+@inlined
+def restored(law, chain, gravity, mass, energy, h, x0, y0, z0, x, y, z, vx, vy, vz, force):
+    """Factor of v after a contact step that gives the particle its first energy back, and whether it is that near to 1.
+
+    Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
+    energy, and over many contacts the errors add up (measured: 2e-10 after 10 000 steps at dt sqrt(alpha/m) = 100). A
+    larger difference than round-off is not touched: it is an equation that was not solved, or a tolerance.
+    `force` is what multipliers add to the springs, per mass.
+    """
+    speed2 = vx * vx + vy * vy + vz * vz
+    stored = contact_energy(law, chain, mass, x, y, z)
+    missing = 2.0 * (energy - potential(gravity, x, y, z) - stored) - speed2
+    # Where the coordinates of the step have their last bits.
+    sx, sy, sz = abs(x0) + abs(x) + h * abs(vx), abs(y0) + abs(y) + h * abs(vy), abs(z0) + abs(z) + h * abs(vz)
+    doubt = energy_doubt(chain, law, mass, x0, y0, z0, sx, sy, sz)
+    doubt += energy_doubt(chain, law, mass, x, y, z, sx, sy, sz)
+    doubt += speed2 + abs(energy) + weight(gravity, sx, sy, sz) + force * (sx + sy + sz)
+    balanced = abs(missing) <= _ROUND_OFF * doubt
+    return 1.0 + select(balanced & (speed2 > 0.0), 0.5 * missing / speed2, 0.0), balanced

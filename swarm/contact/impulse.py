@@ -1,10 +1,11 @@
-"""The impulse of one surface in one step of the penalty method: a scalar root.
+"""The impulse of one surface in one step with the composite discrete gradient: a scalar root.
 
-With h the step, m the mass, D(r0, r1) the discrete gradient of the inner function q and
-    kappa = h^2/(2m) V[g0, g1] g[q0, q1]                                                     (K)
+With h the step, m the mass, D(r0, r1) the discrete gradient of the inner function q, lambda the multiplier and
+    kappa = h^2/(2m) (V[g0, g1] + lambda Phi[g0, g1]) g[q0, q1]                              (K)
 the step is  r1 = r0 + p - kappa D,  v1 = v0 + h G - (2 kappa/h) D,  p = h v0 + h^2 G/2.
-The surface knows r1(kappa) in closed form (`push`), so (K) is one equation in one unknown. Its right side is a
-convex, decreasing function of kappa, so Newton's method from the left climbs to the smallest root.
+The surface knows r1(kappa) in closed form (`push`), so (K) is one equation in one unknown. Without a multiplier its
+right side is a convex, decreasing function of kappa, so Newton's method from the left climbs to the smallest root.
+A multiplier is a float, or None where the method has none.
 """
 
 import math
@@ -15,26 +16,53 @@ from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
 from . import regularisation as law_of
 
-# A Newton step that moves the gap by this part of itself is the last: its square is below round-off.
+# A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
+# a multiplier its square need only be small, as the loop repairs the rest.
 _NEWTON_TOLERANCE = 1e-8
+_LOOP_TOLERANCE = 1e-2
 # Steps of the vectorised solve; what needs more goes the careful way.
 NEWTON_STEPS = 8
 _CAREFUL_ITERATIONS = 200
 # Doublings of a bracket: from the smallest number to the largest.
 _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
+# A point whose coordinates would be on the surface within this part of themselves is on it.
+_ON_SURFACE = 8.0 * _EPSILON
 
 
 @inlined
-def _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, kappa):
-    """F(kappa) = kappa - c V[g0, g1] g[q0, q1], c = h^2/(2m); its derivative; g1 and its derivative."""
-    q1, dq1 = surfaces.pushed(surface, x, y, z, px, py, pz, kappa)
-    slope, dslope = surfaces.gap_slope(surface, q0, q1)
-    g1 = surfaces.gap_of(surface, q1)
-    force, dforce = law_of.energy_slope(law, g0, g1)
-    # from g1 - g0 = g[q0, q1] (q1 - q0)
-    dg1 = dq1 * (slope + dslope * (q1 - q0))
-    return kappa - c * force * slope, 1.0 - c * (dforce * dg1 * slope + force * dslope * dq1), g1, dg1
+def _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, kappa):
+    """F(kappa), the left side of (K) less its right side, and its derivative; g1 and its derivative; g[q0, q1].
+
+    c = h^2/(2m).
+    """
+    rise, drise = surfaces.rise(surface, x, y, z, px, py, pz, kappa)
+    slope, dslope = surfaces.gap_slope(surface, q0, q0 + rise)
+    # g1 - g0 = g[q0, q1] (q1 - q0)
+    g1 = g0 + slope * rise
+    g1 = select(abs(g1) <= round_off, 0.0, g1)
+    force, dforce = law_of.force(multiplier, law, g0, g1)
+    dg1 = drise * (slope + dslope * rise)
+    return kappa - c * force * slope, 1.0 - c * (dforce * dg1 * slope + force * dslope * drise), g1, dg1, slope
+
+
+@by_type
+def start_gap(multiplier, surface, x, y, z, q0):
+    """g0, the gap that counts as 0 (only multipliers tell 0 from round-off), and the tolerance of Newton's steps."""
+    raise NotImplementedError
+
+
+@start_gap.register(Nothing)
+def _(multiplier, surface, x, y, z, q0):
+    return surfaces.gap_of(surface, q0), 0.0, _NEWTON_TOLERANCE
+
+
+@start_gap.register(float)
+def _(multiplier, surface, x, y, z, q0):
+    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
+    g0 = surfaces.gap_of(surface, q0)
+    round_off = _ON_SURFACE * surfaces.gap_scale(surface, x, y, z)
+    return select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE
 
 
 @by_type
@@ -48,14 +76,14 @@ def _(chain, index, law, x, y, z, px, py, pz, c):
     surface = chain.first
     q0 = surfaces.inner(surface, x, y, z)
     g0 = surfaces.gap_of(surface, q0)
-    qf, dqf = surfaces.pushed(surface, x, y, z, px, py, pz, 0.0)
-    gf = surfaces.gap_of(surface, qf)
+    rise, drise = surfaces.rise(surface, x, y, z, px, py, pz, 0.0)
+    slope, _dslope = surfaces.gap_slope(surface, q0, q0 + rise)
+    gf = g0 + slope * rise
     # There g1 = gf - e kappa, and with C = c alpha/2 g[q0, q1] e equation (K) is one of
     #   entering (g0 <= 0):  (1 + C) g1^2 - (gf + g0) g1 + gf g0 = 0
     #   staying:             g1 = (gf - C g0)/(1 + C)
     #   leaving (g1 < 0):    g1^2 - (gf + g0) g1 + gf g0 - C g0^2 = 0
-    slope, _dslope = surfaces.gap_slope(surface, q0, qf)
-    e = -slope * dqf
+    e = -slope * drise
     stiff = 0.5 * c * slope * e * law_of.stiffness(law, select(g0 > gf, g0, gf))
     entering = g0 <= 0.0
     one = 1.0 + stiff
@@ -76,8 +104,8 @@ def _(chain, index, law, x, y, z, px, py, pz, c):
 
 
 @by_type
-def improve(chain, index, law, x, y, z, px, py, pz, c, kappa):
-    """The Newton step of kappa for surface `index`, and whether it was so large that another is needed.
+def improve(chain, index, law, multiplier, x, y, z, px, py, pz, c, kappa):
+    """The Newton step of kappa for surface `index`, whether it was so large that another is needed, and `_told`.
 
     What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1 is
     a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
@@ -86,31 +114,70 @@ def improve(chain, index, law, x, y, z, px, py, pz, c, kappa):
 
 
 @improve.register(Chain)
-def _(chain, index, law, x, y, z, px, py, pz, c, kappa):
+def _(chain, index, law, multiplier, x, y, z, px, py, pz, c, kappa):
     surface = chain.first
     q0 = surfaces.inner(surface, x, y, z)
-    g0 = surfaces.gap_of(surface, q0)
-    f, df, g1, dg1 = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, kappa)
+    g0, round_off, tolerance = start_gap(multiplier, surface, x, y, z, q0)
+    f, df, g1, dg1, slope = _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, kappa)
     step = f / df
     depth = select(g0 > abs(g1), g0, abs(g1))
     # True for NaN.
-    more = not (abs(step * dg1) <= _NEWTON_TOLERANCE * depth)
-    other, other_more = improve(chain.rest, index - 1.0, law, x, y, z, px, py, pz, c, kappa)
+    more = not (abs(step * dg1) <= tolerance * depth + 2.0 * round_off)
+    mean, stored, gain = _told(multiplier, law, g0, g1, g1 - step * dg1, c * slope / df)
+    other, other_more, other_mean, other_stored, other_gain = improve(
+        chain.rest, index - 1.0, law, multiplier, x, y, z, px, py, pz, c, kappa
+    )
     here = index == 0.0
-    return select(here, step, other), (here & more) | ((not here) & other_more)
+    return (
+        select(here, step, other),
+        (here & more) | ((not here) & other_more),
+        select(here, mean, other_mean),
+        select(here, stored, other_stored),
+        select(here, gain, other_gain),
+    )
 
 
 @improve.register(Nothing)
-def _(chain, index, law, x, y, z, px, py, pz, c, kappa):
-    return 0.0, False
+def _(chain, index, law, multiplier, x, y, z, px, py, pz, c, kappa):
+    return 0.0, False, 0.0, 0.0, 0.0
+
+
+@by_type
+def _told(multiplier, law, g0, g1, g, factor):
+    """What the loop of a multiplier asks of the step that ends at gap g: (Phi0 + Phi1)/2, V1, and dkappa/dlambda.
+
+    It is dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
+    """
+    raise NotImplementedError
+
+
+@_told.register(Nothing)
+def _(multiplier, law, g0, g1, g, factor):
+    return 0.0, 0.0, 0.0
+
+
+@_told.register(float)
+def _(multiplier, law, g0, g1, g, factor):
+    slope, _curvature = law_of.constraint_slope(law, g0, g1)
+    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
+    return mean, law_of.stored_energy(law, g), factor * slope
+
+
+@inlined
+def end_gap(surface, x, y, z, px, py, pz, q0, g0, round_off, kappa):
+    """g1 of the step that is pushed with kappa, from g1 - g0: more digits of a small g1 than r1 has."""
+    rise, _drise = surfaces.rise(surface, x, y, z, px, py, pz, kappa)
+    slope, _dslope = surfaces.gap_slope(surface, q0, q0 + rise)
+    g1 = g0 + slope * rise
+    return select(abs(g1) <= round_off, 0.0, g1)
 
 
 @outlined
-def careful(law, surface, x, y, z, px, py, pz, c):
+def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
     """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
     q0 = surfaces.inner(surface, x, y, z)
-    g0 = surfaces.gap_of(surface, q0)
-    f, _df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, 0.0)
+    g0, round_off, _tolerance = start_gap(multiplier, surface, x, y, z, q0)
+    f, _df, _g, _dg, _slope = _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, 0.0)
     if f == 0.0:
         return 0.0, True
     # A cavity pushes with kappa > 0, a solid with kappa < 0 short of the pole of `push`: `sign` mirrors it.
@@ -121,14 +188,18 @@ def careful(law, surface, x, y, z, px, py, pz, c):
     low, high = 0.0, min(abs(f), 0.5 * farthest)
     bracketed = False
     for _i in range(_DOUBLINGS):
-        f, _df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, sign * high)
+        f, _df, _g, _dg, _slope = _residual(
+            law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign * high
+        )
         if sign * f >= 0.0:
             bracketed = True
             break
         low, high = high, min(2.0 * high, 0.5 * (high + farthest))
     k, previous = low, math.inf
     for _i in range(_CAREFUL_ITERATIONS):
-        f, df, _g, _dg = _residual(law, surface, x, y, z, px, py, pz, c, q0, g0, sign * k)
+        f, df, _g, _dg, _slope = _residual(
+            law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign * k
+        )
         f = sign * f
         if f == 0.0:
             return sign * k, bracketed

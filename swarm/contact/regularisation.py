@@ -1,11 +1,11 @@
-"""The penalty's stored energy V(g) = alpha Phi(g)^2/2 and its divided difference.
+"""The regularised constraint Phi(g), the stored energy V = alpha Phi^2/2, and their divided differences.
 
 Phi(g) = sqrt(2/(a+1)) max(g, 0)^((a+1)/2)                      [García Orden & Ortega 2007, eq. (2)]
 so V(g) = alpha g^(a+1)/(a+1) for g > 0: a linear spring for a = 1, Hertz's law for a = 1.5.
 
-The contact force of a step is the divided difference V[g0, g1] = (V1 - V0)/(g1 - g0), whatever the two gaps
-are; the energy balance needs nothing else. Where both gaps are positive and close, the quotient would cancel,
-so each law has a form that does not.
+The penalty force of a step is the divided difference V[g0, g1] = (V1 - V0)/(g1 - g0), whatever the two gaps
+are; the energy balance needs nothing else. A multiplier lambda adds lambda Phi[g0, g1]. Where both gaps are positive
+and close, the quotients would cancel, so each law has forms that do not.
 """
 
 import math
@@ -43,6 +43,27 @@ def regularisation(penalty: float, exponent: float) -> Any:
 
 
 @by_type
+def stiffened(law, factor):
+    """The same law with `factor` times the penalty."""
+    raise NotImplementedError
+
+
+@stiffened.register(Linear)
+def _(law, factor):
+    return Linear(factor * law.alpha)
+
+
+@stiffened.register(Hertz)
+def _(law, factor):
+    return Hertz(factor * law.alpha)
+
+
+@stiffened.register(Power)
+def _(law, factor):
+    return Power(factor * law.alpha, law.a)
+
+
+@by_type
 def stored_energy(law, g):
     """V(g)"""
     raise NotImplementedError
@@ -58,6 +79,42 @@ def stiffness(law, g):
 def energy_slope(law, g0, g1):
     """V[g0, g1] and its derivative by g1."""
     raise NotImplementedError
+
+
+@by_type
+def constraint(law, g):
+    """Phi(g)"""
+    raise NotImplementedError
+
+
+@by_type
+def constraint_gradient(law, g):
+    """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+    raise NotImplementedError
+
+
+@by_type
+def constraint_slope(law, g0, g1):
+    """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+    raise NotImplementedError
+
+
+@by_type
+def force(multiplier, law, g0, g1):
+    """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
+    raise NotImplementedError
+
+
+@force.register(type(None))
+def _(multiplier, law, g0, g1):
+    return energy_slope(law, g0, g1)
+
+
+@force.register(float)
+def _(multiplier, law, g0, g1):
+    spring, dspring = energy_slope(law, g0, g1)
+    slope, dslope = constraint_slope(law, g0, g1)
+    return spring + multiplier * slope, dspring + multiplier * dslope
 
 
 @inlined
@@ -92,9 +149,26 @@ def _(law, g0, g1):
     p0, p1 = _positive(g0), _positive(g1)
     half = 0.5 * law.alpha
     slope, curvature = _quotient(half * p0 * p0, half * p1 * p1, law.alpha * p1, g1 - g0)
-    both = (g0 > 0.0) & (g1 > 0.0)
+    both = (g0 >= 0.0) & (g1 >= 0.0)
     # (g1^2 - g0^2)/(g1 - g0) = g0 + g1
     return select(both, half * (g0 + g1), slope), select(both, half, curvature)
+
+
+@constraint.register(Linear)
+def _(law, g):
+    return _positive(g)
+
+
+@constraint_gradient.register(Linear)
+def _(law, g):
+    return select(g >= 0.0, 1.0, 0.0)
+
+
+@constraint_slope.register(Linear)
+def _(law, g0, g1):
+    slope, curvature = _quotient(_positive(g0), _positive(g1), select(g1 >= 0.0, 1.0, 0.0), g1 - g0)
+    both = (g0 >= 0.0) & (g1 >= 0.0)
+    return select(both, 1.0, slope), select(both, 0.0, curvature)
 
 
 # --- a = 1.5 ---------------------------------------------------------------------------------------------
@@ -128,6 +202,38 @@ def _(law, g0, g1):
     return select(both, s, slope), select(both, ds, curvature)
 
 
+_HERTZ = math.sqrt(0.8)
+
+
+@constraint.register(Hertz)
+def _(law, g):
+    p = _positive(g)
+    return _HERTZ * p * math.sqrt(math.sqrt(p))
+
+
+@constraint_gradient.register(Hertz)
+def _(law, g):
+    return 1.25 * _HERTZ * math.sqrt(math.sqrt(_positive(g)))
+
+
+@constraint_slope.register(Hertz)
+def _(law, g0, g1):
+    p0, p1 = _positive(g0), _positive(g1)
+    u0, u1 = math.sqrt(p0), math.sqrt(p1)
+    w0, w1 = math.sqrt(u0), math.sqrt(u1)
+    slope, curvature = _quotient(p0 * w0, p1 * w1, 1.25 * w1, g1 - g0)
+    both = (g0 > 0.0) & (g1 > 0.0)
+    # with w = g^(1/4): (w1^5 - w0^5)/(w1^4 - w0^4) = (w1^4 + w1^3 w0 + ... + w0^4)/((w1 + w0)(w1^2 + w0^2))
+    total = select(both, (w0 + w1) * (u0 + u1), 1.0)
+    n = p1 + w1 * w0 * (u1 + w1 * w0 + u0) + p0
+    # their derivatives by w1, and dw/dg = 1/(4 w^3)
+    dn = 4.0 * w1 * u1 + 3.0 * u1 * w0 + 2.0 * w1 * u0 + u0 * w0
+    dtotal = u0 + u1 + 2.0 * w1 * (w0 + w1)
+    s = n / total
+    ds = (dn - s * dtotal) / total * (0.25 / select(both, w1 * u1, 1.0))
+    return _HERTZ * select(both, s, slope), _HERTZ * select(both, ds, curvature)
+
+
 # --- any a -----------------------------------------------------------------------------------------------
 
 # Nodes and weights of the three-point Gauss rule on [0, 1].
@@ -150,15 +256,43 @@ def _(law, g):
 
 @energy_slope.register(Power)
 def _(law, g0, g1):
+    slope, curvature = _power_slope(law.a + 1.0, g0, g1)
+    k = law.alpha / (law.a + 1.0)
+    return k * slope, k * curvature
+
+
+@constraint.register(Power)
+def _(law, g):
+    return math.sqrt(2.0 / (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a + 1.0))
+
+
+@constraint_gradient.register(Power)
+def _(law, g):
+    return select(g >= 0.0, math.sqrt(0.5 * (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a - 1.0)), 0.0)
+
+
+@constraint_slope.register(Power)
+def _(law, g0, g1):
+    slope, curvature = _power_slope(0.5 * (law.a + 1.0), g0, g1)
+    k = math.sqrt(2.0 / (law.a + 1.0))
+    return k * slope, k * curvature
+
+
+@inlined
+def _power_slope(b, g0, g1):
+    """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
     d = g1 - g0
-    if g0 > 0.0 and g1 > 0.0 and abs(d) * (law.a + 1.0) < _CLOSE * g0:
-        # V[g0, g1] is the mean of the force alpha g^a between the two gaps.
+    p0, p1 = _positive(g0), _positive(g1)
+    if g0 > 0.0 and g1 > 0.0 and abs(d) * b < _CLOSE * g0:
+        # It is the mean of the derivative b g^(b-1) between the two gaps.
         slope, curvature = 0.0, 0.0
         for i in range(3):
             g = g0 + _THETA[i] * d
-            force = _WEIGHT[i] * law.alpha * g**law.a
-            slope += force
-            curvature += _THETA[i] * law.a * force / g
+            part = _WEIGHT[i] * b * g ** (b - 1.0)
+            slope += part
+            curvature += _THETA[i] * (b - 1.0) * part / g
         return slope, curvature
-    p1 = _positive(g1)
-    return _quotient(stored_energy(law, g0), stored_energy(law, g1), law.alpha * p1**law.a, d)
+    slope, curvature = _quotient(p0**b, p1**b, b * p1 ** (b - 1.0), d)
+    # b = 1 has a corner at 0, where Phi' from the outside is 1.
+    corner = (d == 0.0) & (g0 == 0.0) & (b == 1.0)
+    return select(corner, 1.0, slope), select(corner, 0.0, curvature)

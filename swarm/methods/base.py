@@ -6,10 +6,12 @@ Zen 3: 7.8 instead of 10.3 ns an impact in an ellipsoid, 3.2 instead of 5.8 for 
 needs loops and branches is left to `hard_pass`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from .._jit import by_type, by_type_outlined
+from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
 
@@ -32,9 +34,27 @@ class Method:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
         return duration
 
+    def has_multipliers(self) -> bool:
+        """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
+        return False
+
+    def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
+        """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
+        raise NotImplementedError
+
     def law(self) -> Any:
         """The regularisation whose stored energy counts as contact energy, or None for rigid walls."""
         return None
+
+
+def check_crossing(name: str, step: float | None, scene: Scene, particles: Particles) -> None:
+    """Raise a `SceneError` if the fastest particle crosses the scene in less than a contact step of this length."""
+    fastest = particles.fastest()
+    crossing = scene.size() / fastest if fastest > 0.0 else math.inf
+    if step is not None and step > crossing:
+        raise SceneError(
+            f"{name} must be at most the crossing time size/|v| of the fastest particle, {crossing:.3g} s, got {step:g}"
+        )
 
 
 @by_type
@@ -54,21 +74,48 @@ def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
 
 
 @by_type
-def most_sweeps(method):
+def most_sweeps(method, chain):
     """The most sweeps of `improve` a contact may take: a constant for the compiler, 0 where it has a closed form."""
     return 0
 
 
 @by_type
-def guess(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface):
+def guess(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
     """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
     return 0.0, False
 
 
 @by_type
-def improve(method, chain, gravity, x, y, z, vx, vy, vz, k0, surface, kappa, unsolved):
-    """One sweep of the solve: (kappa, unsolved). A lane that is solved stays as it is, bit by bit."""
-    return kappa, False
+def improve(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
+    """One sweep of the solve: (kappa, unsolved, (Phi0 + Phi1)/2, V, dkappa/dlambda).
+
+    A lane that is solved stays as it is, bit by bit. The last three are for the loop of a multiplier.
+    """
+    return kappa, False, 0.0, 0.0, 0.0
+
+
+@by_type
+def has_multiplier(method):
+    """Whether contacts run the loop (8) of a multiplier: a constant for the compiler."""
+    return False
+
+
+@by_type
+def multiplier_sweeps(method):
+    """The most sweeps of that loop."""
+    return 0
+
+
+@by_type
+def first_multiplier(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
+    """The multiplier that the loop (8) starts from, and kappa for it."""
+    return 0.0, kappa
+
+
+@by_type
+def next_multiplier(method, left, multiplier, mean, stored, multiplier_before, miss_before):
+    """The multiplier after a sweep, what the sweep missed by, and whether to go on."""
+    return 0.0, 0.0, False
 
 
 @by_type
@@ -76,12 +123,16 @@ def contact(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surfa
     """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits).
 
     `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts. A `surface` that is HARD
-    already passes through and nothing else changes; to become hard, return `HARD - surface`.
+    already passes through and nothing else changes; to become hard, return `HARD - surface`. `unsolved` says that the
+    unknown was not found, or that the multiplier did not converge.
     """
     raise NotImplementedError
 
 
 @by_type_outlined
-def hard_pass(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, lane):
-    """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, status); adds to `impulse[surface, lane]`."""
+def hard_pass(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
+    """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, status).
+
+    Adds to `impulse[surface, lane]`, and writes the sweeps of a multiplier loop into `record[:, lane]`.
+    """
     raise NotImplementedError

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
-from .._jit import by_type, inlined, select
+from .._jit import by_type, select
+from ..contact.reflection import chord, chord_step, reflect
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
@@ -61,14 +62,8 @@ class Impact(base.Method):
                 f"Impact does not know gravity yet, got gravity={tuple(scene.gravity)}; "
                 "use Penalty(dt, penalty) or gravity=None"
             )
-        fastest = particles.fastest()
-        crossing = scene.size() / fastest if fastest > 0.0 else math.inf
-        for name, value in (("contact_step", self.contact_step), ("shortest_flight", self.shortest_flight)):
-            if value is not None and value > crossing:
-                raise SceneError(
-                    f"{name} must be at most the crossing time size/|v| = {crossing:.3g} s of the fastest particle, "
-                    f"got {value:g}"
-                )
+        base.check_crossing("contact_step", self.contact_step, scene, particles)
+        base.check_crossing("shortest_flight", self.shortest_flight, scene, particles)
 
     def numbers(self, scene: Scene) -> "ImpactNumbers":
         length = _SHORTEST * scene.finite_size() if self.shortest_flight is None else 0.0
@@ -96,47 +91,33 @@ def _(method, mass, energy, vx, vy, vz):
     return speed2, select(moving, 0.5 / safe, 0.0), select(moving, shortest, 0.0)
 
 
-@inlined
-def _reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse):
-    """v - 2 (v.n) n where v.n > 0, and the impulse per mass 2 v.n.
-
-    Reflections alone lose energy linearly in their number, because the rounding of n has a bias (3.4e-13 after
-    1e5 impacts). The factor, one Newton step of the square root of speed2/|v1|^2, keeps |v1|^2 at its first value.
-    """
-    b = vx * nx + vy * ny + vz * nz
-    impulse = 2.0 * select(b > 0.0, b, 0.0)
-    wx, wy, wz = vx - impulse * nx, vy - impulse * ny, vz - impulse * nz
-    f = 1.0 + (speed2 - (wx * wx + wy * wy + wz * wz)) * half_inverse
-    return wx * f, wy * f, wz * f, impulse
-
-
 @by_type
-def _contact(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
+def _contact(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
     """The contact step from r on `surface`: (x, y, z, vx, vy, vz, time used, impulse)."""
     raise NotImplementedError
 
 
 @_contact.register(type(None))
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
     nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, impulse = _reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
     return x, y, z, wx, wy, wz, 0.0, impulse
 
 
 @_contact.register(float)
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
     h = select(contact_step < left, contact_step, left)
-    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz)
-    cx, cy, cz, chord_impulse = _reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
+    cx, cy, cz, chord_impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
     # (v0 + v1)/2 = (r1 - r0)/h
     ux, uy, uz = 0.5 * (vx + cx), 0.5 * (vy + cy), 0.5 * (vz + cz)
-    # A chord that another wall would cut, or that a solid does not oppose (the free flight of length h ends
-    # outside it again), gives way to the exact reflection.
+    # A chord that another wall would cut, that a solid does not oppose (the free flight of length h ends outside it
+    # again), or that was not found, gives way to the exact reflection.
     cut, _other = walls.other_hit(chain, surface, x, y, z, ux, uy, uz)
-    chord = (chord_impulse > 0.0) & (cut > h)
+    chord = (chord_impulse > 0.0) & (cut > h) & (not unsolved)
     ox, oy, oz = walls.settle(chain, surface, x + h * ux, y + h * uy, z + h * uz)
     nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, impulse = _reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
     return (
         select(chord, ox, x),
         select(chord, oy, y),
@@ -159,10 +140,59 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
     return x + t * vx, y + t * vy, z + t * vz, vx, vy, vz, left - t, surface
 
 
+@base.most_sweeps.register(ImpactNumbers)
+def _(method, chain):
+    return _sweeps(method.contact_step, chain)
+
+
+@by_type
+def _sweeps(contact_step, chain):
+    return 0
+
+
+@_sweeps.register(float)
+def _(contact_step, chain):
+    return walls.chord_sweeps(chain)
+
+
+@base.guess.register(ImpactNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
+    return _guess(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left)
+
+
+@by_type
+def _guess(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
+    return 0.0, False
+
+
+@_guess.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
+    h = select(contact_step < left, contact_step, left)
+    return walls.chord_guess(chain, surface, x, y, z, h * vx, h * vy, h * vz), (surface >= 0.0) & (h > 0.0)
+
+
+@base.improve.register(ImpactNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
+    kappa, more = _improve(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, kappa, unsolved)
+    return kappa, more, 0.0, 0.0, 0.0
+
+
+@by_type
+def _improve(contact_step, chain, surface, x, y, z, vx, vy, vz, left, kappa, unsolved):
+    return kappa, False
+
+
+@_improve.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, kappa, unsolved):
+    h = select(contact_step < left, contact_step, left)
+    better, more = chord_step(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
+    return select(unsolved, better, kappa), unsolved & more
+
+
 @base.contact.register(ImpactNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
     sx, sy, sz, wx, wy, wz, used, impulse = _contact(
-        method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1
+        method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, unsolved
     )
     hit = surface >= 0.0
     return (
@@ -182,34 +212,48 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
 # --- Grazing ---------------------------------------------------------------------------------------------
 
 
+@by_type
+def _chord(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
+    """kappa of the contact step, for one particle."""
+    return 0.0
+
+
+@_chord.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
+    h = min(contact_step, left)
+    return chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
+
+
 @base.hard_pass.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, lane):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
     # A flight shorter than `shortest_flight` ends here. If the next one, back to the same wall, is short too, the
     # particle grazes: it takes a chord step of that length h instead.
     nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, given = _reflect(vx, vy, vz, nx, ny, nz, k0, k1)
+    wx, wy, wz, given = reflect(vx, vy, vz, nx, ny, nz, k0, k1)
     used = 0.0
     if walls.hit_of(chain, surface, x, y, z, wx, wy, wz) < k2:
         # How far along the wall until another wall is in the way?
         tx, ty, tz = 0.5 * (vx + wx), 0.5 * (vy + wy), 0.5 * (vz + wz)
         cut, other = walls.other_hit(chain, surface, x, y, z, tx, ty, tz)
         nx, ny, nz = walls.unit_normal(chain, other, x, y, z)
-        ax, ay, az, blow = _reflect(vx, vy, vz, nx, ny, nz, k0, k1)
+        ax, ay, az, blow = reflect(vx, vy, vz, nx, ny, nz, k0, k1)
         if cut < _SAME_INSTANT * k2 and blow > 0.0:
             # Both walls at once: the blow of the other one comes first, this one is met again in the next pass.
             impulse[int(other), lane] += blow
             return x, y, z, ax, ay, az, left, 1.0, Status.DONE.value
         # Half way to the other wall at most: the chord bends towards the inside, and what is left halves.
         h = min(k2, left, 0.5 * cut)
-        x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1)
+        kappa = chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
+        x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, False)
         ex, ey, ez = x + h * wx, y + h * wy, z + h * wz
         cut, other = walls.other_hit(chain, surface, x, y, z, wx, wy, wz)
         if used == 0.0 and cut > h and not walls.outside(chain, -1.0, ex, ey, ez):
             # The wall curves away from the flight (a solid that is only touched): the sign of v.n is round-off.
             x, y, z, used = ex, ey, ez, h
     else:
+        kappa = _chord(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left)
         x, y, z, wx, wy, wz, used, given = _contact(
-            method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1
+            method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, False
         )
     impulse[int(surface), lane] += given
     return x, y, z, wx, wy, wz, left - used, 1.0, Status.DONE.value

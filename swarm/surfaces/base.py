@@ -116,12 +116,29 @@ def unit_normal(surface, x, y, z):
 
 
 @by_type
-def chord_normal(surface, x, y, z, px, py, pz):
-    """Unit normal of a contact step from r0 on the surface to r1 on the surface.
+def chord_guess(surface, x, y, z, px, py, pz):
+    """First guess of the kappa for which a step from r0 on the surface ends on it: r1 = r0 + p - kappa D(r0, r1).
 
-    It is parallel to the discrete gradient D(r0, r1), where r1 = r0 + p - kappa D(r0, r1) and p is the free
-    displacement h v0 + h^2 G/2. With p = 0 it is `unit_normal`.
+    p is the free displacement h v0 + h^2 G/2. Exact where `chord_improve` is always 0.
     """
+    raise NotImplementedError
+
+
+@by_type
+def chord_improve(surface, x, y, z, px, py, pz, kappa):
+    """Newton step of that kappa, to be subtracted."""
+    return 0.0
+
+
+@by_type
+def chord_sweeps(surface):
+    """The most steps of `chord_improve` it takes: a constant for the compiler."""
+    return 0
+
+
+@by_type
+def chord_normal(surface, x, y, z, px, py, pz, kappa):
+    """Unit normal of that step, parallel to D(r0, r1) and out of the admissible side; for p = 0 it is `unit_normal`."""
     raise NotImplementedError
 
 
@@ -151,6 +168,13 @@ def distance(surface, x, y, z):
 
 
 @by_type
+def gap_scale(surface, x, y, z):
+    """How far the gap moves at most when each coordinate moves by its own size: where its last bits are."""
+    gx, gy, gz = gradient(surface, x, y, z)
+    return abs(gx * x) + abs(gy * y) + abs(gz * z)
+
+
+@by_type
 def gap_slope(surface, q0, q1):
     """Divided difference g[q0, q1] = (g1 - g0)/(q1 - q0), without cancellation, and its derivative by q1.
 
@@ -172,8 +196,8 @@ def push(surface, x0, y0, z0, px, py, pz, kappa):
 
 
 @by_type
-def pushed(surface, x0, y0, z0, px, py, pz, kappa):
-    """q(r1) and its derivative by kappa for the r1 of `push`."""
+def rise(surface, x0, y0, z0, px, py, pz, kappa):
+    """q1 - q0 = D.(r1 - r0) for the r1 of `push`, without cancellation, and its derivative by kappa."""
     raise NotImplementedError
 
 

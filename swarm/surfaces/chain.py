@@ -115,21 +115,73 @@ def _(chain, index, x, y, z):
 
 
 @by_type
-def chord_normal(chain, index, x, y, z, px, py, pz):
+def chord_sweeps(chain):
+    """The most steps of `chord_improve` that any surface takes: a constant for the compiler."""
+    raise NotImplementedError
+
+
+@chord_sweeps.register(Chain)
+def _(chain):
+    return max(base.chord_sweeps(chain.first), chord_sweeps(chain.rest))
+
+
+@chord_sweeps.register(Nothing)
+def _(chain):
+    return 0
+
+
+@by_type
+def chord_guess(chain, index, x, y, z, px, py, pz):
+    """First guess of the kappa of a step on surface `index` with free displacement p."""
+    raise NotImplementedError
+
+
+@chord_guess.register(Chain)
+def _(chain, index, x, y, z, px, py, pz):
+    kappa = base.chord_guess(chain.first, x, y, z, px, py, pz)
+    other = chord_guess(chain.rest, index - 1.0, x, y, z, px, py, pz)
+    return select(index == 0.0, kappa, other)
+
+
+@chord_guess.register(Nothing)
+def _(chain, index, x, y, z, px, py, pz):
+    return 0.0
+
+
+@by_type
+def chord_improve(chain, index, x, y, z, px, py, pz, kappa):
+    """Newton step of that kappa."""
+    raise NotImplementedError
+
+
+@chord_improve.register(Chain)
+def _(chain, index, x, y, z, px, py, pz, kappa):
+    step = base.chord_improve(chain.first, x, y, z, px, py, pz, kappa)
+    other = chord_improve(chain.rest, index - 1.0, x, y, z, px, py, pz, kappa)
+    return select(index == 0.0, step, other)
+
+
+@chord_improve.register(Nothing)
+def _(chain, index, x, y, z, px, py, pz, kappa):
+    return 0.0
+
+
+@by_type
+def chord_normal(chain, index, x, y, z, px, py, pz, kappa):
     """Unit normal of the contact step on surface `index` with free displacement p."""
     raise NotImplementedError
 
 
 @chord_normal.register(Chain)
-def _(chain, index, x, y, z, px, py, pz):
-    nx, ny, nz = base.chord_normal(chain.first, x, y, z, px, py, pz)
-    ox, oy, oz = chord_normal(chain.rest, index - 1.0, x, y, z, px, py, pz)
+def _(chain, index, x, y, z, px, py, pz, kappa):
+    nx, ny, nz = base.chord_normal(chain.first, x, y, z, px, py, pz, kappa)
+    ox, oy, oz = chord_normal(chain.rest, index - 1.0, x, y, z, px, py, pz, kappa)
     here = index == 0.0
     return select(here, nx, ox), select(here, ny, oy), select(here, nz, oz)
 
 
 @chord_normal.register(Nothing)
-def _(chain, index, x, y, z, px, py, pz):
+def _(chain, index, x, y, z, px, py, pz, kappa):
     return 0.0, 0.0, 0.0
 
 

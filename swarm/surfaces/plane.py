@@ -99,8 +99,13 @@ def _(surface, x, y, z):
     return surface.nx, surface.ny, surface.nz
 
 
-@base.chord_normal.register(PlaneNumbers)
+@base.chord_guess.register(PlaneNumbers)
 def _(surface, x, y, z, px, py, pz):
+    return base.inner(surface, px, py, pz)
+
+
+@base.chord_normal.register(PlaneNumbers)
+def _(surface, x, y, z, px, py, pz, kappa):
     return surface.nx, surface.ny, surface.nz
 
 
@@ -139,9 +144,9 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     return x0 + (px - kappa * surface.nx), y0 + (py - kappa * surface.ny), z0 + (pz - kappa * surface.nz)
 
 
-@base.pushed.register(PlaneNumbers)
+@base.rise.register(PlaneNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
-    return base.inner(surface, x0, y0, z0) + (base.inner(surface, px, py, pz) - kappa), -1.0
+    return base.inner(surface, px, py, pz) - kappa, -1.0
 
 
 @base.farthest_push.register(PlaneNumbers)

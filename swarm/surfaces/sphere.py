@@ -70,8 +70,8 @@ def _(surface, x, y, z):
 @base.gradient.register(SphereNumbers)
 def _(surface, x, y, z):
     # At the centre, where |r - c| has no gradient, the answer is 0.
-    distance = np.maximum(np.sqrt(base.inner(surface, x, y, z)), np.finfo(np.float64).tiny)
-    return (x - surface.cx) / distance, (y - surface.cy) / distance, (z - surface.cz) / distance
+    inverse = 1.0 / np.maximum(np.sqrt(base.inner(surface, x, y, z)), np.finfo(np.float64).tiny)
+    return (x - surface.cx) * inverse, (y - surface.cy) * inverse, (z - surface.cz) * inverse
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -110,8 +110,16 @@ def _(surface, x, y, z):
     return (x - surface.cx) * k, (y - surface.cy) * k, (z - surface.cz) * k
 
 
-@base.chord_normal.register(SphereNumbers)
+@base.chord_guess.register(SphereNumbers)
 def _(surface, x, y, z, px, py, pz):
+    # q1 = q0 is linear in kappa: kappa = (2 r0.p + p.p)/(4 q0 + 2 r0.p)
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    rp = 2.0 * (dx * px + dy * py + dz * pz)
+    return (rp + px * px + py * py + pz * pz) / (4.0 * surface.radius2 + rp)
+
+
+@base.chord_normal.register(SphereNumbers)
+def _(surface, x, y, z, px, py, pz, kappa):
     # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
     nx = 2.0 * (x - surface.cx) + px
     ny = 2.0 * (y - surface.cy) + py
@@ -141,6 +149,12 @@ def _(surface, x, y, z):
     return base.gap_of(surface, base.inner(surface, x, y, z))
 
 
+@base.gap_scale.register(SphereNumbers)
+def _(surface, x, y, z):
+    # |grad g| = 1
+    return abs(x) + abs(y) + abs(z)
+
+
 @base.gap_slope.register(SphereNumbers)
 def _(surface, q0, q1):
     # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1))
@@ -167,17 +181,18 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     )
 
 
-@base.pushed.register(SphereNumbers)
+@base.rise.register(SphereNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
-    # q1 = [(1 - kappa)^2 q0 + 2 (1 - kappa) r0.p + p.p]/(1 + kappa)^2: three numbers, whatever kappa is.
+    # r0 + r1 = (2 r0 + p)/(1 + kappa) and r1 - r0 = (p - 2 kappa r0)/(1 + kappa), relative to the centre, so
+    # q1 - q0 = [2 r0.p + p.p - kappa (4 q0 + 2 r0.p)]/(1 + kappa)^2
     dx, dy, dz = x0 - surface.cx, y0 - surface.cy, z0 - surface.cz
     q0 = dx * dx + dy * dy + dz * dz
-    rp = dx * px + dy * py + dz * pz
-    pp = px * px + py * py + pz * pz
+    rp = 2.0 * (dx * px + dy * py + dz * pz)
+    fall = 4.0 * q0 + rp
     w = 1.0 / (1.0 + kappa)
-    u = (1.0 - kappa) * w
-    q1 = u * u * q0 + 2.0 * u * w * rp + w * w * pp
-    return q1, -2.0 * w * (u * q0 + w * rp + q1)
+    risen = (rp + px * px + py * py + pz * pz - kappa * fall) * w * w
+    # q1 >= 0, even by round-off.
+    return select(risen > -q0, risen, -q0), -w * (2.0 * risen + w * fall)
 
 
 @base.farthest_push.register(SphereNumbers)

@@ -6,9 +6,11 @@ from unittest import mock
 import numpy as np
 from conftest import call
 
+from swarm.contact import energy as energies
+from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
 from swarm.gravity import potential
-from swarm.methods import base, penalty
+from swarm.methods import base
 from swarm.status import Status
 
 
@@ -41,10 +43,12 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
     *state, left, surface = call(base.flight, numbers, chain, gravity, position, velocity, left, *constants)
     kappa, unsolved = 0.0, False
-    if base.most_sweeps(numbers) > 0:
-        kappa, unsolved = call(base.guess, numbers, chain, gravity, *state, constants[0], surface)
-    for _ in range(base.most_sweeps(numbers)):
-        kappa, unsolved = call(base.improve, numbers, chain, gravity, *state, constants[0], surface, kappa, unsolved)
+    if base.most_sweeps(numbers, chain) > 0:
+        kappa, unsolved = call(base.guess, numbers, chain, gravity, *state, left, constants[0], surface)
+    for _ in range(base.most_sweeps(numbers, chain)):
+        kappa, unsolved, *_loop = call(
+            base.improve, numbers, chain, gravity, *state, left, constants[0], surface, kappa, unsolved, 0.0
+        )
     *state, left, surface, given, hits = call(
         base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, unsolved
     )
@@ -54,7 +58,16 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
         surface = base.HARD - surface
         with np.errstate(all="ignore"):
             *state, left, hits, status = base.hard_pass(
-                numbers, chain, gravity, *state, left, *map(float, constants), surface, impulse, 0
+                numbers,
+                chain,
+                gravity,
+                *state,
+                left,
+                *map(float, constants),
+                surface,
+                impulse,
+                np.zeros((uzawa.RECORDS, 1)),
+                0,
             )
         assert status == Status.DONE, Status(status).name
     elif surface >= 0.0:
@@ -66,7 +79,7 @@ def run(method, scene, position, velocity, left, mass=1.0, restores=True):
     """Passes until nothing of the frame is left."""
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     if not restores:
-        with mock.patch.object(penalty, "_restored", return_value=(1.0, True)):
+        with mock.patch.object(energies, "restored", return_value=(1.0, True)):
             return run(method, scene, position, velocity, left, mass)
     energy = energy_of(method, scene, position, velocity, mass)
     passes = [Pass(position, velocity, left, -1.0, False, np.zeros(len(scene.surfaces)), 0.0)]

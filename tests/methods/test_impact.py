@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import EPSILON, call, directions, every_surface, gap, scene_of, wall_point
+from conftest import EPSILON, call, chord_of, directions, every_surface, gap, scene_of, wall_point
 from hypothesis import given
 from hypothesis import strategies as st
 from passes import one_pass, run
@@ -68,7 +68,9 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
     assert after.position - wall == pytest.approx(0.5 * used * (velocity + after.velocity), abs=100 * EPSILON)
     if used > 1e-12:
         assert used == pytest.approx(h, abs=4 * EPSILON)
-        normal = np.array(call(surfaces.chord_normal, numbers, wall, h * velocity))
+        normal = np.array(
+            call(surfaces.chord_normal, numbers, wall, h * velocity, chord_of(numbers, wall, h * velocity))
+        )
     else:
         assert getattr(numbers, "side", 1.0) < 0.0 or name == "plane"
         normal = np.array(call(surfaces.unit_normal, numbers, wall))

@@ -71,7 +71,9 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
     for index, numbers in enumerate(single):
         for pick, one, arguments in [
             (chain.unit_normal, base.unit_normal, (point,)),
-            (chain.chord_normal, base.chord_normal, (point, 0.1 * free)),
+            (chain.chord_guess, base.chord_guess, (point, 0.1 * free)),
+            (chain.chord_improve, base.chord_improve, (point, 0.1 * free, kappa)),
+            (chain.chord_normal, base.chord_normal, (point, 0.1 * free, kappa)),
             (chain.settle, base.settle, (point,)),
             (chain.push, base.push, (point, free, kappa)),
             (chain.inner_gradient, base.inner_gradient, (point, free)),

@@ -11,6 +11,7 @@ from conftest import (
     EPSILON,
     SURFACES,
     call,
+    chord_of,
     directions,
     every_surface,
     gap,
@@ -348,27 +349,32 @@ def test_push_solves_its_equation(name, point, free, strength, scale):
 
 @every_surface
 @given(**pushes)
-def test_pushed_is_the_inner_function_of_push(name, point, free, strength, scale):
+def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
+    """q1 - q0 = D.(r1 - r0), whose error is relative to D.p and not to q."""
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
-    q, slope = call(base.pushed, surface, point, free, kappa)
+    rise, slope = call(base.rise, surface, point, free, kappa)
     end = np.array(call(base.push, surface, point, free, kappa))
     steep = np.linalg.norm(call(base.inner_gradient, surface, end, end))
-    assert q == pytest.approx(call(base.inner, surface, end), abs=32 * EPSILON * (abs(q) + steep * scale))
+    q0, q1 = call(base.inner, surface, point), call(base.inner, surface, end)
+    assert rise == pytest.approx(q1 - q0, abs=32 * EPSILON * (abs(q0) + abs(q1) + steep * scale))
+    discrete = np.array(call(base.inner_gradient, surface, point, end))
+    terms = abs(discrete) @ abs(free) + abs(kappa) * discrete @ discrete
+    assert abs(rise - discrete @ (free - kappa * discrete)) <= 32 * EPSILON * terms
     step = 1e-6 * scale / steep
-    rise = call(base.pushed, surface, point, free, kappa + step)[0]
-    rise -= call(base.pushed, surface, point, free, kappa - step)[0]
-    assert rise / (2.0 * step) == pytest.approx(slope, rel=1e-6, abs=1e-6 * steep * steep)
+    change = call(base.rise, surface, point, free, kappa + step)[0]
+    change -= call(base.rise, surface, point, free, kappa - step)[0]
+    assert change / (2.0 * step) == pytest.approx(slope, rel=1e-6, abs=1e-6 * steep * steep)
 
 
 @every_surface
-@given(point=directions, direction=directions, length=st.floats(1e-9, 0.3), scale=scales)
+@given(point=directions, direction=directions, length=st.floats(1e-9, 1.0), scale=scales)
 def test_chord_normal_reflects_along_a_chord(name, point, direction, length, scale):
     """From the wall a step with the mean of the old and the reflected velocity ends on the wall; |v| is kept."""
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
     size = min(SURFACES[name](scale).size(), scale)
     free = length * size * direction / np.linalg.norm(direction)
-    normal = np.array(call(base.chord_normal, surface, wall, free))
+    normal = np.array(call(base.chord_normal, surface, wall, free, chord_of(surface, wall, free)))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
     reflected = free - 2.0 * (free @ normal) * normal
     assert np.linalg.norm(reflected) == pytest.approx(np.linalg.norm(free), rel=8 * EPSILON)
@@ -382,7 +388,7 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
 def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
-    chord = call(base.chord_normal, surface, wall, np.zeros(3))
+    chord = call(base.chord_normal, surface, wall, np.zeros(3), 0.0)
     assert chord == pytest.approx(call(base.unit_normal, surface, wall), abs=16 * EPSILON)
 
 

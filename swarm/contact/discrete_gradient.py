@@ -1,0 +1,237 @@
+"""The three discrete gradients of Phi: vectors D with D.(r1 - r0) = Phi(r1) - Phi(r0).
+
+The step m (v1 - v0) = h m G - h D (alpha Phi_mean + lambda) balances the energy exactly by that identity alone.
+    mean value (6)  grad Phi at a point r_beta between r0 and r1; Phi must be C1 there, so the exponent is above 1.
+    scalar (9)      (Phi1 - Phi0)/(|r1|^2 - |r0|^2) (r0 + r1): a sphere about the origin of r.
+    composite       Phi[g0, g1] g[q0, q1] times a discrete gradient of the smooth inner function q. It is (9) for a
+                    sphere, holds for every surface, and lets Phi have a corner on it, so any exponent will do.
+The discrete gradient of q is the surface's: grad q at the midpoint m for a quadric, else Gonzalez's
+grad q(m) + (q1 - q0 - grad q(m).d)/|d|^2 d, with d = r1 - r0.
+Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
+"""
+
+import math
+from typing import NamedTuple
+
+from .._jit import by_type, by_type_outlined, inlined, outlined
+from ..surfaces import base as surfaces
+from . import impulse
+from . import regularisation as law_of
+
+_EPSILON = 2.220446049250313e-16
+# Iterations of the mean-value form's three solves, the innermost last; halving ends far sooner.
+_BETA_ITERATIONS = 200
+_FORCE_ITERATIONS = 200
+_POINT_ITERATIONS = 200
+
+
+class Composite(NamedTuple):
+    """Chooses the composite form."""
+
+
+class MeanValue(NamedTuple):
+    """Chooses the mean-value form."""
+
+
+def form_of(gradient: str) -> Composite | MeanValue:
+    """The form of a method's argument `gradient`."""
+    return MeanValue() if gradient == "mean-value" else Composite()
+
+
+@by_type
+def nested(form):
+    """Whether a step takes nested solves, which are too long for lanes."""
+    raise NotImplementedError
+
+
+@nested.register(Composite)
+def _(form):
+    return False
+
+
+@nested.register(MeanValue)
+def _(form):
+    return True
+
+
+# --- The vectors -----------------------------------------------------------------------------------------
+
+
+@outlined
+def composite(law, surface, x0, y0, z0, x1, y1, z1):
+    """D = Phi[g0, g1] g[q0, q1] D_q; where q1 = q0 the quotients are their one-sided limits."""
+    q0, q1 = surfaces.inner(surface, x0, y0, z0), surfaces.inner(surface, x1, y1, z1)
+    g0, g1 = surfaces.gap_of(surface, q0), surfaces.gap_of(surface, q1)
+    slope, _curvature = law_of.constraint_slope(law, g0, g1)
+    rise, _curvature = surfaces.gap_slope(surface, q0, q1)
+    dx, dy, dz = surfaces.inner_gradient(surface, x0, y0, z0, x1, y1, z1)
+    f = slope * rise
+    return f * dx, f * dy, f * dz
+
+
+@outlined
+def scalar(law, radius, x0, y0, z0, x1, y1, z1):
+    """The paper's (9) for the cavity |r| <= radius, as it stands there: 0/0 where |r1| = |r0|."""
+    q0, q1 = x0 * x0 + y0 * y0 + z0 * z0, x1 * x1 + y1 * y1 + z1 * z1
+    rise = law_of.constraint(law, math.sqrt(q1) - radius) - law_of.constraint(law, math.sqrt(q0) - radius)
+    f = rise / (q1 - q0)
+    return f * (x0 + x1), f * (y0 + y1), f * (z0 + z1)
+
+
+@outlined
+def constraint_gradient(law, surface, x, y, z):
+    """grad Phi(r) = Phi'(g) g'(q) grad q."""
+    q = surfaces.inner(surface, x, y, z)
+    slope, _curvature = surfaces.gap_slope(surface, q, q)
+    f = law_of.constraint_gradient(law, surfaces.gap_of(surface, q)) * slope
+    dx, dy, dz = surfaces.inner_gradient(surface, x, y, z, x, y, z)
+    return f * dx, f * dy, f * dz
+
+
+@outlined
+def mean_value(law, surface, x0, y0, z0, x1, y1, z1):
+    """D = grad Phi(r_beta), r_beta = (1 - beta) r0 + beta r1, and beta (NaN if none was found)."""
+    low, high = 0.0, 1.0
+    f_low = _identity(law, surface, x0, y0, z0, x1, y1, z1, low)
+    f_high = _identity(law, surface, x0, y0, z0, x1, y1, z1, high)
+    beta = low if f_low == 0.0 else high if f_high == 0.0 else math.nan
+    if f_low * f_high < 0.0:
+        for _i in range(_BETA_ITERATIONS):
+            beta = _illinois(low, f_low, high, f_high)
+            f = _identity(law, surface, x0, y0, z0, x1, y1, z1, beta)
+            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
+            if f == 0.0 or high - low <= 2.0 * _EPSILON:
+                break
+    dx, dy, dz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
+    return dx, dy, dz, beta
+
+
+@inlined
+def _between(x0, y0, z0, x1, y1, z1, beta):
+    """r_beta"""
+    return x0 + beta * (x1 - x0), y0 + beta * (y1 - y0), z0 + beta * (z1 - z0)
+
+
+@inlined
+def _gap(surface, x, y, z):
+    return surfaces.gap_of(surface, surfaces.inner(surface, x, y, z))
+
+
+@outlined
+def _identity(law, surface, x0, y0, z0, x1, y1, z1, beta):
+    """grad Phi(r_beta).(r1 - r0) - (Phi1 - Phi0)"""
+    dx, dy, dz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
+    rise = law_of.constraint(law, _gap(surface, x1, y1, z1)) - law_of.constraint(law, _gap(surface, x0, y0, z0))
+    return dx * (x1 - x0) + dy * (y1 - y0) + dz * (z1 - z0) - rise
+
+
+# --- A step that one wall holds back ---------------------------------------------------------------------
+
+
+@by_type_outlined
+def reaction(form, law, multiplier, surface, x, y, z, px, py, pz, c):
+    """The displacement c D (alpha Phi_mean + lambda) by which one wall holds a step back, Phi1, whether found.
+
+    r1 = r0 + p less the displacement. `form` is Composite or MeanValue, `multiplier` a float or None, c = h^2/(2m).
+    """
+    raise NotImplementedError
+
+
+@reaction.register(Composite)
+def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
+    kappa, solved = impulse.careful(law, multiplier, surface, x, y, z, px, py, pz, c)
+    x1, y1, z1 = surfaces.push(surface, x, y, z, px, py, pz, kappa)
+    dx, dy, dz = surfaces.inner_gradient(surface, x, y, z, x1, y1, z1)
+    q0 = surfaces.inner(surface, x, y, z)
+    g0, round_off, _tolerance = impulse.start_gap(multiplier, surface, x, y, z, q0)
+    g1 = impulse.end_gap(surface, x, y, z, px, py, pz, q0, g0, round_off, kappa)
+    return kappa * dx, kappa * dy, kappa * dz, law_of.constraint(law, g1), solved
+
+
+@reaction.register(MeanValue)
+def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
+    # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
+    low, high = 0.0, 1.0
+    rx, ry, rz, f_low = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
+    sx, sy, sz, f_high = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, high)
+    if f_low == 0.0:
+        return rx, ry, rz, law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz)), True
+    if f_high == 0.0:
+        return sx, sy, sz, law_of.constraint(law, _gap(surface, x + px - sx, y + py - sy, z + pz - sz)), True
+    if not f_low * f_high < 0.0:
+        return rx, ry, rz, math.nan, False
+    for _i in range(_BETA_ITERATIONS):
+        beta = _illinois(low, f_low, high, f_high)
+        rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
+        low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
+        if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+            return rx, ry, rz, law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz)), True
+    return rx, ry, rz, math.nan, False
+
+
+@outlined
+def _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta):
+    """The reaction along grad q(r_beta) that solves the step for this beta, and how far (6) misses its identity."""
+    # F(kappa) = kappa - c (alpha Phi_mean + lambda) Phi'(g_beta) g'(q_beta); a solid pushes with kappa < 0.
+    rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, 0.0)
+    sign = -1.0 if f > 0.0 else 1.0
+    low, f_low, high = 0.0, sign * f, abs(f)
+    if f != 0.0:
+        rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * high)
+        f_high = sign * f
+        for _i in range(_FORCE_ITERATIONS):
+            if f_high > 0.0:
+                break
+            # Not past the push yet: the force grows along this line.
+            low, f_low, high = high, f_high, 2.0 * high
+            rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * high)
+            f_high = sign * f
+        for _i in range(_FORCE_ITERATIONS):
+            kappa = _illinois(low, f_low, high, f_high)
+            rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * kappa)
+            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, kappa, sign * f)
+            if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                break
+    miss = _identity(law, surface, x, y, z, x + px - rx, y + py - ry, z + pz - rz, beta)
+    return rx, ry, rz, miss
+
+
+@outlined
+def _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa):
+    """The reaction kappa grad q(r_beta) and F(kappa); NaN where the point r_beta was not found."""
+    rx, ry, rz = 0.0, 0.0, 0.0
+    found = False
+    for _i in range(_POINT_ITERATIONS):
+        # r_beta = r0 + beta (p - kappa grad q(r_beta)): a contraction while the push is short of the curvature radius.
+        bx, by, bz = x + beta * (px - rx), y + beta * (py - ry), z + beta * (pz - rz)
+        dx, dy, dz = surfaces.inner_gradient(surface, bx, by, bz, bx, by, bz)
+        change = max(abs(kappa * dx - rx), abs(kappa * dy - ry), abs(kappa * dz - rz))
+        rx, ry, rz = kappa * dx, kappa * dy, kappa * dz
+        if change <= _EPSILON * max(abs(rx), abs(ry), abs(rz)):
+            found = True
+            break
+    q = surfaces.inner(surface, bx, by, bz)
+    slope, _curvature = surfaces.gap_slope(surface, q, q)
+    f = law_of.constraint_gradient(law, surfaces.gap_of(surface, q)) * slope
+    mean = 0.5 * law_of.constraint(law, _gap(surface, x, y, z))
+    mean += 0.5 * law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz))
+    force = law.alpha * mean + (0.0 if multiplier is None else multiplier)
+    return rx, ry, rz, kappa - c * force * f if found else math.nan
+
+
+# --- A root in a bracket without derivatives -------------------------------------------------------------
+
+
+@inlined
+def _illinois(low, f_low, high, f_high):
+    """The next trial of regula falsi, the middle where that does not lie inside."""
+    trial = low - f_low * (high - low) / (f_high - f_low)
+    return trial if low < trial < high else 0.5 * (low + high)
+
+
+@inlined
+def _narrowed(low, f_low, high, f_high, trial, f):
+    """The half of the bracket that holds the root; the weight of an end that stays is halved (Illinois)."""
+    if f * f_high > 0.0:
+        return low, 0.5 * f_low, trial, f
+    return trial, f, high, 0.5 * f_high

@@ -1,0 +1,194 @@
+"""The iteration of one particle's one contact step, sweep by sweep: for looking at a method, not for running it."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .contact import corner, reflection, uzawa
+from .contact.regularisation import regularisation
+from .errors import RunError, SceneError
+from .gravity import accelerated, displacement
+from .methods import AugmentedLagrangian, Impact, Method, Penalty
+from .particles import Particles
+from .scene import Scene
+from .status import Status
+from .surfaces import chain as walls
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactHistory:
+    """Arrays with one entry a sweep; of several surfaces the first four have a column each.
+
+    Attributes, which are keys too (`history["multiplier"]`):
+        multiplier: lambda during the sweep (sweeps,) [N for a = 1].
+        force_multiplier: lambda |D|, the part of the contact force that the multiplier carries [N].
+        force_penalty: alpha |D| (Phi0 + Phi1)/2, the part of the spring [N].
+        constraint: Phi1 at the end of the step.
+        kinetic_energy: m v1^2/2 (sweeps,) [J].
+        position: r1 (sweeps, 3) [m].
+        velocity: v1 (sweeps, 3) [m/s].
+        stored_energy: V = sum of alpha Phi1^2/2 (sweeps,) [J].
+        converged: whether the last sweep reached the tolerance.
+    """
+
+    multiplier: Floats
+    force_multiplier: Floats
+    force_penalty: Floats
+    constraint: Floats
+    kinetic_energy: Floats
+    position: Floats
+    velocity: Floats
+    stored_energy: Floats
+    converged: bool
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in {field.name for field in fields(self)}:
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def __len__(self) -> int:
+        return len(self.kinetic_energy)
+
+
+def contact_history(
+    scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float, method: Method
+) -> ContactHistory:
+    """Uzawa's iteration of one particle's one step with a method.
+
+    Args:
+        scene: the walls and gravity.
+        position: r0, three numbers [m].
+        velocity: v0, three numbers [m/s].
+        mass: m > 0 [kg].
+        method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, whose one solve is one sweep. With
+            adaptive=True, and for Impact, the particle first flies to its next impact.
+
+    Returns:
+        A `ContactHistory` with a sweep at least, and at most max_sweeps of them.
+
+    Raises:
+        SceneError: a bad argument; Impact with contact_step = 0, which has no step; no impact ahead.
+        RunError: the equation of a sweep was not solved.
+
+    >>> import swarm
+    >>> method = swarm.AugmentedLagrangian(dt=0.025, penalty=1e4)
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> history = swarm.contact_history(cavity, (0.4, 0.3, 0.0), (0.3, 0.4, 0.0), 1.0, method)
+    >>> len(history), history.converged
+    (13, True)
+    """
+    particle = Particles(np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64), mass)
+    if len(particle) != 1:
+        raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
+    method.check(scene, particle)
+    start = [*particle.position[:, 0].tolist(), *particle.velocity[:, 0].tolist()]
+    # Plain Python runs the functions that kernels are made of; there a division by zero is an infinity.
+    with np.errstate(all="ignore"):
+        if isinstance(method, AugmentedLagrangian):
+            if method.adaptive:
+                start = _at_the_wall(scene, start)
+            return _uzawa(scene, start, mass, method)
+        if isinstance(method, Penalty):
+            return _penalty(scene, start, mass, method)
+        if isinstance(method, Impact):
+            return _impact(scene, _at_the_wall(scene, start), mass, method)
+    raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
+
+
+class _Rows:
+    """The entries of a history, collected sweep by sweep."""
+
+    def __init__(self, scene: Scene, start: list[float], mass: float, h: float) -> None:
+        self._scene, self._start, self._mass, self._h = scene, start, mass, h
+        self.free = displacement(scene.pull(), *start[3:], h)
+        self.c = h * h / (2.0 * mass)
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(self, multiplier: Floats, mean: Floats, reactions: Floats, stored: float) -> None:
+        """One sweep: lambda, alpha Phi_mean, and c D (alpha Phi_mean + lambda) and Phi1 of each wall."""
+        reactions, constraint = reactions[:, :3], reactions[:, 3].copy()
+        total = reactions.sum(axis=0)
+        r1 = np.array(self._start[:3]) + (np.array(self.free) - total)
+        v1 = np.array(accelerated(self._scene.pull(), *self._start[3:], self._h)) - 2.0 / self._h * total
+        force, strength = np.sqrt((reactions**2).sum(axis=1)) / self.c, multiplier + mean
+        slope = np.divide(force, strength, out=np.zeros_like(force), where=strength != 0.0)
+        kinetic = 0.5 * self._mass * float(v1 @ v1)
+        self._rows.append((multiplier, multiplier * slope, mean * slope, constraint, kinetic, r1, v1, stored))
+
+    def history(self, converged: bool) -> ContactHistory:
+        columns: list[Any] = [np.array(column) for column in zip(*self._rows, strict=True)]
+        if len(self._scene.surfaces) == 1:
+            columns[:4] = [column[:, 0] for column in columns[:4]]
+        return ContactHistory(*columns, *[converged])
+
+
+def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
+    """Position and velocity at the next impact."""
+    chain = scene.chain()
+    time, surface = walls.first_hit(chain, *start)
+    if not np.isfinite(time):
+        raise SceneError(f"velocity must lead to a surface, got {tuple(start[3:])}, which never does")
+    place = [r + float(time) * v for r, v in zip(start[:3], start[3:], strict=True)]
+    return [*map(float, walls.settle(chain, surface, *place)), *start[3:]]
+
+
+def _uzawa(scene: Scene, start: list[float], mass: float, method: AugmentedLagrangian) -> ContactHistory:
+    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.surfaces)
+    rows = _Rows(scene, start, mass, method.dt)
+    # Arguments as kernels take them: one number each.
+    step: Any = (*start[:3], *rows.free, rows.c)
+    multipliers, before, misses = np.zeros(count), np.zeros(count), np.zeros(count)
+    reactions = np.zeros((count, 4))
+    uzawa.start(numbers, numbers.law, chain, *step, *[multipliers])
+    for sweep in range(method.max_sweeps):
+        *_r1, stored, solved = uzawa.sweep_all(
+            numbers, numbers.law, chain, *step, *[multipliers, before, misses, sweep, reactions]
+        )
+        _require(solved, sweep)
+        rows.add(before.copy(), misses.copy(), reactions, float(stored))
+        if stored <= method.tolerance:
+            return rows.history(True)
+    return rows.history(False)
+
+
+def _penalty(scene: Scene, start: list[float], mass: float, method: Penalty) -> ContactHistory:
+    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.surfaces)
+    rows, r0, reactions = _Rows(scene, start, mass, method.dt), start[:3], np.zeros((count, 4))
+    step: Any = (*r0, *rows.free, rows.c)
+    *_r1, solved = corner.hold(numbers.form, numbers.law, None, chain, *step, *[reactions])
+    _require(solved, 0)
+    first, last = _constraints(numbers.law, chain, *r0), reactions[:, 3]
+    stored = 0.5 * method.penalty * float(last @ last)
+    rows.add(np.zeros(count), 0.5 * method.penalty * (first + last), reactions, stored)
+    return rows.history(True)
+
+
+def _impact(scene: Scene, start: list[float], mass: float, method: Impact) -> ContactHistory:
+    if method.contact_step == 0.0:
+        raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
+    chain, count = scene.chain(), len(scene.surfaces)
+    rows, r0 = _Rows(scene, start, mass, method.contact_step), start[:3]
+    _time, index = walls.first_hit(chain, *start)
+    kappa = reflection.chord(chain, index, *r0, *rows.free)
+    r1 = walls.push(chain, index, *r0, *rows.free, kappa)
+    reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
+    reactions[int(index), :3] = kappa * np.array(walls.inner_gradient(chain, index, *r0, *r1))
+    # What Uzawa's loop with exponent 1 tends to.
+    multiplier[int(index)] = uzawa.multiplier_of(chain, index, regularisation(1.0, 1.0), *r0, rows.c, kappa)
+    rows.add(multiplier, np.zeros(count), reactions, 0.0)
+    return rows.history(True)
+
+
+def _constraints(law: Any, chain: Any, x: float, y: float, z: float) -> Floats:
+    found = np.zeros(walls.length(chain))
+    corner.constraints(chain, law, 0, x, y, z, found)
+    return found
+
+
+def _require(solved: bool, sweep: int) -> None:
+    if not solved:
+        raise RunError(f"sweep {sweep + 1} failed: {Status.UNSOLVED.sentence}")

@@ -1,0 +1,408 @@
+"""AugmentedLagrangian: the paper's method, with Uzawa's loop in every contact step."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import checks
+from .._jit import by_type, by_type_outlined, outlined, select
+from ..contact import corner, uzawa
+from ..contact import energy as energies
+from ..contact import impulse as contact_impulse
+from ..contact import regularisation as law_of
+from ..contact.discrete_gradient import form_of, nested
+from ..contact.reflection import chord, reflect
+from ..errors import SceneError
+from ..gravity import accelerated, displacement
+from ..particles import Particles
+from ..scene import Scene
+from ..status import Status
+from ..surfaces import chain as walls
+from . import base, fixed_step
+
+RAISE, COUNT, IMPACT = 0, 1, 2
+_POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
+_ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
+# Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
+_MOST_BOUNCES = 1000
+# Another wall that the chord meets this early, as a part of the step, is met in the same instant.
+_SAME_INSTANT = 1e-6
+
+
+@dataclass(frozen=True)
+class AugmentedLagrangian(base.Method):
+    """Rigid walls by the paper's nested loops: the step (7) with multipliers, and Uzawa's update (8) of them.
+
+    (v0 + v1)/2 = (r1 - r0)/h,   m (v1 - v0) = h m G - h D (alpha (Phi0 + Phi1)/2 + lambda),
+    lambda <- lambda + alpha (Phi0 + Phi1)/2   until   V = alpha Phi1^2/2 <= tolerance.
+
+    When does the loop converge? Its limit is a step with Phi1 = 0.
+        exponent 1, on the surface at t0 (State I): always, linearly, with the composite gradient on every smooth
+            surface. At the limit the force is lambda D with D != 0, so a finite multiplier carries the particle.
+        exponent 1, inside at t0 (State II): never. D = Phi1/(g1 - g0) dg vanishes with Phi1, so lambda grows without
+            end, while the energy misses lambda Phi1. Use adaptive=True, which starts every contact on the surface.
+        exponent above 1: never, for the same reason: Phi'(0) = 0. Such walls are for Penalty, as Hertz's law is.
+    The converged step is a reflection about D: `Impact(contact_step=dt)` computes it without the loop, at a tenth of
+    the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
+
+    Args:
+        dt: step h > 0 [s]. Frames must fall on whole steps, unless adaptive.
+        penalty: alpha > 0, the weight of the loop (N/m for a = 1 and a gap in m); larger ones need fewer sweeps.
+        exponent: a >= 1 of the regularisation.
+        tolerance: V > 0 [J] at which a loop ends; the energy of a contact is then off by about lambda Phi1, with Phi1 =
+            sqrt(2 tolerance/alpha).
+        max_sweeps: the most sweeps of a loop, 1 or more.
+        gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
+        adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
+            time, and contact steps are dt long. Without gravity only.
+        acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
+            the multiplier of the converged step. The fixed point is the same.
+        on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,
+            particle, sweeps and V; "count" accepts the step and counts it in the observable "unconverged"; "impact"
+            counts it too, and replaces the contact by the exact one (without gravity only).
+
+    Raises:
+        SceneError: an argument is out of its range; a frame time is not a whole number of steps.
+
+    Conserves: m v^2/2 - m G.r up to the tolerance where the loop converges; to round-off that does not grow for a
+    tolerance at round-off, such as 1e-28. A gap below the round-off of the coordinates counts as 0. Order: 2 in dt away
+    from impacts. Cost: sweeps times a scalar solve; the sweeps are in the observable "sweeps".
+    Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
+
+    >>> AugmentedLagrangian(dt=0.025, penalty=1e4, exponent=1.0, gradient="mean-value")
+    Traceback (most recent call last):
+    swarm.errors.SceneError: gradient must be "composite" for exponent = 1, got "mean-value"
+    """
+
+    dt: float
+    penalty: float
+    exponent: float = 1.0
+    tolerance: float = 1e-10
+    max_sweeps: int = 50
+    gradient: str = "composite"
+    adaptive: bool = False
+    acceleration: str = "none"
+    on_unconverged: str = "raise"
+
+    def __post_init__(self) -> None:
+        fixed_step.check_arguments(self)
+        object.__setattr__(self, "tolerance", checks.positive("tolerance", self.tolerance))
+        object.__setattr__(self, "max_sweeps", checks.count("max_sweeps", self.max_sweeps))
+        object.__setattr__(self, "adaptive", checks.flag("adaptive", self.adaptive))
+        checks.one_of("acceleration", self.acceleration, _ACCELERATIONS)
+        checks.one_of("on_unconverged", self.on_unconverged, _POLICIES)
+
+    def check(self, scene: Scene, particles: Particles) -> None:
+        if scene.gravity is not None and (self.adaptive or self.on_unconverged == "impact"):
+            name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
+            raise SceneError(
+                f"{name} = {value} does not know gravity yet, got gravity={tuple(scene.gravity)}; use fixed steps with "
+                'on_unconverged="count", Penalty, or gravity=None'
+            )
+        if self.adaptive:
+            base.check_crossing("dt", self.dt, scene, particles)
+        else:
+            fixed_step.check_solids(scene, particles, self.dt)
+
+    def numbers(self, scene: Scene) -> "AugmentedLagrangianNumbers":
+        return AugmentedLagrangianNumbers(
+            self.dt,
+            self.law(),
+            form_of(self.gradient),
+            Adaptive() if self.adaptive else None,
+            self.tolerance,
+            self.max_sweeps,
+            _ACCELERATIONS[self.acceleration],
+            _POLICIES[self.on_unconverged],
+        )
+
+    def span(self, name: str, duration: float) -> float:
+        return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)
+
+    def law(self) -> Any:
+        return law_of.regularisation(self.penalty, self.exponent)
+
+    def has_multipliers(self) -> bool:
+        return True
+
+    def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
+        now = moment - (left if self.adaptive else left * self.dt)
+        return (
+            f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "
+            f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. The loop converges for exponent = 1 from the "
+            'surface: use adaptive=True, more max_sweeps, or on_unconverged="count" or "impact"'
+        )
+
+
+class Adaptive(NamedTuple):
+    """Chooses steps that are cut at the impact."""
+
+
+class AugmentedLagrangianNumbers(NamedTuple):
+    """What kernels know of the method."""
+
+    dt: float
+    law: Any
+    form: Any  # of the discrete gradient
+    adaptive: Any  # Adaptive or None
+    tolerance: float
+    max_sweeps: int
+    acceleration: float
+    policy: int
+
+
+# --- One pass --------------------------------------------------------------------------------------------
+
+
+@base.lane_constants.register(AugmentedLagrangianNumbers)
+def _(method, mass, energy, vx, vy, vz):
+    # 1/(2m), the energy per mass at the start, and nothing
+    return 0.5 / mass, energy, 0.0
+
+
+@by_type
+def _flight(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
+    raise NotImplementedError
+
+
+@_flight.register(type(None))
+def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
+    x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
+    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
+    surface, count = walls.touched(chain, x, y, z, px, py, pz)
+    surface = select((count > 1.0) | nested(method.form), base.HARD - surface, surface)
+    touched = (left > 0.0) & (count > 0.0)
+    return x, y, z, vx, vy, vz, left, select(touched, surface, -1.0)
+
+
+@_flight.register(Adaptive)
+def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
+    time, surface = walls.first_hit(chain, x, y, z, vx, vy, vz)
+    hit = time <= left
+    t = select(hit, time, left)
+    x, y, z = x + t * vx, y + t * vy, z + t * vz
+    sx, sy, sz = walls.settle(chain, surface, x, y, z)
+    surface = select(nested(method.form), base.HARD - surface, surface)
+    # A hit in the last instant of a frame is met again in the next one.
+    hit = hit & (left - t > 0.0)
+    x, y, z = select(hit, sx, x), select(hit, sy, y), select(hit, sz, z)
+    return x, y, z, vx, vy, vz, left - t, select(hit, surface, -1.0)
+
+
+@by_type
+def _step(adaptive, method, left):
+    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
+    raise NotImplementedError
+
+
+@_step.register(type(None))
+def _(adaptive, method, left):
+    return method.dt, 1.0, method.law
+
+
+@_step.register(Adaptive)
+def _(adaptive, method, left):
+    # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger alpha.
+    dt = method.dt
+    h = select(dt < left, dt, left)
+    part = dt / h
+    return h, h, law_of.stiffened(method.law, part * part)
+
+
+@base.flight.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
+    return _flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
+
+
+@base.most_sweeps.register(AugmentedLagrangianNumbers)
+def _(method, chain):
+    return contact_impulse.NEWTON_STEPS
+
+
+@base.guess.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
+    h, _used, law = _step(method.adaptive, method, left)
+    px, py, pz = displacement(gravity, vx, vy, vz, h)
+    kappa = contact_impulse.guess(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
+    touching = surface >= 0.0
+    return select(touching, kappa, 0.0), touching
+
+
+@base.improve.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
+    h, _used, law = _step(method.adaptive, method, left)
+    px, py, pz = displacement(gravity, vx, vy, vz, h)
+    step, more, mean, stored, gain = contact_impulse.improve(
+        chain, surface, law, multiplier, x, y, z, px, py, pz, k0 * h * h, kappa
+    )
+    return select(unsolved, kappa - step, kappa), unsolved & more, mean, stored, gain
+
+
+@base.has_multiplier.register(AugmentedLagrangianNumbers)
+def _(method):
+    return True
+
+
+@base.multiplier_sweeps.register(AugmentedLagrangianNumbers)
+def _(method):
+    return method.max_sweeps
+
+
+@base.first_multiplier.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
+    h, _used, law = _step(method.adaptive, method, left)
+    px, py, pz = displacement(gravity, vx, vy, vz, h)
+    better, multiplier = uzawa.reflection(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
+    use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
+    return select(use, multiplier, 0.0), select(use, better, kappa)
+
+
+@base.next_multiplier.register(AugmentedLagrangianNumbers)
+def _(method, left, multiplier, mean, stored, multiplier_before, miss_before):
+    _h, _used, law = _step(method.adaptive, method, left)
+    miss = law.alpha * mean
+    following = uzawa.next_multiplier(method.acceleration, multiplier, miss, multiplier_before, miss_before)
+    return following, miss, not (stored <= method.tolerance)
+
+
+@base.contact.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
+    # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
+    h, used, _law = _step(method.adaptive, method, left)
+    px, py, pz = displacement(gravity, vx, vy, vz, h)
+    x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
+    gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
+    f = 2.0 * kappa / h
+    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
+    wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
+    given = abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz)
+
+    free = _free(method.adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa)
+    solved = free & (not unsolved) & walls.pushes(chain, surface, kappa)
+    touching = surface >= 0.0
+    step = (left > 0.0) & touching & solved
+    factor, _balanced = energies.restored(
+        method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
+    )
+    new = step & (not walls.outside(chain, -1.0, x, y, z))
+    # A step without contact: only fixed steps end here that way, just before one.
+    loose = (left > 0.0) & (surface > base.HARD) & (not touching)
+    ex, ey, ez = accelerated(gravity, vx, vy, vz, h)
+    return (
+        select(step, x1, select(loose, x + px, x)),
+        select(step, y1, select(loose, y + py, y)),
+        select(step, z1, select(loose, z + pz, z)),
+        select(step, wx * factor, select(loose, ex, vx)),
+        select(step, wy * factor, select(loose, ey, vy)),
+        select(step, wz * factor, select(loose, ez, vz)),
+        left - select(step | loose, used, 0.0),
+        select(touching & (not solved), base.HARD - surface, surface),
+        select(step, given, 0.0),
+        select(new, 1.0, 0.0),
+    )
+
+
+@by_type
+def _free(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
+    """Whether no other wall has a part in the step, which then one lane can do alone."""
+    raise NotImplementedError
+
+
+@_free.register(type(None))
+def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
+    return not walls.outside(chain, surface, x1, y1, z1)
+
+
+@_free.register(Adaptive)
+def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
+    # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free flight
+    # ends outside again) was hit all the same.
+    cut, _other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
+    return (cut > 1.0) & (kappa != 0.0)
+
+
+# --- Several walls, nested solves, and loops that do not converge ----------------------------------------
+
+
+@base.hard_pass.register(AugmentedLagrangianNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
+    h, used, law = _step(method.adaptive, method, left)
+    if _is_blocked(method.adaptive, chain, surface, x, y, z, h * vx, h * vy, h * vz):
+        record[uzawa.SWEEPS, lane] = 0.0
+        vx, vy, vz = _exact_reflection(chain, int(surface), x, y, z, vx, vy, vz, impulse, lane)
+        return x, y, z, vx, vy, vz, left, 1.0, Status.DONE.value
+    px, py, pz = displacement(gravity, vx, vy, vz, h)
+    reactions = np.zeros((walls.length(chain), 4))
+    x1, y1, z1, sweeps, stored, solved, converged = uzawa.loop(
+        method, law, chain, x, y, z, px, py, pz, k0 * h * h, reactions
+    )
+    record[uzawa.SWEEPS, lane], record[uzawa.STORED, lane] = sweeps, stored
+    record[uzawa.UNCONVERGED, lane] = 0.0 if converged else 1.0
+    if not converged and method.policy == IMPACT:
+        return _exact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane)
+    if not converged and (method.policy == RAISE or not solved):
+        status = Status.UNCONVERGED.value if solved else Status.UNSOLVED.value
+        return x, y, z, vx, vy, vz, left, 0.0, status
+    new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
+    rx, ry, rz = corner.total(reactions)
+    f = 2.0 / h
+    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
+    wx, wy, wz = wx - f * rx, wy - f * ry, wz - f * rz
+    corner.add_impulses(reactions, h, impulse, lane)
+    given = f * math.sqrt(rx * rx + ry * ry + rz * rz)
+    e, _balanced = energies.restored(
+        method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
+    )
+    return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, Status.DONE.value
+
+
+@by_type
+def _is_blocked(adaptive, chain, surface, x, y, z, px, py, pz):
+    """Whether the chord on `surface` meets another wall later in the step, or passes a solid by."""
+    return False
+
+
+@_is_blocked.register(Adaptive)
+def _(adaptive, chain, surface, x, y, z, px, py, pz):
+    kappa = chord(chain, surface, x, y, z, px, py, pz)
+    x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
+    cut, _other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
+    return not walls.pushes(chain, surface, kappa) or kappa == 0.0 or _SAME_INSTANT < cut <= 1.0
+
+
+@outlined
+def _exact_reflection(chain, surface, x, y, z, vx, vy, vz, impulse, lane):
+    """The velocity after the exact impact on `surface`."""
+    speed2 = vx * vx + vy * vy + vz * vz
+    nx, ny, nz = walls.unit_normal(chain, float(surface), x, y, z)
+    vx, vy, vz, given = reflect(vx, vy, vz, nx, ny, nz, speed2, 0.5 / speed2 if speed2 > 0.0 else 0.0)
+    impulse[surface, lane] += given
+    return vx, vy, vz
+
+
+@by_type_outlined
+def _exact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
+    """The contact as exact impacts, in the place of a loop that did not converge."""
+    raise NotImplementedError
+
+
+@_exact.register(Adaptive)
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
+    vx, vy, vz = _exact_reflection(chain, int(surface), x, y, z, vx, vy, vz, impulse, lane)
+    return x, y, z, vx, vy, vz, left, 1.0, Status.DONE.value
+
+
+@_exact.register(type(None))
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
+    remaining, hits = h, 0.0
+    for _i in range(_MOST_BOUNCES):
+        time, wall = walls.first_hit(chain, x, y, z, vx, vy, vz)
+        t = min(time, remaining)
+        x, y, z, remaining = x + t * vx, y + t * vy, z + t * vz, remaining - t
+        if not time < math.inf or remaining <= 0.0:
+            return x, y, z, vx, vy, vz, left - used, hits, Status.DONE.value
+        vx, vy, vz = _exact_reflection(chain, int(wall), x, y, z, vx, vy, vz, impulse, lane)
+        hits += 1.0
+    return x, y, z, vx, vy, vz, left, hits, Status.STALLED.value

@@ -1,0 +1,72 @@
+"""What methods with a fixed step share: whole steps, the jump over free ones, solids that a step could miss."""
+
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from .._jit import inlined, select
+from ..errors import SceneError
+from ..gravity import accelerated, displacement
+from ..particles import Particles
+from ..scene import Scene
+from ..surfaces import chain as walls
+
+# A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
+_WHOLE = 1e-6
+# More steps than this are not counted exactly.
+_MOST_STEPS = 2.0**53
+GRADIENTS = ("composite", "mean-value")
+
+
+def check_arguments(method: Any) -> None:
+    """Check and convert dt, penalty, exponent and gradient of a description."""
+    object.__setattr__(method, "dt", checks.positive("dt", method.dt))
+    object.__setattr__(method, "penalty", checks.positive("penalty", method.penalty))
+    object.__setattr__(method, "exponent", checks.at_least("exponent", method.exponent, 1.0))
+    checks.one_of("gradient", method.gradient, GRADIENTS)
+    if method.gradient == "mean-value" and method.exponent == 1.0:
+        raise SceneError(
+            'gradient must be "composite" for exponent = 1, got "mean-value": that form is the gradient of Phi at a '
+            "point of the step, and for exponent = 1 this gradient jumps at the surface, so no such point need exist"
+        )
+
+
+def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
+    """Raise a `SceneError` where the fastest particle can jump over a solid in one step."""
+    step = particles.fastest() * dt
+    for i, surface in enumerate(scene.surfaces):
+        solid = getattr(surface, "side", "inside") == "outside"
+        if solid and step > 2.0 * surface.size():
+            raise SceneError(
+                f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
+                f"fastest flies {step:.3g} m, and surfaces[{i}], {2.0 * surface.size():.3g} m thick; use "
+                f"dt < {2.0 * surface.size() / particles.fastest():.2g} s, or Impact"
+            )
+
+
+def whole_steps(name: str, duration: float, dt: float) -> float:
+    """How many steps a duration is; a `SceneError` that calls it `name` where they are not whole."""
+    if duration / dt > _MOST_STEPS:
+        raise SceneError(
+            f"{name} must be at most {_MOST_STEPS:g} steps, got {name} = {duration:g} s with dt = {dt:g} s"
+        )
+    steps = round(duration / dt)
+    if abs(duration / dt - steps) > _WHOLE:
+        raise SceneError(
+            f"{name} must be a whole number of steps, got {name} = {duration:g} s with dt = {dt:g} s, which is "
+            f"{duration / dt:.6g} steps"
+        )
+    return float(steps)
+
+
+@inlined
+def free_steps(chain, gravity, dt, x, y, z, vx, vy, vz, left):
+    """Jump over the steps that surely stay free: (x, y, z, vx, vy, vz, steps left)."""
+    # One too many by round-off starts a contact 1e-16 deep: harmless.
+    steps = np.floor(walls.free_time(gravity, chain, x, y, z, vx, vy, vz) / dt)
+    steps = select(steps < left, steps, left)
+    t = steps * dt
+    dx, dy, dz = displacement(gravity, vx, vy, vz, t)
+    vx, vy, vz = accelerated(gravity, vx, vy, vz, t)
+    return x + dx, y + dy, z + dz, vx, vy, vz, left - steps
