@@ -19,10 +19,9 @@ from . import impulse
 from . import regularisation as law_of
 
 _EPSILON = 2.220446049250313e-16
-# Iterations of the mean-value form's three solves, the innermost last; halving ends far sooner.
+# Iterations of the mean-value form's two solves; halving alone would end sooner.
 _BETA_ITERATIONS = 200
 _FORCE_ITERATIONS = 200
-_POINT_ITERATIONS = 200
 
 
 class Composite(NamedTuple):
@@ -198,25 +197,18 @@ def _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta):
 
 @outlined
 def _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa):
-    """The reaction kappa grad q(r_beta) and F(kappa); NaN where the point r_beta was not found."""
-    rx, ry, rz = 0.0, 0.0, 0.0
-    found = False
-    for _i in range(_POINT_ITERATIONS):
-        # r_beta = r0 + beta (p - kappa grad q(r_beta)): a contraction while the push is short of the curvature radius.
-        bx, by, bz = x + beta * (px - rx), y + beta * (py - ry), z + beta * (pz - rz)
-        dx, dy, dz = surfaces.inner_gradient(surface, bx, by, bz, bx, by, bz)
-        change = max(abs(kappa * dx - rx), abs(kappa * dy - ry), abs(kappa * dz - rz))
-        rx, ry, rz = kappa * dx, kappa * dy, kappa * dz
-        if change <= _EPSILON * max(abs(rx), abs(ry), abs(rz)):
-            found = True
-            break
+    """The reaction kappa grad q(r_beta) and F(kappa)."""
+    # r_beta = r0 + beta (p - kappa grad q(r_beta))
+    bx, by, bz = surfaces.resolve(surface, x + beta * px, y + beta * py, z + beta * pz, beta * kappa)
+    dx, dy, dz = surfaces.inner_gradient(surface, bx, by, bz, bx, by, bz)
+    rx, ry, rz = kappa * dx, kappa * dy, kappa * dz
     q = surfaces.inner(surface, bx, by, bz)
     slope, _curvature = surfaces.gap_slope(surface, q, q)
     f = law_of.constraint_gradient(law, surfaces.gap_of(surface, q)) * slope
     mean = 0.5 * law_of.constraint(law, _gap(surface, x, y, z))
     mean += 0.5 * law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz))
     force = law.alpha * mean + (0.0 if multiplier is None else multiplier)
-    return rx, ry, rz, kappa - c * force * f if found else math.nan
+    return rx, ry, rz, kappa - c * force * f
 
 
 # --- A root in a bracket without derivatives -------------------------------------------------------------

@@ -22,8 +22,8 @@ from . import regularisation as law_of
 
 # How the multiplier is updated and started: (8) itself, the secant, or the secant from the reflection's multiplier.
 PLAIN, SECANT, REFLECTION = 0.0, 1.0, 2.0
-# Rows of the record that a lane keeps of its loop: lambda now; (Phi0 + Phi1)/2, V and dkappa/dlambda of its step; lambda
-# and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance.
+# Rows of the record that a lane keeps of its loop: lambda now; (Phi0 + Phi1)/2, V and dkappa/dlambda of its step;
+# lambda and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance.
 MULTIPLIER, MEAN, STORED, GAIN, BEFORE, MISS, SWEEPS, UNCONVERGED, RECORDS = range(9)
 # The secant stops this part short: beyond the last multiplier the step equation has no root.
 _SHORT = 1e-3

@@ -196,6 +196,12 @@ def push(surface, x0, y0, z0, px, py, pz, kappa):
 
 
 @by_type
+def resolve(surface, x, y, z, strength):
+    """The point s with s + strength grad q(s) = r, for the mean-value form."""
+    raise NotImplementedError
+
+
+@by_type
 def rise(surface, x0, y0, z0, px, py, pz, kappa):
     """q1 - q0 = D.(r1 - r0) for the r1 of `push`, without cancellation, and its derivative by kappa."""
     raise NotImplementedError

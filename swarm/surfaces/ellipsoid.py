@@ -214,6 +214,12 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     )
 
 
+@base.resolve.register(EllipsoidNumbers)
+def _(surface, x, y, z, strength):
+    wx, wy, wz = _widths(surface, 2.0 * strength)
+    return surface.cx + wx * (x - surface.cx), surface.cy + wy * (y - surface.cy), surface.cz + wz * (z - surface.cz)
+
+
 @base.rise.register(EllipsoidNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     # s = r0 + r1 = (2 r0 + p)/(1 + kappa A) and e = r1 - r0 = (p - 2 kappa A r0)/(1 + kappa A): q1 - q0 = s.A e

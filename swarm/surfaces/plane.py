@@ -144,6 +144,11 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     return x0 + (px - kappa * surface.nx), y0 + (py - kappa * surface.ny), z0 + (pz - kappa * surface.nz)
 
 
+@base.resolve.register(PlaneNumbers)
+def _(surface, x, y, z, strength):
+    return x - strength * surface.nx, y - strength * surface.ny, z - strength * surface.nz
+
+
 @base.rise.register(PlaneNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     return base.inner(surface, px, py, pz) - kappa, -1.0

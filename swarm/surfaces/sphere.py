@@ -181,6 +181,12 @@ def _(surface, x0, y0, z0, px, py, pz, kappa):
     )
 
 
+@base.resolve.register(SphereNumbers)
+def _(surface, x, y, z, strength):
+    w = 1.0 / (1.0 + 2.0 * strength)
+    return surface.cx + w * (x - surface.cx), surface.cy + w * (y - surface.cy), surface.cz + w * (z - surface.cz)
+
+
 @base.rise.register(SphereNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     # r0 + r1 = (2 r0 + p)/(1 + kappa) and r1 - r0 = (p - 2 kappa r0)/(1 + kappa), relative to the centre, so
