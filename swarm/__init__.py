@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .particles import Particles
     from .scene import Scene
     from .simulation import Frame, Result, simulate
-    from .surfaces import Ellipsoid, Plane, Sphere
+    from .surfaces import Ellipsoid, Plane, Sphere, Torus
 
 __version__ = VERSION
 
@@ -30,7 +30,7 @@ _HOMES = {
     "particles": ("Particles",),
     "scene": ("Scene",),
     "simulation": ("Frame", "Result", "simulate"),
-    "surfaces": ("Ellipsoid", "Plane", "Sphere"),
+    "surfaces": ("Ellipsoid", "Plane", "Sphere", "Torus"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -50,6 +50,7 @@ __all__ = [
     "SceneError",
     "Sphere",
     "SwarmError",
+    "Torus",
     "Trajectory",
     "__version__",
     "contact_history",

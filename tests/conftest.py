@@ -29,8 +29,12 @@ SURFACES = {
     "ball": lambda s=1.0: swarm.Sphere(0.7 * s, (0.2 * s, -0.3 * s, 0.1 * s), side="outside"),
     "ellipsoid": lambda s=1.0: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s)),
     "egg": lambda s=1.0: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s), "outside"),
+    "torus": lambda s=1.0: swarm.Torus(0.7 * s, 0.3 * s, (0.2 * s, -0.1 * s, 0.1 * s)),
+    "ring": lambda s=1.0: swarm.Torus(0.7 * s, 0.3 * s, (0.2 * s, -0.1 * s, 0.1 * s), "outside"),
     "plane": lambda s=1.0: swarm.Plane((1.0, -2.0, 0.5), 0.3 * s),
 }
+# Those whose flight has a polynomial, and whose push has a closed form for any step.
+QUADRICS = [name for name in SURFACES if name not in ("torus", "ring")]
 METHODS = {
     "impact": swarm.Impact(),
     "impact, chord": swarm.Impact(contact_step=1e-3),
@@ -40,6 +44,7 @@ METHODS = {
 LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 4.0, 12.0)}
 
 every_surface = pytest.mark.parametrize("name", SURFACES)
+every_quadric = pytest.mark.parametrize("name", QUADRICS)
 every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 
 _unit = st.floats(-1.0, 1.0, allow_subnormal=False)

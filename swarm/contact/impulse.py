@@ -23,6 +23,8 @@ _LOOP_TOLERANCE = 1e-2
 # Steps of the vectorised solve; what needs more goes the careful way.
 NEWTON_STEPS = 8
 _CAREFUL_ITERATIONS = 200
+# A push this near to its farthest has no root before it.
+_NEAR = 1.0 - 1e-12
 # Doublings of a bracket: from the smallest number to the largest.
 _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
@@ -194,6 +196,8 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
         if sign * f >= 0.0:
             bracketed = True
             break
+        if not (abs(f) < math.inf and high < _NEAR * farthest):
+            break
         low, high = high, min(2.0 * high, 0.5 * (high + farthest))
     k, previous = low, math.inf
     for _i in range(_CAREFUL_ITERATIONS):
@@ -201,8 +205,8 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
             law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign * k
         )
         f = sign * f
-        if f == 0.0:
-            return sign * k, bracketed
+        if f == 0.0 or not abs(f) < math.inf:
+            return sign * k, bracketed and f == 0.0
         if f < 0.0:
             low = k
         else:

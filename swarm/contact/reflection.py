@@ -4,6 +4,8 @@ v1 = v0 - 2 (v0.n) n with n parallel to D(r0, r1), r1 = r0 + h (v0 + v1)/2: it k
 Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0.
 """
 
+import math
+
 from .._jit import inlined, outlined, select
 from ..surfaces import chain as walls
 
@@ -39,6 +41,6 @@ def chord(chain, surface, x, y, z, px, py, pz):
     kappa = walls.chord_guess(chain, surface, x, y, z, px, py, pz)
     for _sweep in range(walls.chord_sweeps(chain)):
         kappa, more = chord_step(chain, surface, x, y, z, px, py, pz, kappa)
-        if not more:
+        if not more or math.isnan(kappa):
             break
     return kappa

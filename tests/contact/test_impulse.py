@@ -5,7 +5,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from conftest import EPSILON, LAWS, call, directions, every_surface, numbers_of, wall_point
+from conftest import EPSILON, LAWS, call, directions, every_quadric, numbers_of, wall_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -88,7 +88,7 @@ class Step:
         return call(impulse.careful, self.law, None, self.surface, self.start, self.free, self.c)
 
 
-@every_surface
+@every_quadric
 @some_laws
 @given(**steps)
 def test_careful_solves_the_equation(name, law, **step):
@@ -98,7 +98,7 @@ def test_careful_solves_the_equation(name, law, **step):
     assert abs(step.residual(kappa)) <= 8 * EPSILON * abs(kappa) + step.slack()
 
 
-@every_surface
+@every_quadric
 @some_laws
 @settings(max_examples=10)
 @given(**steps)
@@ -113,7 +113,7 @@ def test_careful_finds_the_smallest_root(name, law, **step):
         assert all(mp.sign(step.residual(kappa * part)) == sign for part in np.linspace(0.01, 0.99, 25))
 
 
-@every_surface
+@every_quadric
 @some_laws
 @given(**steps)
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
@@ -132,7 +132,7 @@ def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
         assert expected == 0.0 or step.c * law.alpha * np.linalg.norm(step.inner_slope(step.start)) ** 2 > 0.5
 
 
-@every_surface
+@every_quadric
 @some_laws
 def test_a_free_step_has_no_impulse(name, law):
     step = Step(name, law, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0]), -0.5, 0.05, 0.1, 30.0)
@@ -151,7 +151,7 @@ def test_a_head_on_plane_by_hand(law):
         assert kappa == pytest.approx(half * (2 * g0 + p) / (1 + half), rel=8 * EPSILON)
 
 
-@every_surface
+@every_quadric
 @some_laws
 @settings(max_examples=60)
 @given(

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from conftest import (
     EPSILON,
+    QUADRICS,
     SURFACES,
     call,
     chord_of,
     directions,
+    every_quadric,
     every_surface,
     gap,
     numbers_of,
@@ -195,7 +197,7 @@ flights = {
 }
 
 
-@every_surface
+@every_quadric
 @given(**flights)
 def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
     """Against the exact quadratic: nothing outside before the hit, on the wall and on the way out at it."""
@@ -250,7 +252,7 @@ def test_from_the_wall_the_direction_decides(name, depth):
     assert call(base.first_hit, surface, position, -velocity) > 0.1
 
 
-@every_surface
+@every_quadric
 @given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
@@ -268,7 +270,7 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
         assert time > 0.0
 
 
-@every_surface
+@every_quadric
 @settings(max_examples=10)
 @given(point=directions, direction=directions, pull=directions, lean=st.floats(0.3, 1.0))
 def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
@@ -360,6 +362,8 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     discrete = np.array(call(base.inner_gradient, surface, point, end))
     terms = abs(discrete) @ abs(free) + abs(kappa) * discrete @ discrete
     assert abs(rise - discrete @ (free - kappa * discrete)) <= 32 * EPSILON * terms
+    if name not in QUADRICS:
+        return  # there the derivative is that of a D that does not turn
     step = 1e-6 * scale / steep
     change = call(base.rise, surface, point, free, kappa + step)[0]
     change -= call(base.rise, surface, point, free, kappa - step)[0]
@@ -373,6 +377,8 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
     size = min(SURFACES[name](scale).size(), scale)
+    # A torus is pushed by an iteration, which a step of its size need not contract.
+    size *= 1.0 if name in QUADRICS else 0.3
     free = length * size * direction / np.linalg.norm(direction)
     normal = np.array(call(base.chord_normal, surface, wall, free, chord_of(surface, wall, free)))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
@@ -438,5 +444,5 @@ def test_bounds_hold_the_admissible_side(name):
     admissible = points[:, side * surface.phi(points) <= 0.0]
     assert admissible.shape[1] > 10
     assert ((admissible >= low) & (admissible <= high)).all()
-    assert np.isfinite(high - low).all() == (name in {"sphere", "ellipsoid"})
+    assert np.isfinite(high - low).all() == (name in {"sphere", "ellipsoid", "torus"})
     assert np.isfinite(surface.size()) == (name != "plane")

@@ -1,0 +1,1 @@
+"""Scripts and scenes, all of them run by the tests."""
