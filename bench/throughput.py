@@ -58,7 +58,17 @@ def advance_seconds(
     scene: swarm.Scene, method: swarm.Impact | swarm.Penalty, n: int, until: float, threads: int = 1
 ) -> Callable[[], tuple[float, int]]:
     """A measurement: seconds of the kernels for one frame of `until`, and impacts."""
-    particles = swarm.fill(scene, n, speed=SPEED, seed=1)
+    return advance_of(scene, swarm.fill(scene, n, speed=SPEED, seed=1), method, until, threads)
+
+
+def advance_of(
+    scene: swarm.Scene,
+    particles: swarm.Particles,
+    method: swarm.Impact | swarm.Penalty,
+    until: float,
+    threads: int = 1,
+) -> Callable[[], tuple[float, int]]:
+    """The same for these particles."""
     span = method.span("until", until)
 
     def measure() -> tuple[float, int]:
@@ -71,25 +81,58 @@ def advance_seconds(
     return measure
 
 
+def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
+    """Seconds an impact."""
+    seconds, count = measure()
+    return seconds / count
+
+
 def impacts(n: int, repeats: int, bare: float) -> list[Row]:
     """Nanoseconds per impact."""
     cases = [
         ("Impact, sphere", SPHERE, swarm.Impact(), "6"),
         ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "7.5"),
         ("Impact, sphere and two planes", SLICE, swarm.Impact(), "8"),
-        ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), ""),
-        ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), ""),
+        ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), "10"),
+        ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), "14"),
     ]
     rows = []
     for what, scene, method, bar in cases:
         measure = advance_seconds(scene, method, n, until=100.0)
-
-        def nanoseconds(measure: Callable[[], tuple[float, int]] = measure) -> float:
-            seconds, count = measure()
-            return seconds / count * 1e9
-
-        best, median = repeated(nanoseconds, repeats)
+        best, median = repeated(lambda measure=measure: per_impact(measure) * 1e9, repeats)
         rows.append(Row(what, best, median, "ns/impact", bar, best / bare if bare else None))
+    return rows
+
+
+def multipliers(n: int, repeats: int) -> list[Row]:
+    """The augmented Lagrangian in State I: particles through the centre of a sphere, whose contacts are all alike."""
+    random = np.random.default_rng(1)
+    directions = random.standard_normal((3, n))
+    directions /= np.sqrt((directions**2).sum(axis=0))
+    particles = swarm.Particles(0.2 * directions, SPEED * directions)
+    rows = []
+    cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "150"), ("none", 1e-28, "")]
+    until, dt = 40.0, 0.025
+    for acceleration, tolerance, bar in cases:
+        method = swarm.AugmentedLagrangian(
+            dt=dt, penalty=1e4, tolerance=tolerance, adaptive=True, acceleration=acceleration
+        )
+        times, sweeps = [], 0.0
+        for _ in range(repeats):
+            with simulation.Run(SPHERE, particles, method, 1, None) as run:
+                run.advance(0.0, 0.0)
+                start = time.perf_counter()
+                run.advance(until, until)
+                seconds = time.perf_counter() - start
+                counts = run.state.multipliers
+                assert counts is not None
+                times.append(seconds / counts.contacts.sum() * 1e9)
+                sweeps = float(counts.sweeps.sum() / counts.contacts.sum())
+        what = f'Uzawa, State I, sphere, V <= {tolerance:g}, "{acceleration}": {sweeps:.1f} sweeps'
+        rows.append(Row(what, min(times), statistics.median(times), "ns/contact", bar))
+    chord = advance_of(SPHERE, particles, swarm.Impact(contact_step=dt), until)
+    best, median = repeated(lambda: per_impact(chord) * 1e9, repeats)
+    rows.append(Row("  the same contacts by Impact(contact_step=dt)", best, median, "ns/contact"))
     return rows
 
 
@@ -228,6 +271,7 @@ def main(quick: bool) -> None:
     bare = yardstick.bare_impact(quick)
     rows = [Row("bare loop in C, sphere", min(bare), statistics.median(bare), "ns/impact", "", 1.0)] if bare else []
     rows += impacts(n, repeats, min(bare, default=0.0))
+    rows += multipliers(n // 5, repeats)
     rows += two_threads(n, repeats)
     rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
     rows += overhead(50 if quick else 1_000, repeats)
@@ -255,10 +299,10 @@ def show(rows: list[Row]) -> None:
     print(
         f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
     )
-    print(f"{'':<62}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
+    print(f"{'':<66}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
     for row in rows:
         ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
-        print(f"{row.what:<62}{row.best:>10.3g}{row.median:>10.3g}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
+        print(f"{row.what:<66}{row.best:>10.3g}{row.median:>10.3g}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
 
 
 def write(rows: list[Row]) -> None:

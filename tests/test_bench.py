@@ -15,5 +15,12 @@ def test_throughput_quick():
         [sys.executable, "-m", "bench", "throughput", "--quick"], cwd=root, capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr
-    for row in ("Impact, sphere ", "two threads over one", "Penalty, sphere, dt=0.025", "memory", "first frame"):
+    for row in (
+        "Impact, sphere ",
+        "two threads over one",
+        "Penalty, sphere, dt=0.025",
+        "Uzawa, State I",
+        "memory",
+        "first frame",
+    ):
         assert row in done.stdout

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import swarm
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
@@ -39,3 +41,13 @@ def test_ci_runs_the_readme_test_command():
     assert "python -m pytest\n" in README
     assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
     assert "python -m pytest -q\n" in ci
+
+
+def test_the_second_block_runs_after_the_first(capsys):
+    block = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    names = {"swarm": swarm, "scene": scene}
+    exec(block, names)
+    assert names["history"].converged
+    assert len(names["history"]) == 13
+    assert capsys.readouterr().out.startswith("True")
