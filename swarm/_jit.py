@@ -135,3 +135,13 @@ def select(condition: Any, first: Any, second: Any) -> Any:
 @overload(select, jit_options=_INLINE)
 def _compiled_select(condition, first, second):
     return lambda condition, first, second: _select(condition, first, second)  # type: ignore[call-arg]
+
+
+@inlined
+def kept(value: Any) -> Any:
+    """A value from an array that a select may write back unchanged to its place.
+
+    Of such a select LLVM makes a masked store, which costs AMD's processors some ten times an ordinary one (measured: 18
+    instead of 12 ns an impact with a contact step). An addition of 0 hides the origin of the value.
+    """
+    return value + 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import Array, by_type, by_type_outlined, inlined, kernel, select
+from ._jit import Array, by_type, by_type_outlined, inlined, kept, kernel, select
 from .contact.uzawa import BEFORE, GAIN, MEAN, MISS, MULTIPLIER, RECORDS, STORED, SWEEPS, UNCONVERGED
 from .gravity import Nothing
 from .methods import base as methods
@@ -37,6 +37,7 @@ class Lanes(NamedTuple):
     unsolved: Array  # bool, whether its solve goes on
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
+    turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
 
 
@@ -54,6 +55,7 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         np.zeros(_STRIDE, np.bool_),
         np.zeros(_STRIDE, np.bool_),
         np.zeros((RECORDS, _STRIDE)),
+        np.zeros((4, _STRIDE)),
         np.empty(_STRIDE, np.int64),
     )
     live = min(_LANES, stop - start)
@@ -193,13 +195,13 @@ def _update_multipliers(method, lanes, live):
     rows, record, kappa, unsolved, sweeping = lanes.rows, lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
     remaining = 0
     for i in range(live):
-        old = record[MULTIPLIER, i]
+        old = kept(record[MULTIPLIER, i])
         new, miss, more = methods.next_multiplier(
             method, rows[_LEFT, i], old, record[MEAN, i], record[STORED, i], record[BEFORE, i], record[MISS, i]
         )
         going = sweeping[i]
-        record[BEFORE, i] = select(going, old, record[BEFORE, i])
-        record[MISS, i] = select(going, miss, record[MISS, i])
+        record[BEFORE, i] = select(going, old, kept(record[BEFORE, i]))
+        record[MISS, i] = select(going, miss, kept(record[MISS, i]))
         record[SWEEPS, i] += select(going, 1.0, 0.0)
         # What the inner solve left unsolved is for the careful way, at once.
         going = going & more & (not unsolved[i])
@@ -224,12 +226,12 @@ def _newton(method, chain, gravity, lanes, live):
             kappa[i], unsolved[i], mean, stored, gain = methods.improve(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
-                rows[_LEFT, i], rows[_K0, i], surface[i], kappa[i], going, record[MULTIPLIER, i],
+                rows[_LEFT, i], rows[_K0, i], surface[i], kept(kappa[i]), going, record[MULTIPLIER, i],
             )  # fmt: skip
             if methods.has_multiplier(method):
-                record[MEAN, i] = select(going, mean, record[MEAN, i])
-                record[STORED, i] = select(going, stored, record[STORED, i])
-                record[GAIN, i] = select(going, gain, record[GAIN, i])
+                record[MEAN, i] = select(going, mean, kept(record[MEAN, i]))
+                record[STORED, i] = select(going, stored, kept(record[STORED, i]))
+                record[GAIN, i] = select(going, gain, kept(record[GAIN, i]))
             remaining += unsolved[i]
         if remaining == 0:
             break
@@ -271,12 +273,24 @@ def _contact(method, chain, gravity, lanes, live):
     """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
     rows, surface = lanes.rows, lanes.surface
     impulse, kappa, unsolved = lanes.impulse, lanes.kappa, lanes.unsolved
+    turned = lanes.turned
     retired, hard_lanes = 0, 0
+    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
+    if methods.turns(method):
+        for i in range(live):
+            turned[0, i], turned[1, i], turned[2, i], turned[3, i] = methods.turn(
+                method, chain, gravity,
+                rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
+                rows[_LEFT, i], rows[_K0, i], rows[_K1, i], surface[i], kappa[i],
+            )  # fmt: skip
     for i in range(live):
+        if methods.turns(method):
+            tx, ty, tz, given = turned[0, i], turned[1, i], turned[2, i], turned[3, i]
         x, y, z, vx, vy, vz, left, wall, given, hits = methods.contact(
             method, chain, gravity,
             rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
             rows[_LEFT, i], rows[_K0, i], rows[_K1, i], rows[_K2, i], surface[i], kappa[i], unsolved[i],
+            tx, ty, tz, given,
         )  # fmt: skip
         rows[_X, i], rows[_Y, i], rows[_Z, i] = x, y, z
         rows[_VX, i], rows[_VY, i], rows[_VZ, i] = vx, vy, vz

@@ -10,7 +10,7 @@ from .._jit import inlined, outlined, select
 from ..surfaces import chain as walls
 
 # A Newton step of the chord this small, relative to kappa, is the last: its square is below round-off.
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-7
 
 
 @inlined

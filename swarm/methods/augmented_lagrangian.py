@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from .._jit import by_type, by_type_outlined, outlined, select
+from .._jit import by_type, by_type_outlined, kept, outlined, select
 from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -268,7 +268,7 @@ def _(method, left, multiplier, mean, stored, multiplier_before, miss_before):
 
 
 @base.contact.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
     h, used, _law = _step(method.adaptive, method, left)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
@@ -291,12 +291,12 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     loose = (left > 0.0) & (surface > base.HARD) & (not touching)
     ex, ey, ez = accelerated(gravity, vx, vy, vz, h)
     return (
-        select(step, x1, select(loose, x + px, x)),
-        select(step, y1, select(loose, y + py, y)),
-        select(step, z1, select(loose, z + pz, z)),
-        select(step, wx * factor, select(loose, ex, vx)),
-        select(step, wy * factor, select(loose, ey, vy)),
-        select(step, wz * factor, select(loose, ez, vz)),
+        select(step, x1, select(loose, x + px, kept(x))),
+        select(step, y1, select(loose, y + py, kept(y))),
+        select(step, z1, select(loose, z + pz, kept(z))),
+        select(step, wx * factor, select(loose, ex, kept(vx))),
+        select(step, wy * factor, select(loose, ey, kept(vy))),
+        select(step, wz * factor, select(loose, ez, kept(vz))),
         left - select(step | loose, used, 0.0),
         select(touching & (not solved), base.HARD - surface, surface),
         select(step, given, 0.0),

@@ -119,8 +119,24 @@ def next_multiplier(method, left, multiplier, mean, stored, multiplier_before, m
 
 
 @by_type
-def contact(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
+def turns(method):
+    """Whether `turn` runs before `contact`, as one loop of both would be too long: a constant for the compiler."""
+    return False
+
+
+@by_type
+def turn(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, surface, kappa):
+    """The velocity after the contact with `surface` and its impulse per mass, for `contact`."""
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@by_type
+def contact(
+    method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned
+):
     """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits).
+
+    (tx, ty, tz, turned) is what `turn` found.
 
     `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts. A `surface` that is HARD
     already passes through and nothing else changes; to become hard, return `HARD - surface`. `unsolved` says that the

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
-from .._jit import by_type, select
+from .._jit import by_type, inlined, kept, select
 from ..contact.reflection import chord, chord_step, reflect
 from ..errors import SceneError
 from ..particles import Particles
@@ -91,45 +91,6 @@ def _(method, mass, energy, vx, vy, vz):
     return speed2, select(moving, 0.5 / safe, 0.0), select(moving, shortest, 0.0)
 
 
-@by_type
-def _contact(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
-    """The contact step from r on `surface`: (x, y, z, vx, vy, vz, time used, impulse)."""
-    raise NotImplementedError
-
-
-@_contact.register(type(None))
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
-    nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
-    return x, y, z, wx, wy, wz, 0.0, impulse
-
-
-@_contact.register(float)
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa, unsolved):
-    h = select(contact_step < left, contact_step, left)
-    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
-    cx, cy, cz, chord_impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
-    # (v0 + v1)/2 = (r1 - r0)/h
-    ux, uy, uz = 0.5 * (vx + cx), 0.5 * (vy + cy), 0.5 * (vz + cz)
-    # A chord that another wall would cut, that a solid does not oppose (the free flight of length h ends outside it
-    # again), or that was not found, gives way to the exact reflection.
-    cut, _other = walls.other_hit(chain, surface, x, y, z, ux, uy, uz)
-    chord = (chord_impulse > 0.0) & (cut > h) & (not unsolved)
-    ox, oy, oz = walls.settle(chain, surface, x + h * ux, y + h * uy, z + h * uz)
-    nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
-    return (
-        select(chord, ox, x),
-        select(chord, oy, y),
-        select(chord, oz, z),
-        select(chord, cx, wx),
-        select(chord, cy, wy),
-        select(chord, cz, wz),
-        select(chord, h, 0.0),
-        select(chord, chord_impulse, impulse),
-    )
-
-
 @base.flight.register(ImpactNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
     time, surface = walls.first_hit(chain, x, y, z, vx, vy, vz)
@@ -189,39 +150,126 @@ def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, kappa, unsolved):
     return select(unsolved, better, kappa), unsolved & more
 
 
+@base.turns.register(ImpactNumbers)
+def _(method):
+    return _turns(method.contact_step)
+
+
+@by_type
+def _turns(contact_step):
+    return False
+
+
+@_turns.register(float)
+def _(contact_step):
+    return True
+
+
+@base.turn.register(ImpactNumbers)
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, surface, kappa):
+    return _turn(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa)
+
+
+@by_type
+def _turn(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa):
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@_turn.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, kappa):
+    h = select(contact_step < left, contact_step, left)
+    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
+    return reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+
+
 @base.contact.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved):
-    sx, sy, sz, wx, wy, wz, used, impulse = _contact(
-        method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, unsolved
-    )
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
+    return _lane(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, unsolved, tx, ty, tz, turned)
+
+
+@by_type
+def _lane(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, unsolved, tx, ty, tz, turned):
+    """The contact of one lane."""
+    raise NotImplementedError
+
+
+@_lane.register(type(None))
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, unsolved, tx, ty, tz, turned):
+    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
     hit = surface >= 0.0
     return (
-        select(hit, sx, x),
-        select(hit, sy, y),
-        select(hit, sz, z),
-        select(hit, wx, vx),
-        select(hit, wy, vy),
-        select(hit, wz, vz),
-        left - select(hit, used, 0.0),
+        x,
+        y,
+        z,
+        select(hit, wx, kept(vx)),
+        select(hit, wy, kept(vy)),
+        select(hit, wz, kept(vz)),
+        left,
         surface,
         select(hit, impulse, 0.0),
         select(hit, 1.0, 0.0),
     )
 
 
+@_lane.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, unsolved, tx, ty, tz, turned):
+    h = select(contact_step < left, contact_step, left)
+    ox, oy, oz, stays = _along(chain, surface, x, y, z, vx, vy, vz, tx, ty, tz, h)
+    hit = surface >= 0.0
+    chord = hit & stays & (turned > 0.0) & (not unsolved)
+    return (
+        select(chord, ox, kept(x)),
+        select(chord, oy, kept(y)),
+        select(chord, oz, kept(z)),
+        select(chord, tx, kept(vx)),
+        select(chord, ty, kept(vy)),
+        select(chord, tz, kept(vz)),
+        left - select(chord, h, 0.0),
+        select(hit & (not chord), base.HARD - surface, surface),
+        select(chord, turned, 0.0),
+        select(chord, 1.0, 0.0),
+    )
+
+
+@inlined
+def _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse):
+    """The exact reflection: velocity and impulse per mass."""
+    nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
+    return reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+
+
+@inlined
+def _along(chain, surface, x, y, z, vx, vy, vz, wx, wy, wz, h):
+    """The end of the chord step, (v0 + v1)/2 = (r1 - r0)/h, and whether no other wall cuts it."""
+    ux, uy, uz = 0.5 * (vx + wx), 0.5 * (vy + wy), 0.5 * (vz + wz)
+    cut, _other = walls.other_hit(chain, surface, x, y, z, ux, uy, uz)
+    ox, oy, oz = walls.settle(chain, surface, x + h * ux, y + h * uy, z + h * uz)
+    return ox, oy, oz, cut > h
+
+
 # --- Grazing ---------------------------------------------------------------------------------------------
 
 
 @by_type
-def _chord(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
-    """kappa of the contact step, for one particle."""
-    return 0.0
+def _contact(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
+    """The contact step of one particle: (x, y, z, vx, vy, vz, time used, impulse)."""
+    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
+    return x, y, z, wx, wy, wz, 0.0, impulse
 
 
-@_chord.register(float)
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left):
+@_contact.register(float)
+def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
     h = min(contact_step, left)
-    return chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
+    kappa = chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
+    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
+    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
+    ox, oy, oz, stays = _along(chain, surface, x, y, z, vx, vy, vz, wx, wy, wz, h)
+    if stays and impulse > 0.0:
+        return ox, oy, oz, wx, wy, wz, h, impulse
+    # A chord that another wall would cut, or that a solid does not oppose (the free flight of length h ends outside it
+    # again), gives way to the exact reflection.
+    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
+    return x, y, z, wx, wy, wz, 0.0, impulse
 
 
 @base.hard_pass.register(ImpactNumbers)
@@ -243,17 +291,15 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
             return x, y, z, ax, ay, az, left, 1.0, Status.DONE.value
         # Half way to the other wall at most: the chord bends towards the inside, and what is left halves.
         h = min(k2, left, 0.5 * cut)
-        kappa = chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
-        x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, False)
+        x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1)
         ex, ey, ez = x + h * wx, y + h * wy, z + h * wz
         cut, other = walls.other_hit(chain, surface, x, y, z, wx, wy, wz)
         if used == 0.0 and cut > h and not walls.outside(chain, -1.0, ex, ey, ez):
             # The wall curves away from the flight (a solid that is only touched): the sign of v.n is round-off.
             x, y, z, used = ex, ey, ez, h
     else:
-        kappa = _chord(method.contact_step, chain, surface, x, y, z, vx, vy, vz, left)
         x, y, z, wx, wy, wz, used, given = _contact(
-            method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, kappa, False
+            method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1
         )
     impulse[int(surface), lane] += given
     return x, y, z, wx, wy, wz, left - used, 1.0, Status.DONE.value

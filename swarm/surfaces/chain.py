@@ -78,19 +78,45 @@ def _(chain, index, x, y, z, vx, vy, vz):
 
 @by_type
 def other_hit(chain, index, x, y, z, vx, vy, vz):
-    """Time and index of the first hit with any surface but `index`."""
+    """Time and index of the first hit with any surface but `index`, which is one of the chain's."""
     raise NotImplementedError
 
 
 @other_hit.register(Chain)
 def _(chain, index, x, y, z, vx, vy, vz):
+    return _other_hit(chain.rest, chain, index, x, y, z, vx, vy, vz)
+
+
+@by_type
+def _other_hit(rest, chain, index, x, y, z, vx, vy, vz):
+    raise NotImplementedError
+
+
+@_other_hit.register(Nothing)
+def _(rest, chain, index, x, y, z, vx, vy, vz):
+    # The only surface has no other: without this the compiler would compute its hit and throw it away at run time.
+    return math.inf, 0.0
+
+
+@_other_hit.register(Chain)
+def _(rest, chain, index, x, y, z, vx, vy, vz):
+    return _hit_but(chain, index, x, y, z, vx, vy, vz)
+
+
+@by_type
+def _hit_but(chain, index, x, y, z, vx, vy, vz):
+    raise NotImplementedError
+
+
+@_hit_but.register(Chain)
+def _(chain, index, x, y, z, vx, vy, vz):
     time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
-    later, found = other_hit(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
+    later, found = _hit_but(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
     use = (later < time) | (index == 0.0)
     return select(use, later, time), select(use, found + 1.0, 0.0)
 
 
-@other_hit.register(Nothing)
+@_hit_but.register(Nothing)
 def _(chain, index, x, y, z, vx, vy, vz):
     return math.inf, 0.0
 

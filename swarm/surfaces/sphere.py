@@ -209,5 +209,7 @@ def _(surface):
 @base.settle.register(SphereNumbers)
 def _(surface, x, y, z):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    f = (dx * dx + dy * dy + dz * dz - surface.radius2) / (2.0 * surface.radius2)
+    # 1/(2 R^2)
+    k = 0.5 * surface.curvature * surface.curvature
+    f = (dx * dx + dy * dy + dz * dz - surface.radius2) * k
     return x - f * dx, y - f * dy, z - f * dz

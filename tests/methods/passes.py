@@ -49,8 +49,11 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
         kappa, unsolved, *_loop = call(
             base.improve, numbers, chain, gravity, *state, left, constants[0], surface, kappa, unsolved, 0.0
         )
+    turned = (0.0, 0.0, 0.0, 0.0)
+    if base.turns(numbers):
+        turned = call(base.turn, numbers, chain, gravity, *state, left, *constants[:2], surface, kappa)
     *state, left, surface, given, hits = call(
-        base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, unsolved
+        base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, unsolved, *turned
     )
     impulse = np.zeros((len(scene.surfaces), 1))
     hard = surface <= base.HARD
