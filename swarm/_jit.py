@@ -141,7 +141,7 @@ def _compiled_select(condition, first, second):
 def kept(value: Any) -> Any:
     """A value from an array that a select may write back unchanged to its place.
 
-    Of such a select LLVM makes a masked store, which costs AMD's processors some ten times an ordinary one (measured: 18
+    Of such a select LLVM makes a masked store, which costs AMD processors some ten times an ordinary one (measured: 18
     instead of 12 ns an impact with a contact step). An addition of 0 hides the origin of the value.
     """
     return value + 0.0

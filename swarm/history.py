@@ -81,12 +81,15 @@ def contact_history(
     >>> len(history), history.converged
     (13, True)
     """
+    for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
+        if not isinstance(value, kind):
+            raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
     particle = Particles(np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64), mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
     method.check(scene, particle)
-    start = [*particle.position[:, 0].tolist(), *particle.velocity[:, 0].tolist()]
-    # Plain Python runs the functions that kernels are made of; there a division by zero is an infinity.
+    # Plain Python runs the functions that kernels are made of; with NumPy's numbers 1/0 is an infinity there too.
+    start = [*particle.position[:, 0], *particle.velocity[:, 0]]
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
             if method.adaptive:
@@ -105,7 +108,7 @@ class _Rows:
     def __init__(self, scene: Scene, start: list[float], mass: float, h: float) -> None:
         self._scene, self._start, self._mass, self._h = scene, start, mass, h
         self.free = displacement(scene.pull(), *start[3:], h)
-        self.c = h * h / (2.0 * mass)
+        self.c = np.float64(h * h / (2.0 * mass))
         self._rows: list[tuple[Any, ...]] = []
 
     def add(self, multiplier: Floats, mean: Floats, reactions: Floats, stored: float) -> None:
@@ -132,8 +135,8 @@ def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
     time, surface = walls.first_hit(chain, *start)
     if not np.isfinite(time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start[3:])}, which never does")
-    place = [r + float(time) * v for r, v in zip(start[:3], start[3:], strict=True)]
-    return [*map(float, walls.settle(chain, surface, *place)), *start[3:]]
+    place = [r + time * v for r, v in zip(start[:3], start[3:], strict=True)]
+    return [*walls.settle(chain, surface, *place), *start[3:]]
 
 
 def _uzawa(scene: Scene, start: list[float], mass: float, method: AugmentedLagrangian) -> ContactHistory:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import Array, by_type, by_type_outlined, inlined, kept, kernel, select
-from .contact.uzawa import BEFORE, GAIN, MEAN, MISS, MULTIPLIER, RECORDS, STORED, SWEEPS, UNCONVERGED
+from .contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, RECORDS, STORED, SWEEPS, UNCONVERGED
 from .gravity import Nothing
 from .methods import base as methods
 from .particles import Multipliers
@@ -171,7 +171,7 @@ def _solve(method, chain, gravity, lanes, live):
             )  # fmt: skip
     if methods.has_multiplier(method):
         for i in range(live):
-            record[MULTIPLIER, i], kappa[i] = methods.first_multiplier(
+            record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
                 method, chain, gravity,
                 rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
                 rows[_LEFT, i], rows[_K0, i], surface[i], kappa[i],
@@ -197,7 +197,14 @@ def _update_multipliers(method, lanes, live):
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
         new, miss, more = methods.next_multiplier(
-            method, rows[_LEFT, i], old, record[MEAN, i], record[STORED, i], record[BEFORE, i], record[MISS, i]
+            method,
+            rows[_LEFT, i],
+            record[ACCELERATION, i],
+            old,
+            record[MEAN, i],
+            record[STORED, i],
+            record[BEFORE, i],
+            record[MISS, i],
         )
         going = sweeping[i]
         record[BEFORE, i] = select(going, old, kept(record[BEFORE, i]))

@@ -21,6 +21,10 @@ from . import regularisation as law_of
 _EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
 _BETA_ITERATIONS = 200
+# Parts of a step in which a beta is looked for.
+_PARTS = 16
+# How well, relative to Phi1 - Phi0, the identity must be met.
+_MET = 1e-12
 _FORCE_ITERATIONS = 200
 
 
@@ -90,17 +94,22 @@ def constraint_gradient(law, surface, x, y, z):
 @outlined
 def mean_value(law, surface, x0, y0, z0, x1, y1, z1):
     """D = grad Phi(r_beta), r_beta = (1 - beta) r0 + beta r1, and beta (NaN if none was found)."""
-    low, high = 0.0, 1.0
-    f_low = _identity(law, surface, x0, y0, z0, x1, y1, z1, low)
-    f_high = _identity(law, surface, x0, y0, z0, x1, y1, z1, high)
+    # Phi need not be convex along the step: the first part of it whose ends miss to different sides.
+    low, f_low = 0.0, _identity(law, surface, x0, y0, z0, x1, y1, z1, 0.0)
+    high, f_high = low, f_low
+    for i in range(_PARTS):
+        if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
+            break
+        low, f_low, high = high, f_high, (i + 1.0) / _PARTS
+        f_high = _identity(law, surface, x0, y0, z0, x1, y1, z1, high)
     beta = low if f_low == 0.0 else high if f_high == 0.0 else math.nan
     if f_low * f_high < 0.0:
         for _i in range(_BETA_ITERATIONS):
             beta = _illinois(low, f_low, high, f_high)
             f = _identity(law, surface, x0, y0, z0, x1, y1, z1, beta)
-            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
             if f == 0.0 or high - low <= 2.0 * _EPSILON:
                 break
+            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
     dx, dy, dz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
     return dx, dy, dz, beta
 
@@ -118,10 +127,14 @@ def _gap(surface, x, y, z):
 
 @outlined
 def _identity(law, surface, x0, y0, z0, x1, y1, z1, beta):
-    """grad Phi(r_beta).(r1 - r0) - (Phi1 - Phi0)"""
-    dx, dy, dz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
-    rise = law_of.constraint(law, _gap(surface, x1, y1, z1)) - law_of.constraint(law, _gap(surface, x0, y0, z0))
-    return dx * (x1 - x0) + dy * (y1 - y0) + dz * (z1 - z0) - rise
+    """grad Phi(r_beta).(r1 - r0) - (Phi1 - Phi0); 0 where that is round-off."""
+    dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
+    gx, gy, gz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
+    # The composite form has the difference without cancellation.
+    cx, cy, cz = composite(law, surface, x0, y0, z0, x1, y1, z1)
+    miss = (gx - cx) * dx + (gy - cy) * dy + (gz - cz) * dz
+    terms = (abs(gx) + abs(cx)) * abs(dx) + (abs(gy) + abs(cy)) * abs(dy) + (abs(gz) + abs(cz)) * abs(dz)
+    return 0.0 if abs(miss) <= 16.0 * _EPSILON * terms else miss
 
 
 # --- A step that one wall holds back ---------------------------------------------------------------------
@@ -150,22 +163,29 @@ def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
 @reaction.register(MeanValue)
 def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
     # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
-    low, high = 0.0, 1.0
+    low, high = 0.0, 0.0
     rx, ry, rz, f_low = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
-    sx, sy, sz, f_high = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, high)
+    f, f_high = f_low, f_low
+    for i in range(_PARTS):
+        if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
+            break
+        low, f_low, high = high, f_high, (i + 1.0) / _PARTS
+        rx, ry, rz, f_high = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, high)
+        f = f_high
     if f_low == 0.0:
-        return rx, ry, rz, law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz)), True
-    if f_high == 0.0:
-        return sx, sy, sz, law_of.constraint(law, _gap(surface, x + px - sx, y + py - sy, z + pz - sz)), True
-    if not f_low * f_high < 0.0:
-        return rx, ry, rz, math.nan, False
-    for _i in range(_BETA_ITERATIONS):
-        beta = _illinois(low, f_low, high, f_high)
-        rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
-        low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
-        if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
-            return rx, ry, rz, law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz)), True
-    return rx, ry, rz, math.nan, False
+        rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
+    elif f_low * f_high < 0.0:
+        for _i in range(_BETA_ITERATIONS):
+            beta = _illinois(low, f_low, high, f_high)
+            rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
+            if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                break
+            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
+    x1, y1, z1 = x + px - rx, y + py - ry, z + pz - rz
+    end = law_of.constraint(law, _gap(surface, x1, y1, z1))
+    start = law_of.constraint(law, _gap(surface, x, y, z))
+    # Near the surface Phi' of a small exponent can rise faster than beta has digits: then (6) is not met.
+    return rx, ry, rz, end, abs(f) <= _MET * (abs(end - start) + _EPSILON * max(end, start))
 
 
 @outlined
@@ -192,6 +212,9 @@ def _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta):
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
                 break
     miss = _identity(law, surface, x, y, z, x + px - rx, y + py - ry, z + pz - rz, beta)
+    # Where Phi' jumps from 0 within the digits of beta there is no root.
+    if not abs(f) <= 1e3 * _MET * high:
+        miss = math.nan
     return rx, ry, rz, miss
 
 

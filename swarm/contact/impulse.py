@@ -182,23 +182,11 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
     f, _df, _g, _dg, _slope = _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, 0.0)
     if f == 0.0:
         return 0.0, True
-    # A cavity pushes with kappa > 0, a solid with kappa < 0 short of the pole of `push`: `sign` mirrors it.
+    # A cavity pushes with kappa > 0, a solid with kappa < 0: `sign` mirrors it.
     sign = -1.0 if f > 0.0 else 1.0
-    farthest = abs(surfaces.farthest_push(surface))
-    # While g1 falls with kappa the right side of (K) is largest at 0, so its value there is past the root; on a chord
-    # across an ellipsoid g1 may rise first. The doubling ends: (K) has F > 0 both far out and before the pole.
-    low, high = 0.0, min(abs(f), 0.5 * farthest)
-    bracketed = False
-    for _i in range(_DOUBLINGS):
-        f, _df, _g, _dg, _slope = _residual(
-            law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign * high
-        )
-        if sign * f >= 0.0:
-            bracketed = True
-            break
-        if not (abs(f) < math.inf and high < _NEAR * farthest):
-            break
-        low, high = high, min(2.0 * high, 0.5 * (high + farthest))
+    low, high, found = _bracket(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign, abs(f))
+    if not found:
+        return sign * low, False
     k, previous = low, math.inf
     for _i in range(_CAREFUL_ITERATIONS):
         f, df, _g, _dg, _slope = _residual(
@@ -206,7 +194,7 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
         )
         f = sign * f
         if f == 0.0 or not abs(f) < math.inf:
-            return sign * k, bracketed and f == 0.0
+            return sign * k, f == 0.0
         if f < 0.0:
             low = k
         else:
@@ -217,6 +205,30 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
             trial = 0.5 * (low + high)
         previous = abs(trial - k)
         if previous <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
-            return sign * trial, bracketed
+            return sign * trial, True
         k = trial
     return sign * k, False
+
+
+@outlined
+def _bracket(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign, first):
+    """Two sizes of kappa with F < 0 and F >= 0, from F(0) = -`first`, and whether they were found."""
+    # While g1 falls with kappa the right side of (K) is largest at 0, so its value there is past the root; on a chord
+    # across an ellipsoid g1 may rise first. The doubling ends: (K) has F > 0 both far out and before the pole.
+    farthest = abs(surfaces.farthest_push(surface))
+    low, high = 0.0, min(first, 0.5 * farthest)
+    for _i in range(_DOUBLINGS):
+        f, _df, _g, _dg, _slope = _residual(
+            law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign * high
+        )
+        if not abs(f) < math.inf:
+            # A push that is not defined so far.
+            farthest = high
+            high = 0.5 * (low + high)
+        elif sign * f >= 0.0:
+            return low, high, True
+        elif high >= _NEAR * farthest:
+            break
+        else:
+            low, high = high, min(2.0 * high, 0.5 * (high + farthest))
+    return low, high, False

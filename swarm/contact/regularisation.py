@@ -240,7 +240,7 @@ def _(law, g0, g1):
 _NODE = 0.5 * math.sqrt(0.6)
 _THETA = (0.5 - _NODE, 0.5, 0.5 + _NODE)
 _WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-# Its error is of the sixth order in (a + 1)|g1 - g0|/g; below this ratio it is under round-off.
+# Its error is of the sixth order in (b + 2)|g1 - g0|/g; below this ratio it is under round-off.
 _CLOSE = 1.0 / 16.0
 
 
@@ -283,7 +283,7 @@ def _power_slope(b, g0, g1):
     """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
     d = g1 - g0
     p0, p1 = _positive(g0), _positive(g1)
-    if g0 > 0.0 and g1 > 0.0 and abs(d) * b < _CLOSE * g0:
+    if g0 > 0.0 and g1 > 0.0 and abs(d) * (b + 2.0) < _CLOSE * g0:
         # It is the mean of the derivative b g^(b-1) between the two gaps.
         slope, curvature = 0.0, 0.0
         for i in range(3):
@@ -292,7 +292,7 @@ def _power_slope(b, g0, g1):
             slope += part
             curvature += _THETA[i] * (b - 1.0) * part / g
         return slope, curvature
-    slope, curvature = _quotient(p0**b, p1**b, b * p1 ** (b - 1.0), d)
+    slope, curvature = _quotient(p0**b, p1**b, select(g1 >= 0.0, b * p1 ** (b - 1.0), 0.0), d)
     # b = 1 has a corner at 0, where Phi' from the outside is 1.
     corner = (d == 0.0) & (g0 == 0.0) & (b == 1.0)
     return select(corner, 1.0, slope), select(corner, 0.0, curvature)

@@ -23,8 +23,9 @@ from . import regularisation as law_of
 # How the multiplier is updated and started: (8) itself, the secant, or the secant from the reflection's multiplier.
 PLAIN, SECANT, REFLECTION = 0.0, 1.0, 2.0
 # Rows of the record that a lane keeps of its loop: lambda now; (Phi0 + Phi1)/2, V and dkappa/dlambda of its step;
-# lambda and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance.
-MULTIPLIER, MEAN, STORED, GAIN, BEFORE, MISS, SWEEPS, UNCONVERGED, RECORDS = range(9)
+# lambda and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance; the
+# acceleration.
+MULTIPLIER, MEAN, STORED, GAIN, BEFORE, MISS, SWEEPS, UNCONVERGED, ACCELERATION, RECORDS = range(10)
 # The secant stops this part short: beyond the last multiplier the step equation has no root.
 _SHORT = 1e-3
 # Newton steps of the chord that starts the loop: it need not be exact.
@@ -49,6 +50,29 @@ def reflection(chain, index, law, x, y, z, px, py, pz, c):
     multiplier = multiplier_of(chain, index, law, x, y, z, c, kappa)
     good = (multiplier > 0.0) & (multiplier < math.inf)
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
+
+
+@by_type
+def has_limit(chain, index, law, x, y, z):
+    """Whether the loop has a limit for surface `index`: State I with Phi'(0) > 0.
+
+    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
+    """
+    raise NotImplementedError
+
+
+@has_limit.register(walls.Chain)
+def _(chain, index, law, x, y, z):
+    surface = chain.first
+    g0, _round_off, _tolerance = impulse.start_gap(0.0, surface, x, y, z, surfaces.inner(surface, x, y, z))
+    here = (g0 == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
+    other = has_limit(chain.rest, index - 1.0, law, x, y, z)
+    return ((index == 0.0) & here) | ((index != 0.0) & other)
+
+
+@has_limit.register(Nothing)
+def _(chain, index, law, x, y, z):
+    return False
 
 
 @by_type
@@ -88,10 +112,11 @@ def sweep_all(method, law, chain, x, y, z, px, py, pz, c, multipliers, before, m
         stored += 0.5 * law.alpha * last[k] * last[k]
         miss = 0.5 * law.alpha * (first[k] + last[k])
         old = multipliers[k]
+        acceleration = method.acceleration if has_limit(chain, float(k), law, x, y, z) else PLAIN
         if sweep == 0:
             multipliers[k] = old + miss
         else:
-            multipliers[k] = next_multiplier(method.acceleration, old, miss, before[k], misses[k])
+            multipliers[k] = next_multiplier(acceleration, old, miss, before[k], misses[k])
         before[k], misses[k] = old, miss
     return x1, y1, z1, stored, solved
 

@@ -58,7 +58,7 @@ class AugmentedLagrangian(base.Method):
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
             time, and contact steps are dt long. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
-            the multiplier of the converged step. The fixed point is the same.
+            the multiplier of the converged step. The fixed point is the same; where there is none, so is the loop.
         on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,
             particle, sweeps and V; "count" accepts the step and counts it in the observable "unconverged"; "impact"
             counts it too, and replaces the contact by the exact one (without gravity only).
@@ -256,14 +256,15 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     better, multiplier = uzawa.reflection(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
     use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-    return select(use, multiplier, 0.0), select(use, better, kappa)
+    limited = uzawa.has_limit(chain, surface, law, x, y, z)
+    return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, method.acceleration, uzawa.PLAIN)
 
 
 @base.next_multiplier.register(AugmentedLagrangianNumbers)
-def _(method, left, multiplier, mean, stored, multiplier_before, miss_before):
+def _(method, left, acceleration, multiplier, mean, stored, multiplier_before, miss_before):
     _h, _used, law = _step(method.adaptive, method, left)
     miss = law.alpha * mean
-    following = uzawa.next_multiplier(method.acceleration, multiplier, miss, multiplier_before, miss_before)
+    following = uzawa.next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before)
     return following, miss, not (stored <= method.tolerance)
 
 

@@ -108,12 +108,12 @@ def multiplier_sweeps(method):
 
 @by_type
 def first_multiplier(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
-    """The multiplier that the loop (8) starts from, and kappa for it."""
-    return 0.0, kappa
+    """The multiplier that the loop (8) starts from, kappa for it, and the acceleration of the loop."""
+    return 0.0, kappa, 0.0
 
 
 @by_type
-def next_multiplier(method, left, multiplier, mean, stored, multiplier_before, miss_before):
+def next_multiplier(method, left, acceleration, multiplier, mean, stored, multiplier_before, miss_before):
     """The multiplier after a sweep, what the sweep missed by, and whether to go on."""
     return 0.0, 0.0, False
 
