@@ -52,3 +52,18 @@ def test_penalty_over_1e5_steps(name, exponent):
     start = swarm.fill(scene, 50, speed=0.5, seed=22)
     result = run(scene, start, swarm.Penalty(0.0078125, 1e4, exponent), 781.25, 78.125)
     assert result.observables["energy_error"].max() <= 5e-11
+
+
+@pytest.mark.parametrize("name", ["sphere", "ellipsoid", "cut sphere"])
+@pytest.mark.parametrize("contact_step", [0.0, 1e-4])
+def test_a_tangential_launch_slides_for_1e6_steps(name, contact_step):
+    """Along the wall, chord by chord: energy and walls as after impacts."""
+    scene = scene_of(name)
+    wall = {"sphere": (0.5, 0.0, 0.0), "cut sphere": (0.5, 0.0, 0.0), "ellipsoid": (0.3, 0.0, 0.0)}[name]
+    start = swarm.Particles([[part, part] for part in wall], [[0.0, 0.0], [0.5, 0.3], [0.0, 0.4]])
+    shortest = 1e-4
+    method = swarm.Impact(contact_step=contact_step, shortest_flight=shortest)
+    result = run(scene, start, method, 1.5e6 * shortest, 1e4 * shortest)
+    assert result.observables["impacts"][-1] >= 1e6
+    assert result.observables["energy_error"].max() <= 1e-12
+    assert ulps_outside(scene, result) <= 4.0
