@@ -21,11 +21,12 @@ from . import regularisation as law_of
 _EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
 _BETA_ITERATIONS = 200
+_FORCE_ITERATIONS = 200
 # Parts of a step in which a beta is looked for.
 _PARTS = 16
-# How well, relative to Phi1 - Phi0, the identity must be met.
-_MET = 1e-12
-_FORCE_ITERATIONS = 200
+# How nearly a beta to its last digit must meet (6), relative to the push; and the first step of the solve after it.
+_NEARLY = 0.1
+_NUDGE = 1e-6
 
 
 class Composite(NamedTuple):
@@ -163,59 +164,84 @@ def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
 @reaction.register(MeanValue)
 def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
     # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
-    low, high = 0.0, 0.0
-    rx, ry, rz, f_low = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
-    f, f_high = f_low, f_low
+    low, high, kappa = 0.0, 0.0, 0.0
+    kappa, f_low = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
+    f_high = f_low
     for i in range(_PARTS):
         if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
             break
         low, f_low, high = high, f_high, (i + 1.0) / _PARTS
-        rx, ry, rz, f_high = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, high)
-        f = f_high
+        kappa, f_high = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, high)
+    beta, found = high, f_high == 0.0
     if f_low == 0.0:
-        rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
+        beta, found = low, True
+        kappa, _f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
     elif f_low * f_high < 0.0:
         for _i in range(_BETA_ITERATIONS):
             beta = _illinois(low, f_low, high, f_high)
-            rx, ry, rz, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
+            kappa, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                found = True
                 break
             low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
-    x1, y1, z1 = x + px - rx, y + py - ry, z + pz - rz
-    end = law_of.constraint(law, _gap(surface, x1, y1, z1))
-    start = law_of.constraint(law, _gap(surface, x, y, z))
-    # Near the surface Phi' of a small exponent can rise faster than beta has digits: then (6) is not met.
-    return rx, ry, rz, end, abs(f) <= _MET * (abs(end - start) + _EPSILON * max(end, start))
+    # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
+    # identity asks for along grad q(r_beta) meets it whatever beta is.
+    rx, ry, rz, end, change = _balanced(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa)
+    return rx, ry, rz, end, found and change <= _NEARLY
+
+
+@outlined
+def _balanced(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa):
+    """The reaction for this beta with exact energy, Phi1, and by what part of itself kappa had to change."""
+    k, before, g_before = kappa, kappa * (1.0 + _NUDGE), 0.0
+    mean = 0.5 * law_of.constraint(law, _gap(surface, x, y, z))
+    rx, ry, rz, change, previous = 0.0, 0.0, 0.0, math.inf, math.inf
+    for i in range(_FORCE_ITERATIONS):
+        at = before if i == 0 else k
+        bx, by, bz = surfaces.resolve(surface, x + beta * px, y + beta * py, z + beta * pz, beta * at)
+        dx, dy, dz = surfaces.inner_gradient(surface, bx, by, bz, bx, by, bz)
+        rx, ry, rz = at * dx, at * dy, at * dz
+        ex, ey, ez = px - rx, py - ry, pz - rz
+        cx, cy, cz = composite(law, surface, x, y, z, x + ex, y + ey, z + ez)
+        end = 0.5 * law_of.constraint(law, _gap(surface, x + ex, y + ey, z + ez))
+        force = law.alpha * (mean + end) + (0.0 if multiplier is None else multiplier)
+        g = at - c * force * (cx * ex + cy * ey + cz * ez) / (dx * ex + dy * ey + dz * ez)
+        if i == 0:
+            g_before = g
+            continue
+        step = g * (k - before) / (g - g_before)
+        # NaN at the turning point, where both parts of the quotient vanish and (6) holds by itself. Steps that do not
+        # shrink are round-off.
+        if not abs(step) > 4.0 * _EPSILON * abs(k) or previous <= abs(step) <= _NUDGE * abs(k):
+            change = abs(k - kappa) / abs(kappa) if kappa != 0.0 else 0.0
+            break
+        before, g_before, k, previous = k, g, k - step, abs(step)
+    return rx, ry, rz, law_of.constraint(law, _gap(surface, x + px - rx, y + py - ry, z + pz - rz)), change
 
 
 @outlined
 def _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta):
-    """The reaction along grad q(r_beta) that solves the step for this beta, and how far (6) misses its identity."""
+    """The kappa that solves the step with D along grad q(r_beta), and by how much (6) then misses its identity."""
     # F(kappa) = kappa - c (alpha Phi_mean + lambda) Phi'(g_beta) g'(q_beta); a solid pushes with kappa < 0.
     rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, 0.0)
     sign = -1.0 if f > 0.0 else 1.0
-    low, f_low, high = 0.0, sign * f, abs(f)
+    kappa, low, f_low, high = 0.0, 0.0, sign * f, abs(f)
     if f != 0.0:
-        rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * high)
-        f_high = sign * f
+        kappa, f_high = high, -1.0
         for _i in range(_FORCE_ITERATIONS):
+            rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * high)
+            f_high = sign * f
             if f_high > 0.0:
                 break
             # Not past the push yet: the force grows along this line.
             low, f_low, high = high, f_high, 2.0 * high
-            rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * high)
-            f_high = sign * f
         for _i in range(_FORCE_ITERATIONS):
             kappa = _illinois(low, f_low, high, f_high)
             rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * kappa)
             low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, kappa, sign * f)
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
                 break
-    miss = _identity(law, surface, x, y, z, x + px - rx, y + py - ry, z + pz - rz, beta)
-    # Where Phi' jumps from 0 within the digits of beta there is no root.
-    if not abs(f) <= 1e3 * _MET * high:
-        miss = math.nan
-    return rx, ry, rz, miss
+    return sign * kappa, _identity(law, surface, x, y, z, x + px - rx, y + py - ry, z + pz - rz, beta)
 
 
 @outlined

@@ -76,6 +76,25 @@ def _(chain, index, law, x, y, z):
 
 
 @by_type
+def meets_later(chain, index, law, x, y, z, px, py, pz):
+    """Whether the free flight r0 + p leaves any wall but `index` on which the particle is not yet: a State II."""
+    raise NotImplementedError
+
+
+@meets_later.register(walls.Chain)
+def _(chain, index, law, x, y, z, px, py, pz):
+    surface = chain.first
+    leaves = surfaces.level_of(surface, surfaces.inner(surface, x + px, y + py, z + pz)) > 0.0
+    here = leaves & (index != 0.0) & (not has_limit(chain, 0.0, law, x, y, z))
+    return here | meets_later(chain.rest, index - 1.0, law, x, y, z, px, py, pz)
+
+
+@meets_later.register(Nothing)
+def _(chain, index, law, x, y, z, px, py, pz):
+    return False
+
+
+@by_type
 def multiplier_of(chain, index, law, x, y, z, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the surface."""
     raise NotImplementedError

@@ -13,7 +13,7 @@ from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, nested
-from ..contact.reflection import chord, reflect
+from ..contact.reflection import chord, exact, impact
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
@@ -27,8 +27,8 @@ _POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
 _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
 # Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
 _MOST_BOUNCES = 1000
-# Another wall that the chord meets this early, as a part of the step, is met in the same instant.
-_SAME_INSTANT = 1e-6
+# A |v|^2 that is off its first value by more than this has lost energy to a tolerance, which is not to be hidden.
+_ROUND_OFF = 1e-13
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class AugmentedLagrangian(base.Method):
             self.dt,
             self.law(),
             form_of(self.gradient),
-            Adaptive() if self.adaptive else None,
+            Adaptive(base.SHORTEST * scene.finite_size()) if self.adaptive else None,
             self.tolerance,
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
@@ -138,6 +138,8 @@ class AugmentedLagrangian(base.Method):
 
 class Adaptive(NamedTuple):
     """Chooses steps that are cut at the impact."""
+
+    shortest_length: float  # of the flights of particles that graze where a step is not possible
 
 
 class AugmentedLagrangianNumbers(NamedTuple):
@@ -287,7 +289,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     factor, _balanced = energies.restored(
         method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
     )
-    new = step & (not walls.outside(chain, -1.0, x, y, z))
+    new = step & _is_new(method.adaptive, chain, x, y, z)
     # A step without contact: only fixed steps end here that way, just before one.
     loose = (left > 0.0) & (surface > base.HARD) & (not touching)
     ex, ey, ez = accelerated(gravity, vx, vy, vz, h)
@@ -303,6 +305,22 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
         select(step, given, 0.0),
         select(new, 1.0, 0.0),
     )
+
+
+@by_type
+def _is_new(adaptive, chain, x, y, z):
+    """Whether a contact step starts with an impact."""
+    raise NotImplementedError
+
+
+@_is_new.register(type(None))
+def _(adaptive, chain, x, y, z):
+    return not walls.outside(chain, -1.0, x, y, z)
+
+
+@_is_new.register(Adaptive)
+def _(adaptive, chain, x, y, z):
+    return True
 
 
 @by_type
@@ -330,10 +348,9 @@ def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
 @base.hard_pass.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
     h, used, law = _step(method.adaptive, method, left)
-    if _is_blocked(method.adaptive, chain, surface, x, y, z, h * vx, h * vy, h * vz):
+    if _is_blocked(method.adaptive, method.law, chain, surface, x, y, z, h * vx, h * vy, h * vz):
         record[uzawa.SWEEPS, lane] = 0.0
-        vx, vy, vz = _exact_reflection(chain, int(surface), x, y, z, vx, vy, vz, impulse, lane)
-        return x, y, z, vx, vy, vz, left, 1.0, Status.DONE.value
+        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k1, surface, impulse, lane)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     reactions = np.zeros((walls.length(chain), 4))
     x1, y1, z1, sweeps, stored, solved, converged = uzawa.loop(
@@ -342,11 +359,11 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     record[uzawa.SWEEPS, lane], record[uzawa.STORED, lane] = sweeps, stored
     record[uzawa.UNCONVERGED, lane] = 0.0 if converged else 1.0
     if not converged and method.policy == IMPACT:
-        return _exact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane)
+        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k1, surface, impulse, lane)
     if not converged and (method.policy == RAISE or not solved):
         status = Status.UNCONVERGED.value if solved else Status.UNSOLVED.value
         return x, y, z, vx, vy, vz, left, 0.0, status
-    new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
+    new = 1.0 if _is_new(method.adaptive, chain, x, y, z) else 0.0
     rx, ry, rz = corner.total(reactions)
     f = 2.0 / h
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
@@ -360,43 +377,41 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
 
 
 @by_type
-def _is_blocked(adaptive, chain, surface, x, y, z, px, py, pz):
+def _is_blocked(adaptive, law, chain, surface, x, y, z, px, py, pz):
     """Whether the chord on `surface` meets another wall later in the step, or passes a solid by."""
     return False
 
 
 @_is_blocked.register(Adaptive)
-def _(adaptive, chain, surface, x, y, z, px, py, pz):
+def _(adaptive, law, chain, surface, x, y, z, px, py, pz):
     kappa = chord(chain, surface, x, y, z, px, py, pz)
     x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
-    cut, _other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
-    return not walls.pushes(chain, surface, kappa) or kappa == 0.0 or _SAME_INSTANT < cut <= 1.0
-
-
-@outlined
-def _exact_reflection(chain, surface, x, y, z, vx, vy, vz, impulse, lane):
-    """The velocity after the exact impact on `surface`."""
-    speed2 = vx * vx + vy * vy + vz * vz
-    nx, ny, nz = walls.unit_normal(chain, float(surface), x, y, z)
-    vx, vy, vz, given = reflect(vx, vy, vz, nx, ny, nz, speed2, 0.5 / speed2 if speed2 > 0.0 else 0.0)
-    impulse[surface, lane] += given
-    return vx, vy, vz
+    cut, other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
+    # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
+    later = cut <= 1.0 and not uzawa.has_limit(chain, other, law, x, y, z)
+    later = later or uzawa.meets_later(chain, surface, law, x, y, z, px, py, pz)
+    return not walls.pushes(chain, surface, kappa) or kappa == 0.0 or later
 
 
 @by_type_outlined
-def _exact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
-    """The contact as exact impacts, in the place of a loop that did not converge."""
+def _impact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+    """The contact as exact impacts: the result of `hard_pass`."""
     raise NotImplementedError
 
 
-@_exact.register(Adaptive)
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
-    vx, vy, vz = _exact_reflection(chain, int(surface), x, y, z, vx, vy, vz, impulse, lane)
-    return x, y, z, vx, vy, vz, left, 1.0, Status.DONE.value
+@_impact.register(Adaptive)
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+    speed2 = _first_speed2(energy, vx, vy, vz)
+    shortest = adaptive.shortest_length / math.sqrt(speed2)
+    x, y, z, vx, vy, vz, used = impact(
+        None, chain, surface, x, y, z, vx, vy, vz, left, speed2, 0.5 / speed2, shortest, impulse, lane
+    )
+    return x, y, z, vx, vy, vz, left - used, 1.0, Status.DONE.value
 
 
-@_exact.register(type(None))
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lane):
+@_impact.register(type(None))
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+    speed2 = _first_speed2(energy, vx, vy, vz)
     remaining, hits = h, 0.0
     for _i in range(_MOST_BOUNCES):
         time, wall = walls.first_hit(chain, x, y, z, vx, vy, vz)
@@ -404,6 +419,14 @@ def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, surface, impulse, lan
         x, y, z, remaining = x + t * vx, y + t * vy, z + t * vz, remaining - t
         if not time < math.inf or remaining <= 0.0:
             return x, y, z, vx, vy, vz, left - used, hits, Status.DONE.value
-        vx, vy, vz = _exact_reflection(chain, int(wall), x, y, z, vx, vy, vz, impulse, lane)
+        vx, vy, vz, given = exact(chain, wall, x, y, z, vx, vy, vz, speed2, 0.5 / speed2)
+        impulse[int(wall), lane] += given
         hits += 1.0
     return x, y, z, vx, vy, vz, left, hits, Status.STALLED.value
+
+
+@outlined
+def _first_speed2(energy, vx, vy, vz):
+    """|v|^2 at the start of the run, if it is that up to round-off, else |v|^2 now."""
+    now = vx * vx + vy * vy + vz * vz
+    return 2.0 * energy if abs(2.0 * energy - now) <= _ROUND_OFF * now else now

@@ -19,6 +19,10 @@ from ..scene import Scene
 HARD = -2.0
 
 
+# Default shortest flight as a part of the crossing time size/|v|.
+SHORTEST = 1e-4
+
+
 @dataclass(frozen=True)
 class Method:
     """A way to advance particles. See the subclasses."""

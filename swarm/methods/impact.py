@@ -5,19 +5,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
-from .._jit import by_type, inlined, kept, select
-from ..contact.reflection import chord, chord_step, reflect
+from .._jit import by_type, kept, select
+from ..contact.reflection import along, chord_step, exact, impact, reflect
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
 from . import base
-
-# Default shortest flight as a part of the crossing time size/|v|.
-_SHORTEST = 1e-4
-# A second wall nearer than this part of the shortest flight is met in the same instant.
-_SAME_INSTANT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ class Impact(base.Method):
         base.check_crossing("shortest_flight", self.shortest_flight, scene, particles)
 
     def numbers(self, scene: Scene) -> "ImpactNumbers":
-        length = _SHORTEST * scene.finite_size() if self.shortest_flight is None else 0.0
+        length = base.SHORTEST * scene.finite_size() if self.shortest_flight is None else 0.0
         return ImpactNumbers(self.contact_step or None, self.shortest_flight or 0.0, length)
 
 
@@ -195,7 +190,7 @@ def _lane(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_
 
 @_lane.register(type(None))
 def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, unsolved, tx, ty, tz, turned):
-    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
+    wx, wy, wz, impulse = exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
     hit = surface >= 0.0
     return (
         x,
@@ -214,7 +209,7 @@ def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inve
 @_lane.register(float)
 def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse, unsolved, tx, ty, tz, turned):
     h = select(contact_step < left, contact_step, left)
-    ox, oy, oz, stays = _along(chain, surface, x, y, z, vx, vy, vz, tx, ty, tz, h)
+    ox, oy, oz, stays = along(chain, surface, x, y, z, vx, vy, vz, tx, ty, tz, h)
     hit = surface >= 0.0
     chord = hit & stays & (turned > 0.0) & (not unsolved)
     return (
@@ -231,75 +226,12 @@ def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inve
     )
 
 
-@inlined
-def _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse):
-    """The exact reflection: velocity and impulse per mass."""
-    nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    return reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
-
-
-@inlined
-def _along(chain, surface, x, y, z, vx, vy, vz, wx, wy, wz, h):
-    """The end of the chord step, (v0 + v1)/2 = (r1 - r0)/h, and whether no other wall cuts it."""
-    ux, uy, uz = 0.5 * (vx + wx), 0.5 * (vy + wy), 0.5 * (vz + wz)
-    cut, _other = walls.other_hit(chain, surface, x, y, z, ux, uy, uz)
-    ox, oy, oz = walls.settle(chain, surface, x + h * ux, y + h * uy, z + h * uz)
-    return ox, oy, oz, cut > h
-
-
 # --- Grazing ---------------------------------------------------------------------------------------------
-
-
-@by_type
-def _contact(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
-    """The contact step of one particle: (x, y, z, vx, vy, vz, time used, impulse)."""
-    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
-    return x, y, z, wx, wy, wz, 0.0, impulse
-
-
-@_contact.register(float)
-def _(contact_step, chain, surface, x, y, z, vx, vy, vz, left, speed2, half_inverse):
-    h = min(contact_step, left)
-    kappa = chord(chain, surface, x, y, z, h * vx, h * vy, h * vz)
-    nx, ny, nz = walls.chord_normal(chain, surface, x, y, z, h * vx, h * vy, h * vz, kappa)
-    wx, wy, wz, impulse = reflect(vx, vy, vz, nx, ny, nz, speed2, half_inverse)
-    ox, oy, oz, stays = _along(chain, surface, x, y, z, vx, vy, vz, wx, wy, wz, h)
-    if stays and impulse > 0.0:
-        return ox, oy, oz, wx, wy, wz, h, impulse
-    # A chord that another wall would cut, or that a solid does not oppose (the free flight of length h ends outside it
-    # again), gives way to the exact reflection.
-    wx, wy, wz, impulse = _exact(chain, surface, x, y, z, vx, vy, vz, speed2, half_inverse)
-    return x, y, z, wx, wy, wz, 0.0, impulse
 
 
 @base.hard_pass.register(ImpactNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    # A flight shorter than `shortest_flight` ends here. If the next one, back to the same wall, is short too, the
-    # particle grazes: it takes a chord step of that length h instead.
-    nx, ny, nz = walls.unit_normal(chain, surface, x, y, z)
-    wx, wy, wz, given = reflect(vx, vy, vz, nx, ny, nz, k0, k1)
-    used = 0.0
-    if walls.hit_of(chain, surface, x, y, z, wx, wy, wz) < k2:
-        # How far along the wall until another wall is in the way?
-        tx, ty, tz = 0.5 * (vx + wx), 0.5 * (vy + wy), 0.5 * (vz + wz)
-        cut, other = walls.other_hit(chain, surface, x, y, z, tx, ty, tz)
-        nx, ny, nz = walls.unit_normal(chain, other, x, y, z)
-        ax, ay, az, blow = reflect(vx, vy, vz, nx, ny, nz, k0, k1)
-        if cut < _SAME_INSTANT * k2 and blow > 0.0:
-            # Both walls at once: the blow of the other one comes first, this one is met again in the next pass.
-            impulse[int(other), lane] += blow
-            return x, y, z, ax, ay, az, left, 1.0, Status.DONE.value
-        # Half way to the other wall at most: the chord bends towards the inside, and what is left halves.
-        h = min(k2, left, 0.5 * cut)
-        x, y, z, wx, wy, wz, used, given = _contact(h, chain, surface, x, y, z, vx, vy, vz, left, k0, k1)
-        ex, ey, ez = x + h * wx, y + h * wy, z + h * wz
-        cut, other = walls.other_hit(chain, surface, x, y, z, wx, wy, wz)
-        if used == 0.0 and cut > h and not walls.outside(chain, -1.0, ex, ey, ez):
-            # The wall curves away from the flight (a solid that is only touched): the sign of v.n is round-off.
-            x, y, z, used = ex, ey, ez, h
-    else:
-        x, y, z, wx, wy, wz, used, given = _contact(
-            method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1
-        )
-    impulse[int(surface), lane] += given
-    return x, y, z, wx, wy, wz, left - used, 1.0, Status.DONE.value
+    x, y, z, vx, vy, vz, used = impact(
+        method.contact_step, chain, surface, x, y, z, vx, vy, vz, left, k0, k1, k2, impulse, lane
+    )
+    return x, y, z, vx, vy, vz, left - used, 1.0, Status.DONE.value

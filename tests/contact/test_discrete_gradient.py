@@ -16,7 +16,7 @@ from swarm.surfaces import base
 SMOOTH = [law for law in LAWS.values() if exponent_of(law) > 1.0]
 CONVEX = ["sphere", "ellipsoid", "plane"]
 COMPOSITE, MEAN_VALUE = forms.Composite(), forms.MeanValue()
-few = settings(max_examples=8)
+few = settings(max_examples=5)
 
 # Both points of a pair lie off the same wall: how deep each (below 0 inside the cavity), and how far apart along it.
 depths = st.sampled_from([0.1, 0.02, 1e-3, 1e-6, 0.0, -1e-6, -1e-3, -0.02, -0.1])
@@ -74,7 +74,7 @@ def size(vector):
 
 
 @every_surface
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(**pairs)
 def test_composite_is_a_discrete_gradient(name, **pair):
     """D.(r1 - r0) = Phi1 - Phi0 wherever the two points are."""

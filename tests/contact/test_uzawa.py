@@ -14,7 +14,7 @@ from swarm.contact.regularisation import regularisation
 from swarm.surfaces import base
 from swarm.surfaces import chain as walls
 
-few = settings(max_examples=4)
+few = settings(max_examples=3)
 ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
 every_acceleration = pytest.mark.parametrize("acceleration", ACCELERATIONS)
 ALPHA, C = 1e4, 2e-4  # c alpha/2 = 1: each sweep halves the gap of a flat wall with |grad g| = 1
@@ -262,12 +262,12 @@ def corner_of(*normals):
 
 
 @every_acceleration
-@pytest.mark.parametrize("angle", [60.0, 90.0, 120.0])
+@pytest.mark.parametrize("angle", [60.0, 120.0])
 def test_an_edge_of_two_planes(acceleration, angle):
     """Driven into the edge it starts at, with both normals' parts positive: only the part along the edge is left."""
     angle = math.radians(angle)
     n1, n2, edge = turned([[1.0, 0.0, 0.0], [math.cos(angle), math.sin(angle), 0.0], [0.0, 0.0, 1.0]], 1)
-    for a, b, t in ((1.0, 1.0, 0.5), (0.7, 0.2, 1.0), (0.1, 1.0, 0.0)):
+    for a, b, t in ((0.7, 0.2, 1.0), (0.1, 1.0, 0.0)):
         loop = Loop(corner_of(n1, n2), ORIGIN, 0.03 * (a * n1 + b * n2 + t * edge), acceleration, c=10.0 * C).run()
         assert loop.converged
         assert loop.end == pytest.approx(0.03 * t * edge, rel=0.0, abs=1e-13)
@@ -280,19 +280,18 @@ def test_a_corner_of_three_planes(acceleration):
     """Driven into the corner it starts at, against all three: it turns round."""
     for normals in (np.eye(3), turned(np.eye(3), 2), [[1.0, 0.3, 0.0], [0.0, 1.0, -0.2], [-0.3, 0.1, 1.0]]):
         normals = [n / np.linalg.norm(n) for n in np.array(normals)]
-        for parts in ((1.0, 1.0, 1.0), (0.1, 0.5, 1.0)):
-            free = 0.03 * sum(part * n for part, n in zip(parts, normals, strict=True))
-            loop = Loop(corner_of(*normals), ORIGIN, free, acceleration, c=10.0 * C).run()
-            assert loop.converged
-            assert loop.end == pytest.approx(np.zeros(3), abs=1e-13)
-            assert loop.held == pytest.approx(free, abs=1e-13)
-            assert loop.energy_error() <= 1e-11
-            assert max(n @ loop.end for n in normals) <= 1e-14
+        free = 0.03 * sum(part * n for part, n in zip((0.1, 0.5, 1.0), normals, strict=True))
+        loop = Loop(corner_of(*normals), ORIGIN, free, acceleration, c=10.0 * C).run()
+        assert loop.converged
+        assert loop.end == pytest.approx(np.zeros(3), abs=1e-13)
+        assert loop.held == pytest.approx(free, abs=1e-13)
+        assert loop.energy_error() <= 1e-11
+        assert max(n @ loop.end for n in normals) <= 1e-14
 
 
 @every_acceleration
 @given(normals=st.tuples(directions, directions), free=directions)
-@settings(max_examples=8)
+@settings(max_examples=5)
 def test_an_edge_in_any_direction(acceleration, normals, free):
     """Whichever walls oppose the step: it ends inside or on both, with its energy."""
     normals = [n / np.linalg.norm(n) for n in normals]
@@ -308,12 +307,11 @@ def test_an_edge_in_any_direction(acceleration, normals, free):
 def test_the_edge_of_a_sphere_and_a_plane(acceleration):
     """A curved wall and a flat one, r0 on both; along the edge the chord of the sphere lifts off the plane."""
     both = [swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3)]
-    for free in ([0.02, 0.01, -0.02], [0.01, -0.03, -0.03]):
-        loop = Loop(both, [0.4, 0.0, -0.3], free, acceleration, c=10.0 * C).run()
-        assert loop.converged
-        assert loop.energy_error() <= 1e-11
-        assert loop.end[2] >= -0.3 - 1e-14
-        assert np.linalg.norm(loop.end) <= 0.5 + 1e-14
+    loop = Loop(both, [0.4, 0.0, -0.3], [0.02, 0.01, -0.02], acceleration, c=10.0 * C).run()
+    assert loop.converged
+    assert loop.energy_error() <= 1e-11
+    assert loop.end[2] >= -0.3 - 1e-14
+    assert np.linalg.norm(loop.end) <= 0.5 + 1e-14
 
 
 # --- Where it does not converge --------------------------------------------------------------------------
