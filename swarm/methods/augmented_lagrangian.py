@@ -44,7 +44,7 @@ class AugmentedLagrangian(base.Method):
         exponent 1, inside at t0 (State II): never. D = Phi1/(g1 - g0) dg vanishes with Phi1, so lambda grows without
             end, while the energy misses lambda Phi1. Use adaptive=True, which starts every contact on the surface.
         exponent above 1: never, for the same reason: Phi'(0) = 0. Such walls are for Penalty, as Hertz's law is.
-    The converged step is a reflection about D: `Impact(contact_step=dt)` computes it without the loop, at a tenth of
+    The converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of
     the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
     Args:
@@ -56,7 +56,8 @@ class AugmentedLagrangian(base.Method):
         max_sweeps: the most sweeps of a loop, 1 or more.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
-            time, and contact steps are dt long. Without gravity only.
+            time, and contact steps are dt long. A step on whose way another wall stands gives way to the exact
+            reflection. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. The fixed point is the same; where there is none, so is the loop.
         on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,

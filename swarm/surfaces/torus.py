@@ -249,7 +249,8 @@ def _moved(surface, x0, y0, z0, px, py, pz, kappa):
         fx, fy, fz = _unpushed(surface, x0 + 0.5 * dx, y0 + 0.5 * dy, z0 + 0.5 * dz, kappa, fx, fy, fz)
         dx, dy, dz = dx - fx, dy - fy, dz - fz
         change = max(abs(fx), abs(fy), abs(fz))
-        if _settled(change, previous, size):
+        pushed = abs(kappa) * max(abs(gx), abs(gy), abs(gz))
+        if _settled(change, previous, max(size, pushed)):
             return dx, dy, dz
         previous = change
     return math.nan, math.nan, math.nan
