@@ -43,7 +43,9 @@ class AugmentedLagrangian(base.Method):
             surface. At the limit the force is lambda D with D != 0, so a finite multiplier carries the particle.
         exponent 1, inside at t0 (State II): never. D = Phi1/(g1 - g0) dg vanishes with Phi1, so lambda grows without
             end, while the energy misses lambda Phi1. Use adaptive=True, which starts every contact on the surface.
-        exponent above 1: never, for the same reason: Phi'(0) = 0. Such walls are for Penalty, as Hertz's law is.
+        exponent above 1: not in a useful number of sweeps, as Phi'(0) = 0: lambda grows without end, and V falls only
+            as a power of the sweeps. Such walls are for Penalty, as Hertz's law is.
+        In an edge sharper than about 0.1 rad the sweeps over its walls are too many: use on_unconverged="impact".
     The converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of
     the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
@@ -130,10 +132,11 @@ class AugmentedLagrangian(base.Method):
 
     def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
         now = moment - (left if self.adaptive else left * self.dt)
+        hint = "more max_sweeps" if self.adaptive and self.exponent == 1.0 else "exponent = 1 and adaptive=True"
         return (
             f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "
             f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. The loop converges for exponent = 1 from the "
-            'surface: use adaptive=True, more max_sweeps, or on_unconverged="count" or "impact"'
+            f'surface: use {hint}, or on_unconverged="count" or "impact"'
         )
 
 

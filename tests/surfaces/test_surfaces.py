@@ -334,6 +334,8 @@ pushes = {"point": directions, "free": vectors, "strength": st.floats(-1.0, 1.0)
 
 
 def pushed_step(name, point, free, strength, scale):
+    # What is found by iteration is found in the direction in which the surface pushes.
+    strength = strength if name in QUADRICS else math.copysign(strength, base.farthest_push(numbers_of(name)))
     surface, point = numbers_of(name, scale), scale * point
     slope = np.linalg.norm(call(base.inner_gradient, surface, point, point))
     return surface, point, 0.5 * scale * free, 0.2 * strength * scale / slope
