@@ -37,7 +37,7 @@ def draw(numbers: Numbers, folder: Path) -> Path:
             line = {"color": colour, "label": label}
             curve(multiplier, loop, loop.multiplier, **line)
             curve(force, loop, loop.force_multiplier, color=colour, label=f"multiplier, {label}")
-            curve(force, loop, loop.force_penalty, color=colour, fillstyle="none", label=f"penalty, {label}")
+            curve(force, loop, loop.force_penalty, color=colour, ls=":", marker="", label=f"penalty, {label}")
             curve(energy, loop, loop.kinetic_energy, **line)
             curve(constraint, loop, loop.constraint, **line)
         energy.axhline(SPHERE_ENERGY, color=GREY, linestyle="--", label="before the contact")

@@ -54,7 +54,7 @@ def draw(numbers: Numbers, folder: Path) -> Path:
         curve(multiplier, loop, loop.multiplier, color=BLUE, label="swarm")
         multiplier.plot(PAPER_SWEEPS, PAPER_MULTIPLIERS, **paper, label="printed in the paper")
         curve(force, loop, loop.force_multiplier, color=BLUE, label="multiplier")
-        curve(force, loop, loop.force_penalty, color=BLUE, fillstyle="none", label="penalty")
+        curve(force, loop, loop.force_penalty, color=BLUE, ls=":", marker="", label="penalty")
         curve(energy, loop, loop.kinetic_energy, color=BLUE, label="swarm")
         energy.plot(PAPER_SWEEPS, PAPER_ENERGIES, **paper, label="printed in the paper")
         energy.axhline(ELLIPSOID_ENERGY, color=GREY, linestyle="--", label="before the contact")

@@ -59,4 +59,6 @@ def sweeps(history: swarm.ContactHistory) -> Floats:
 def curve(axes: Any, history: swarm.ContactHistory, values: Floats, **line: Any) -> None:
     """One quantity by sweep; a value that a log axis cannot show is left out."""
     positive = axes.get_yscale() == "log"
-    axes.plot(sweeps(history), np.where(values > 0.0, values, np.nan) if positive else values, marker="o", **line)
+    axes.plot(
+        sweeps(history), np.where(values > 0.0, values, np.nan) if positive else values, **{"marker": "o", **line}
+    )
