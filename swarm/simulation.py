@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks, lanes, observables
+from . import checks, interrupt, lanes, observables
 from .errors import RunError, SceneError
 from .methods.base import Method
 from .particles import Multipliers, Particles, State
@@ -27,8 +27,8 @@ _LARGEST_BLOCK = 1 << 16
 _SAME_TIME = 1e-9
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
-# One thread computes in the caller's while frames are shorter than this [s]; longer frames leave the caller free to be
-# interrupted.
+# One thread computes in the caller's while frames are shorter than this [s]; in longer ones, and in the first, the
+# caller's is free to take an interrupt.
 _SHORT_FRAME = 0.05
 
 
@@ -108,6 +108,7 @@ def simulate(
         SceneError: bad input; nothing has run or been written.
         FileError: the trajectory exists or cannot be written.
         RunError: a step failed; the frames before it are in the trajectory.
+        KeyboardInterrupt: SIGINT came; the frames before it are in the trajectory.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -128,7 +129,8 @@ def simulate(
 
     run = Run(scene, particles, method, threads, block_size)
     history: list[dict[str, Any]] = []
-    with run, _output(trajectory, overwrite, scene, method, particles, scene_text) as write, display(progress) as show:
+    writer = _output(trajectory, overwrite, scene, method, particles, scene_text)
+    with run, interrupt.taken_by(run.halt), writer as write, display(progress) as show:
         now = method.span("time", 0.0)
         for number, moment in enumerate(times):
             clock = method.span("time", moment)
@@ -262,14 +264,18 @@ class Run:
         self._halt = np.zeros(1, np.int8)
         self._threads = min(threads, len(self._starts))
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
-        self._frame_seconds = 0.0
+        self._frame_seconds = math.inf
 
     def __enter__(self) -> "Run":
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._halt[0] = 1
+        self.halt()
         self._pool.shutdown(wait=True)
+
+    def halt(self) -> None:
+        """Let the kernels return before their frame is done, and `advance` raise KeyboardInterrupt."""
+        self._halt[0] = 1
 
     def advance(self, span: float, moment: float) -> None:
         """Advance every particle by `span` in the method's unit."""
@@ -284,6 +290,8 @@ class Run:
         began = time.perf_counter()
         status, particle = max(self._for_blocks(block))
         self._frame_seconds = time.perf_counter() - began
+        if self._halt[0]:
+            raise KeyboardInterrupt
         if status != Status.DONE:
             told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
             multipliers = self.state.multipliers

@@ -238,7 +238,7 @@ LAYERS = [
     ["contact"],
     ["surfaces"],
     ["gravity", "checks"],
-    ["status", "_jit", "errors", "version"],
+    ["status", "_jit", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 
