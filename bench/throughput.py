@@ -305,10 +305,10 @@ def show(rows: list[Row]) -> None:
         print(f"{row.what:<66}{row.best:>10.3g}{row.median:>10.3g}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
 
 
-def write(rows: list[Row]) -> None:
+def write(rows: list[Row], report: str = "throughput") -> None:
     """The report as CSV, one file a kind of machine."""
     name = "".join(c if c.isalnum() else "-" for c in machine().lower()).strip("-")
-    path = _RESULTS / f"throughput-{name}.csv"
+    path = _RESULTS / f"{report}-{name}.csv"
     path.parent.mkdir(exist_ok=True)
     with open(path, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")

@@ -17,7 +17,21 @@ if TYPE_CHECKING:
     from .particles import Particles
     from .scene import Scene
     from .simulation import Frame, Result, simulate
-    from .surfaces import Ellipsoid, Plane, Sphere, Torus
+    from .surfaces import (
+        Box,
+        Capsule,
+        Cone,
+        Cylinder,
+        Ellipsoid,
+        Formula,
+        OwnSurface,
+        Paraboloid,
+        Plane,
+        Quadric,
+        Slab,
+        Sphere,
+        Torus,
+    )
 
 __version__ = VERSION
 
@@ -30,24 +44,47 @@ _HOMES = {
     "particles": ("Particles",),
     "scene": ("Scene",),
     "simulation": ("Frame", "Result", "simulate"),
-    "surfaces": ("Ellipsoid", "Plane", "Sphere", "Torus"),
+    "surfaces": (
+        "Box",
+        "Capsule",
+        "Cone",
+        "Cylinder",
+        "Ellipsoid",
+        "Formula",
+        "OwnSurface",
+        "Paraboloid",
+        "Plane",
+        "Quadric",
+        "Slab",
+        "Sphere",
+        "Torus",
+    ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "AugmentedLagrangian",
+    "Box",
+    "Capsule",
+    "Cone",
     "ContactHistory",
+    "Cylinder",
     "Ellipsoid",
     "FileError",
+    "Formula",
     "Frame",
     "Impact",
+    "OwnSurface",
+    "Paraboloid",
     "Particles",
     "Penalty",
     "Plane",
+    "Quadric",
     "Result",
     "RunError",
     "Scene",
     "SceneError",
+    "Slab",
     "Sphere",
     "SwarmError",
     "Torus",

@@ -63,10 +63,11 @@ def run(
 
     from .simulation import simulate
 
+    particles = job.particles()
     try:
         result = simulate(
             job.scene,
-            job.particles(),
+            particles,
             job.method,
             until=job.run.until,
             every=job.run.every,
@@ -80,7 +81,7 @@ def run(
         print(f"interrupted: {target} holds the frames that were finished", file=sys.stderr)
         raise typer.Exit(_INTERRUPTED) from None
     if not quiet:
-        _summary(result)
+        _summary(result, particles.volume)
 
 
 @app.command(epilog="Example:  swarm info cavity.h5")
@@ -112,18 +113,24 @@ def _call(described: Any) -> str:
 def _figures(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that say whether a run went well."""
     energy = seen["total_energy"]
-    drift = abs(energy[-1] - energy[0]) / abs(energy[0]) if energy[0] else abs(energy[-1])
+    escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
+    lost = seen.get("dissipated_energy", [0.0])[-1]
+    dissipated = {"dissipated": f"{lost:.4g} J of {energy[0]:.4g} J"} if lost else {}
+    drift = abs(energy[-1] + lost - energy[0]) / abs(energy[0]) if energy[0] else abs(energy[-1] + lost)
     return {
         "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
         "energy drift": f"{drift:.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
         "largest penetration": f"{seen['max_penetration'].max():.1e} m",
+        **dissipated,
+        **escaped,
     }
 
 
-def _summary(result: "Result") -> None:
+def _summary(result: "Result", volume: float | None) -> None:
     seen = result.observables
     rate = seen["impacts"][-1] / result.wall_time
     rows = {
+        **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
         **_figures(seen),
         "wall time": f"{result.wall_time:.2f} s, {rate:.3g} impacts/s",
         "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",

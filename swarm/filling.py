@@ -33,7 +33,7 @@ def fill(
         seed: the same seed gives the same particles.
 
     Returns:
-        The particles.
+        The particles; their `volume` is the admissible volume [m^3] as the random points found it.
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
@@ -55,7 +55,9 @@ def fill(
         checks.at_least("temperature", temperature, 0.0)
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
-    particles = Particles(_points(scene, n, random), np.zeros((3, n)), mass)
+    points, volume = _points(scene, n, random)
+    particles = Particles(points, np.zeros((3, n)), mass)
+    particles.volume = volume
     normal = random.standard_normal((3, n))
     if speed is not None:
         particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))
@@ -64,23 +66,28 @@ def fill(
     return particles
 
 
-def _points(scene: Scene, n: int, random: np.random.Generator) -> Floats:
+def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
+    """Points, and the volume that the share of random points of the box which were admissible stands for."""
     low, high = (np.array(corner)[:, None] for corner in scene.bounds())
     if not np.isfinite(high - low).all():
         raise SceneError(
             "fill needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or give "
             "the particles as arrays or a CSV file"
         )
-    points, found, tried = np.empty((3, n)), 0, 0
+    points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
+    box = float(np.prod(high - low))
     while found < n:
         trial = low + (high - low) * random.random((3, _BATCH))
-        inside = trial[:, (scene.gaps(trial) <= 0.0).all(axis=0)][:, : n - found]
+        inside = trial[:, (scene.gaps(trial) <= 0.0).all(axis=0)]
+        admissible += inside.shape[1]
+        inside = inside[:, : n - found]
         points[:, found : found + inside.shape[1]] = inside
         found += inside.shape[1]
         tried += _BATCH
         if tried >= _TRIES and found < 1e-6 * tried:
             raise SceneError(
-                f"fill found {found} admissible points in {tried} tries: the admissible part of the box {low.ravel()} "
-                f"to {high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+                f"fill found {found} admissible points in {tried} tries, a volume of about "
+                f"{box * found / tried:.2g} m^3: the admissible part of the box {low.ravel()} to {high.ravel()} "
+                "is below 1e-6 of it; give the particles as arrays or a CSV file"
             )
-    return points
+    return points, box * admissible / tried

@@ -132,7 +132,7 @@ class _Rows:
 def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
     """Position and velocity at the next impact."""
     chain = scene.chain()
-    time, surface = walls.first_hit(chain, *start)
+    time, surface = walls.first_hit(chain, None, *start)
     if not np.isfinite(time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start[3:])}, which never does")
     place = [r + time * v for r, v in zip(start[:3], start[3:], strict=True)]
@@ -140,7 +140,7 @@ def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
 
 
 def _uzawa(scene: Scene, start: list[float], mass: float, method: AugmentedLagrangian) -> ContactHistory:
-    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.surfaces)
+    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
     rows = _Rows(scene, start, mass, method.dt)
     # Arguments as kernels take them: one number each.
     step: Any = (*start[:3], *rows.free, rows.c)
@@ -159,7 +159,7 @@ def _uzawa(scene: Scene, start: list[float], mass: float, method: AugmentedLagra
 
 
 def _penalty(scene: Scene, start: list[float], mass: float, method: Penalty) -> ContactHistory:
-    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.surfaces)
+    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
     rows, r0, reactions = _Rows(scene, start, mass, method.dt), start[:3], np.zeros((count, 4))
     step: Any = (*r0, *rows.free, rows.c)
     *_r1, solved = corner.hold(numbers.form, numbers.law, None, chain, *step, *[reactions])
@@ -173,9 +173,9 @@ def _penalty(scene: Scene, start: list[float], mass: float, method: Penalty) -> 
 def _impact(scene: Scene, start: list[float], mass: float, method: Impact) -> ContactHistory:
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
-    chain, count = scene.chain(), len(scene.surfaces)
+    chain, count = scene.chain(), len(scene.owners())
     rows, r0 = _Rows(scene, start, mass, method.contact_step), start[:3]
-    _time, index = walls.first_hit(chain, *start)
+    _time, index = walls.first_hit(chain, None, *start)
     kappa = reflection.chord(chain, index, *r0, *rows.free)
     r1 = walls.push(chain, index, *r0, *rows.free, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)

@@ -109,8 +109,35 @@ def observe_block(law, chain, gravity, state, start, stop, partial):
             partial[begin // CHUNK, row] = sums[row, 0]
 
 
-def summary(partial: Floats, state: State) -> dict[str, Any]:
-    """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise."""
+@kernel
+def count_escaped(chain, gravity, far, state):
+    """Particles that no wall will stop: farther away than `far`, or in a straight flight that meets none."""
+    position, velocity, count = state.position, state.velocity, 0
+    for i in range(position.shape[1]):
+        x, y, z = position[0, i], position[1, i], position[2, i]
+        count += _escapes(gravity, chain, x, y, z, velocity[0, i], velocity[1, i], velocity[2, i]) or (
+            x * x + y * y + z * z > far * far
+        )
+    return count
+
+
+@by_type
+def _escapes(gravity, chain, x, y, z, vx, vy, vz):
+    """Gravity brings particles back, or not: only their distance tells."""
+    return False
+
+
+@_escapes.register(Nothing)
+def _(gravity, chain, x, y, z, vx, vy, vz):
+    time, _wall = walls.first_hit(chain, gravity, x, y, z, vx, vy, vz)
+    return (time == np.inf) & (vx * vx + vy * vy + vz * vz > 0.0)
+
+
+def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
+    """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise.
+
+    `owners` says which surface each wall belongs to.
+    """
     multipliers = state.multipliers
     loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
@@ -121,12 +148,13 @@ def summary(partial: Floats, state: State) -> dict[str, Any]:
         "potential_energy": fall,
         "contact_energy": stored,
         "total_energy": kinetic + fall + stored,
+        "dissipated_energy": float(state.dissipated.sum()),
         "energy_error": energy_error,
         "momentum": totals[_PX : _PZ + 1],
         "angular_momentum": totals[_LX : _LZ + 1],
         "max_penetration": depth,
         "impacts": int(state.impacts.sum()),
-        "impulse": state.impulse.sum(axis=1),
+        "impulse": np.bincount(owners, weights=state.impulse.sum(axis=1)),
         **loops,
         "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }

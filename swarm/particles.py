@@ -23,7 +23,7 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
 
-    The arrays are copied, in C order.
+    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite, a mass not above 0.
@@ -31,6 +31,8 @@ class Particles:
     >>> len(Particles([[0.0, 0.1], [0.0, 0.0], [0.0, 0.0]], np.ones((3, 2))))
     2
     """
+
+    volume: float | None = None
 
     def __init__(self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0) -> None:
         self.position = _rows("position", position)
@@ -115,10 +117,11 @@ class State(NamedTuple):
     position: Floats  # (3, N)
     velocity: Floats  # (3, N)
     mass: Floats  # (N,)
-    energy: Floats  # (N,) total energy per mass at the start [J/kg]
+    energy: Floats  # (N,) total energy per mass [J/kg]: that of the start, less what was dissipated
     inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
     impacts: NDArray[np.int64]  # (N,) since the start
-    impulse: Floats  # (surfaces, N) normal impulse since the start [N s]
+    impulse: Floats  # (walls, N) normal impulse since the start [N s]
+    dissipated: Floats  # (N,) energy lost since the start [J]; without entries where none can be
     multipliers: Multipliers | None
 
 

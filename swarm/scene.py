@@ -15,7 +15,6 @@ from .gravity import Gravity
 from .surfaces import base
 from .surfaces.base import Box, Surface
 from .surfaces.chain import Chain, chain_of
-from .surfaces.plane import Plane
 
 # The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
 _STARTS = 512
@@ -72,6 +71,19 @@ class Scene:
         """Gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
+    def restitution(self) -> Chain | None:
+        """The restitution of every wall of the chain as kernels take it, None where no surface loses energy."""
+        if all(surface.restitution == 1.0 for surface in self.surfaces):
+            return None
+        chain = None
+        for i in reversed(self.owners()):
+            chain = Chain(self.surfaces[i].restitution, chain)
+        return chain
+
+    def owners(self) -> list[int]:
+        """The surface that each wall of the chain belongs to."""
+        return [i for i, surface in enumerate(self.surfaces) for _wall in surface.walls()]
+
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
         smallest = min(surface.size() for surface in self.surfaces)
@@ -83,18 +95,22 @@ class Scene:
     def finite_size(self) -> float:
         """`size`, or the extent of the surfaces where the volume is open."""
         size = self.size()
-        return size if math.isfinite(size) else self._extent()
+        return size if math.isfinite(size) else self.extent()
 
     def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N), shape (surfaces, N); admissible is <= 0 for all."""
         rows = checks.array("points", points)
         return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
 
+    def is_open(self) -> bool:
+        """Whether a particle may fly to infinity."""
+        return not np.isfinite(self.bounds()).all()
+
     def bounds(self) -> Box:
         """A box (lower, upper) around the admissible volume; infinite where that is open."""
         boxes = np.array([surface.bounds() for surface in self.surfaces])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-        planes = [surface for surface in self.surfaces if isinstance(surface, Plane)]
+        planes = [plane for surface in self.surfaces for plane in surface.half_spaces()]
         if planes:
             low, high = _polyhedron_bounds(planes, low, high)
         return tuple(low.tolist()), tuple(high.tolist())
@@ -104,7 +120,7 @@ class Scene:
         if not (low < high).all():
             return False
         # Open directions are searched as far as the scene itself extends.
-        reach = 2.0 * self._extent()
+        reach = 2.0 * self.extent()
         low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
         points = low + (high - low) * np.random.default_rng(0).random((3, _STARTS))
         for _ in range(_MOVES):
@@ -132,28 +148,22 @@ class Scene:
             points = points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T
         return False
 
-    def _extent(self) -> float:
+    def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
-        reach = 0.0
-        for surface in self.surfaces:
-            size = surface.size()
-            reach = max(reach, size if math.isfinite(size) else 0.0)
-            reach = max(reach, *(abs(part) for part in getattr(surface, "center", (0.0,))))
-            reach = max(reach, *getattr(surface, "semi_axes", (0.0,)), abs(getattr(surface, "offset", 0.0)))
-        return reach or 1.0
+        return max(surface.extent() for surface in self.surfaces) or 1.0
 
 
 def _side(surface: Surface) -> float:
     return base.SIDES[getattr(surface, "side", "inside")]
 
 
-def _polyhedron_bounds(planes: list[Plane], low: Any, high: Any) -> tuple[Any, Any]:
+def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
     """Bounds of the half-spaces' intersection with a box, from its vertices."""
-    finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(plane.offset) for plane in planes]
+    finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(offset) for _normal, offset in planes]
     far = _FAR * (max(finite, default=0.0) or 1.0)
     box_low, box_high = np.maximum(low, -far), np.minimum(high, far)
-    normals = np.vstack([[plane.normal for plane in planes], np.eye(3), -np.eye(3)])
-    offsets = np.concatenate([[plane.offset for plane in planes], box_high, -box_low])
+    normals = np.vstack([[normal for normal, _offset in planes], np.eye(3), -np.eye(3)])
+    offsets = np.concatenate([[offset for _normal, offset in planes], box_high, -box_low])
     vertices = []
     for triple in itertools.combinations(range(len(offsets)), 3):
         matrix = normals[list(triple)]

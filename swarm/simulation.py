@@ -1,5 +1,7 @@
 """The run: frames, blocks, threads. The one border between Python objects and kernels."""
 
+import functools
+import logging
 import math
 import os
 import threading
@@ -20,11 +22,14 @@ from .particles import Multipliers, Particles, State
 from .scene import Scene
 from .status import Status
 
+_LOG = logging.getLogger("swarm")
 # Blocks a thread and frame: enough that uneven ones even out, few enough that lanes stay full.
 _BLOCKS = 4
 _LARGEST_BLOCK = 1 << 16
 # Frames nearer to `until` than this part of `every` are `until`.
 _SAME_TIME = 1e-9
+# A particle this many times the scene's extent away from the origin has escaped from an open scene.
+_FAR = 100.0
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 # One thread computes in the caller's while frames are shorter than this [s]; in longer ones, and in the first, the
@@ -124,6 +129,9 @@ def simulate(
     if recording is not None:
         raise SceneError("recording is not supported yet, got a file name; leave it out and use trajectory=")
     _check(scene, particles, method, until, every)
+
+    if scene.is_open():
+        _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
 
     from .progress import display  # rich is imported only when it is shown
 
@@ -247,10 +255,13 @@ class Run:
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
-            np.zeros((len(scene.surfaces), n)),
+            np.zeros((len(scene.owners()), n)),
+            np.zeros(0 if scene.restitution() is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
         )
-        self._failure = method.failure
+        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
+        self._too_fast = functools.partial(method.too_fast, scene)
+        self._failure, self._owners = method.failure, scene.owners()
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
@@ -294,6 +305,8 @@ class Run:
             raise KeyboardInterrupt
         if status != Status.DONE:
             told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
+            if status == Status.TOO_FAST:
+                told += f", {self._too_fast()}"
             multipliers = self.state.multipliers
             if status == Status.UNCONVERGED and multipliers is not None:
                 left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
@@ -307,7 +320,12 @@ class Run:
             observables.observe_block(self._law, self._chain, self._gravity, self.state, start, stop, self._partial)
 
         self._for_blocks(block)
-        return observables.summary(self._partial, self.state)
+        seen = observables.summary(self._partial, self.state, self._owners)
+        escaped = 0
+        if self._far < math.inf:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self.state))
+        return {**seen, "escaped": escaped}
 
     def require_finite(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite."""

@@ -12,6 +12,7 @@ class Status(IntEnum):
     NOT_FINITE = 3
     STALLED = 4
     UNCONVERGED = 5
+    TOO_FAST = 6
 
     @property
     def sentence(self) -> str:
@@ -25,6 +26,7 @@ _SENTENCES = {
     Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
     Status.STALLED: "the particle met its walls 100 million times within one frame, as in a cusp or in a gap that is "
     "thin beyond measure; start it elsewhere, or observe more often",
+    Status.TOO_FAST: "a step is longer than the thinnest solid, so that the particle could jump over it",
     Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
 }

@@ -14,7 +14,7 @@ from .checks import closest, listed, one_of
 from .errors import SceneError
 from .methods import ALL_METHODS, Method
 from .scene import Scene
-from .surfaces import ALL_SURFACES, Surface
+from .surfaces import ALL_SURFACES, OwnSurface, Surface
 
 T = TypeVar("T")
 
@@ -34,8 +34,11 @@ def method_of(table: Any) -> Method:
 
 def table_of(described: Surface | Method) -> dict[str, Any]:
     """The table of a surface or a method: its kind, and every argument that is not None."""
+    if isinstance(described, OwnSurface):
+        return described.table()
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
-    table = {key: value for key, value in dataclasses.asdict(described).items() if value is not None}
+    keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
+    table = {keys[name]: value for name, value in dataclasses.asdict(described).items() if value is not None}
     return {"kind": kinds[type(described)], **table}
 
 
@@ -61,7 +64,9 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     try:
         return msgspec.convert({names[key].name: value for key, value in table.items()}, cls)
     except msgspec.ValidationError as error:
-        raise SceneError(_sentence(str(error), where, table)) from None
+        raise SceneError(
+            _sentence(str(error), where, table, {field.name: key for key, field in names.items()})
+        ) from None
 
 
 def _described(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
@@ -69,6 +74,10 @@ def _described(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:
         raise SceneError(f"{where}.kind: expected one of {listed(kinds)}, got nothing")
+    if table["kind"] == "own":
+        raise SceneError(
+            f"{where}.kind: 'own' is a phi in Python, which no file holds; make the scene as its script does"
+        )
     cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
     return convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
 
@@ -79,7 +88,7 @@ def _type_name(kind: Any) -> str:
     )
 
 
-def _sentence(message: str, where: str, table: Mapping[str, Any]) -> str:
+def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[str, str]) -> str:
     """Msgspec's "Expected `float`, got `str` - at `$.radius`", with the key first and the value that came."""
     match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*)`)?", message)
     assert match is not None
@@ -87,6 +96,8 @@ def _sentence(message: str, where: str, table: Mapping[str, Any]) -> str:
     if not path:
         # From our own checks, which begin with the argument's name.
         return f"{where}.{reason}"
-    key = re.split(r"[.\[]", path)[0]
+    name = re.split(r"[.\[]", path)[0]
+    key = keys.get(name, name)
+    path = key + path.removeprefix(name)
     value = f" (in {key} = {table[key]!r})" if key in table else ""
     return f"{where}.{path}: {reason[0].lower()}{reason[1:].replace('`', '')}{value}"

@@ -1,5 +1,7 @@
 """Tables that the tests share: a new surface, method or law joins by one line."""
 
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -10,6 +12,7 @@ from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
 from swarm.surfaces import base
 from swarm.surfaces.chain import Chain
+from swarm.surfaces.rotation import Rotated
 
 settings.register_profile(
     "swarm",
@@ -23,6 +26,7 @@ settings.load_profile("swarm")
 
 EPSILON = float(np.finfo(np.float64).eps)
 
+TURN = {"axis": (1.0, -2.0, 3.0), "angle": 1.2}
 # Every surface at every scale: `SURFACES[name](scale)`.
 SURFACES = {
     "sphere": lambda s=1.0: swarm.Sphere(0.7 * s, (0.2 * s, -0.3 * s, 0.1 * s)),
@@ -32,9 +36,22 @@ SURFACES = {
     "torus": lambda s=1.0: swarm.Torus(0.7 * s, 0.3 * s, (0.2 * s, -0.1 * s, 0.1 * s)),
     "ring": lambda s=1.0: swarm.Torus(0.7 * s, 0.3 * s, (0.2 * s, -0.1 * s, 0.1 * s), "outside"),
     "plane": lambda s=1.0: swarm.Plane((1.0, -2.0, 0.5), 0.3 * s),
+    "capsule": lambda s=1.0: swarm.Capsule(0.5 * s, 0.6 * s, (1.0, 0.5, -1.0), (0.1 * s, 0.2 * s, -0.1 * s)),
+    "rod": lambda s=1.0: swarm.Capsule(0.5 * s, 0.6 * s, center=(0.1 * s, 0.2 * s, -0.1 * s), side="outside"),
+    "rotated ellipsoid": lambda s=1.0: swarm.Ellipsoid(
+        (0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s), rotation=TURN
+    ),
+    "rotated egg": lambda s=1.0: swarm.Ellipsoid(
+        (0.4 * s, 0.5 * s, 0.8 * s), (-0.1 * s, 0.2 * s, 0.3 * s), "outside", rotation=TURN
+    ),
+    "rotated torus": lambda s=1.0: swarm.Torus(0.7 * s, 0.3 * s, (0.2 * s, -0.1 * s, 0.1 * s), rotation=TURN),
+    "formula": lambda s=1.0: swarm.Formula(
+        "(x/s)**2/0.16 + (y/s)**2/0.25 + (z/s)**4 - 1", parameters={"s": s}, center=(0.2 * s, -0.1 * s, 0.1 * s)
+    ),
 }
-# Those whose flight has a polynomial, and whose push has a closed form for any step.
-QUADRICS = [name for name in SURFACES if name not in ("torus", "ring")]
+# Those whose push has no closed form: it is found by iteration.
+ITERATED = ("torus", "ring", "rotated torus", "capsule", "rod", "formula")
+QUADRICS = [name for name in SURFACES if name not in ITERATED]
 METHODS = {
     "impact": swarm.Impact(),
     "impact, chord": swarm.Impact(contact_step=1e-3),
@@ -53,9 +70,21 @@ directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.05)
 scales = st.sampled_from([1e-6, 1e-3, 1.0, 1e3, 1e6])
 
 
+@functools.cache
 def numbers_of(name, scale=1.0):
-    """The tuple of numbers of a surface of the table."""
-    return SURFACES[name](scale).numbers()
+    """The tuple of numbers of a surface of the table, as kernels take it."""
+    (wall,) = SURFACES[name](scale).walls()
+    return wall
+
+
+def body_of(surface):
+    """The numbers of a surface in its own frame."""
+    return surface.body if isinstance(surface, Rotated) else surface
+
+
+def side_of(surface):
+    """+1 for a cavity, -1 for a solid."""
+    return getattr(body_of(surface), "side", 1.0)
 
 
 def chord_of(surface, point, free):

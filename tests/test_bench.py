@@ -9,12 +9,18 @@ import pytest
 pytestmark = pytest.mark.physics
 
 
-def test_throughput_quick():
+def report(name):
+    """What `python -m bench NAME --quick` prints."""
     root = Path(__file__).parents[1]
     done = subprocess.run(
-        [sys.executable, "-m", "bench", "throughput", "--quick"], cwd=root, capture_output=True, text=True, timeout=600
+        [sys.executable, "-m", "bench", name, "--quick"], cwd=root, capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_throughput_quick():
+    told = report("throughput")
     for row in (
         "Impact, sphere ",
         "two threads over one",
@@ -23,4 +29,10 @@ def test_throughput_quick():
         "memory",
         "first frame",
     ):
-        assert row in done.stdout
+        assert row in told
+
+
+def test_scenes_quick():
+    told = report("scenes")
+    assert "capped cylinder" in told
+    assert "formula of the ellipsoid" in told

@@ -50,8 +50,9 @@ def every_function_of_a_surface(surface, x, y, z, vx, vy, vz, gx, gy, gz, kappa)
 def every_function_of_a_chain(whole, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
     return (
         chain.length(whole),
-        chain.first_hit(whole, x, y, z, vx, vy, vz),
-        chain.hit_of(whole, 1.0, x, y, z, vx, vy, vz),
+        chain.first_hit(whole, None, x, y, z, vx, vy, vz),
+        chain.first_hit(whole, Gravity(gx, gy, gz), x, y, z, vx, vy, vz),
+        chain.hit_of(whole, None, 1.0, x, y, z, vx, vy, vz),
         chain.other_hit(whole, 0.0, x, y, z, vx, vy, vz),
         chain.unit_normal(whole, 2.0, x, y, z),
         chain.outside(whole, 1.0, x, y, z),

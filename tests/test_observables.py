@@ -24,6 +24,7 @@ def state_of(n, surfaces, seed=1, reach=1.0):
         np.zeros(n),
         random.integers(0, 5, n),
         random.uniform(size=(surfaces, n)),
+        np.zeros(0),
         None,
     )
 
@@ -36,7 +37,7 @@ def observe(law, scene, state, blocks=1):
     for start in edges:
         stop = n if blocks == 1 else min(start + observables.CHUNK, n)
         observables.observe_block(law, scene.chain(), scene.pull(), state, start, stop, partial)
-    return observables.summary(partial, state)
+    return observables.summary(partial, state, list(range(len(state.impulse))))
 
 
 @pytest.fixture(scope="module")

@@ -99,7 +99,7 @@ def test_gaps_have_the_sign_of_each_side():
     gaps = scene_of("ball", "plane").gaps(points)
     assert gaps.shape == (2, 50)
     for row, name in zip(gaps, ("ball", "plane"), strict=True):
-        numbers = SURFACES[name]().numbers()
+        (numbers,) = SURFACES[name]().walls()
         levels = base.level_of(numbers, np.array([base.inner(numbers, *point) for point in points.T]))
         assert (np.sign(row) == np.sign(levels)).all()
 

@@ -26,6 +26,13 @@ every = 0.5
 """
 
 
+SPHERE = 'kind = "sphere"\nradius = 0.5'
+
+
+def formula(phi):
+    return f'kind = "formula"\nphi = "{phi}"'
+
+
 def read(tmp_path, text):
     path = tmp_path / "scene.toml"
     path.write_text(text)
@@ -86,6 +93,28 @@ def test_shipped_scenes_are_read(path):
             "radius = 0.5",
             'radius = 0.5\n[[surface]]\nkind = "plane"\nnormal = [1.0, 0.0, 0.0]\noffset = -2.0',
             r"surfaces must leave a volume",
+        ),
+        ("radius = 0.5", "radius = 0.5\nrotation = [0, 0, 0, 0]", r"surface\[0\]\.rotation must not be of length 0"),
+        (
+            "radius = 0.5",
+            "radius = 0.5\nrotation = { axis = [0, 0, 0], angle = 1.0 }",
+            r"surface\[0\]\.rotation\.axis must not be of length 0",
+        ),
+        ("radius = 0.5", "radius = 0.5\nrestitution = 1.5", r"surface\[0\]\.restitution must be from 0 to 1, got 1\.5"),
+        (
+            SPHERE,
+            'kind = "quadric"\nmatrix = [[1, 2, 0], [3, 1, 0], [0, 0, 1]]\nconstant = -1.0',
+            r"surface\[0\]\.matrix must be symmetric, got matrix\[0\]\[1\] = 2",
+        ),
+        (SPHERE, formula("x**2 + y**2 + zz**2 - 1"), r"surface\[0\]\.phi has an unknown name 'zz'"),
+        (SPHERE, formula("open(x) - 1"), r"surface\[0\]\.phi must call only sqrt"),
+        (SPHERE, formula("x.real - 1"), r"surface\[0\]\.phi must not have an attribute"),
+        (SPHERE, formula("import os"), r"surface\[0\]\.phi is not a formula"),
+        (SPHERE, formula("(x**2 + y**2 + z**2 - 0.25)**3"), r"surface\[0\]\.phi .* gradient"),
+        (
+            SPHERE,
+            formula("log(x) + y**2") + "\nbounds = [[-1, -1, -1], [1, 1, 1]]",
+            r"surface\[0\]\.phi must be a finite number",
         ),
     ],
 )

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm import lanes
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -20,6 +21,8 @@ NAMES = {
     "max_penetration",
     "impacts",
     "impulse",
+    "dissipated_energy",
+    "escaped",
     "unconverged",
 }
 
@@ -182,7 +185,7 @@ def test_particles_outside_are_counted_and_the_first_is_named():
         swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
 
 
-@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.125, penalty=1e3)], ids=["impact", "penalty"])
+@pytest.mark.parametrize("method", [swarm.Impact(shortest_flight=2e-3), swarm.Penalty(dt=0.125, penalty=1e3)], ids=repr)
 def test_particles_on_the_wall_and_at_rest_are_valid(method):
     """On a wall, moving out, in or along it, or at rest anywhere: all are states of a billiard."""
     third = 0.5 / np.sqrt(3.0)
@@ -203,6 +206,34 @@ def test_numbers_spoiled_after_construction_are_refused(name):
     getattr(particles, name)[..., 3] = np.nan
     with pytest.raises(swarm.SceneError, match=rf"{name} must be .* particle 3"):
         swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
+
+
+@pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="the limit is a constant of the kernel, 1e8 in compiled ones")
+def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
+    """An error that names the particle and its walls, not a hang."""
+    monkeypatch.setattr(lanes, "_MOST_HITS", 50.0)
+    start = swarm.Particles([[0.0, 0.5], [0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
+    with pytest.raises(swarm.RunError, match=r"particle 1: .*100 million times"):
+        swarm.simulate(SPHERE, start, swarm.Impact(shortest_flight=1e-3), until=1.0)
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["no gravity", "gravity"])
+def test_an_open_scene_is_said_once_and_the_escaped_are_counted(caplog, gravity):
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), open=["-z"])], gravity)
+    velocity = [[0.0, 0.0, 0.3, 0.1], [0.0, 0.0, 0.0, 0.2], [-1.0, 1.0, 0.0, -0.5]]
+    with caplog.at_level("WARNING", "swarm"):
+        result = swarm.simulate(
+            scene, swarm.Particles(np.zeros((3, 4)), velocity), swarm.Impact(), until=200.0, every=100.0
+        )
+    assert [record.getMessage() for record in caplog.records] == [
+        "the scene is open: particles may fly to infinity; the observable 'escaped' counts them"
+    ]
+    # Without gravity the third goes to and fro for ever.
+    assert result.observables["escaped"][-1] == (4 if gravity else 3)
+    caplog.clear()
+    closed = swarm.simulate(SPHERE, swarm.fill(SPHERE, 5, speed=1.0), swarm.Impact(), until=1.0)
+    assert not caplog.records
+    assert closed.observables["escaped"][-1] == 0
 
 
 def test_a_run_in_two_parts_is_the_run():

@@ -13,7 +13,8 @@ from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, nested
-from ..contact.reflection import chord, exact, impact
+from ..contact.reflection import chord, exact
+from ..contact.sliding import impact
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
@@ -26,6 +27,7 @@ RAISE, COUNT, IMPACT = 0, 1, 2
 _POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
 _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
 # Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
+_SAME_INSTANT = 1e-6
 _MOST_BOUNCES = 1000
 # A |v|^2 that is off its first value by more than this has lost energy to a tolerance, which is not to be hidden.
 _ROUND_OFF = 1e-13
@@ -98,6 +100,7 @@ class AugmentedLagrangian(base.Method):
         checks.one_of("on_unconverged", self.on_unconverged, _POLICIES)
 
     def check(self, scene: Scene, particles: Particles) -> None:
+        base.check_elastic("AugmentedLagrangian", scene)
         if scene.gravity is not None and (self.adaptive or self.on_unconverged == "impact"):
             name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
             raise SceneError(
@@ -119,7 +122,11 @@ class AugmentedLagrangian(base.Method):
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
             _POLICIES[self.on_unconverged],
+            None if self.adaptive else fixed_step.longest_step(scene),
         )
+
+    def too_fast(self, scene: Scene) -> str:
+        return fixed_step.too_fast_failure(scene, self.dt)
 
     def span(self, name: str, duration: float) -> float:
         return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)
@@ -157,6 +164,7 @@ class AugmentedLagrangianNumbers(NamedTuple):
     max_sweeps: int
     acceleration: float
     policy: int
+    longest: Any  # step that jumps over no solid [m], None where there is none
 
 
 # --- One pass --------------------------------------------------------------------------------------------
@@ -179,17 +187,20 @@ def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
     surface, count = walls.touched(chain, x, y, z, px, py, pz)
     surface = select((count > 1.0) | nested(method.form), base.HARD - surface, surface)
-    touched = (left > 0.0) & (count > 0.0)
+    jumps = fixed_step.too_fast(method.longest, px, py, pz)
+    surface = select(jumps, base.HARD, surface)
+    touched = (left > 0.0) & ((count > 0.0) | jumps)
     return x, y, z, vx, vy, vz, left, select(touched, surface, -1.0)
 
 
 @_flight.register(Adaptive)
 def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
-    time, surface = walls.first_hit(chain, x, y, z, vx, vy, vz)
+    time, surface = walls.first_hit(chain, None, x, y, z, vx, vy, vz)
     hit = time <= left
     t = select(hit, time, left)
     x, y, z = x + t * vx, y + t * vy, z + t * vz
     sx, sy, sz = walls.settle(chain, surface, x, y, z)
+    hit = hit & (surface >= 0.0)
     surface = select(nested(method.form), base.HARD - surface, surface)
     # A hit in the last instant of a frame is met again in the next one.
     hit = hit & (left - t > 0.0)
@@ -218,7 +229,7 @@ def _(adaptive, method, left):
 
 
 @base.flight.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     return _flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
 
 
@@ -308,6 +319,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
         select(touching & (not solved), base.HARD - surface, surface),
         select(step, given, 0.0),
         select(new, 1.0, 0.0),
+        k0,
     )
 
 
@@ -354,8 +366,10 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     h, used, law = _step(method.adaptive, method, left)
     if _is_blocked(method.adaptive, method.law, chain, surface, x, y, z, h * vx, h * vy, h * vz):
         record[uzawa.SWEEPS, lane] = 0.0
-        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k1, surface, impulse, lane)
+        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
+    if fixed_step.too_fast(method.longest, px, py, pz):
+        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
     reactions = np.zeros((walls.length(chain), 4))
     x1, y1, z1, sweeps, stored, solved, converged = uzawa.loop(
         method, law, chain, x, y, z, px, py, pz, k0 * h * h, reactions
@@ -363,10 +377,10 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     record[uzawa.SWEEPS, lane], record[uzawa.STORED, lane] = sweeps, stored
     record[uzawa.UNCONVERGED, lane] = 0.0 if converged else 1.0
     if not converged and method.policy == IMPACT:
-        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k1, surface, impulse, lane)
+        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane)
     if not converged and (method.policy == RAISE or not solved):
         status = Status.UNCONVERGED.value if solved else Status.UNSOLVED.value
-        return x, y, z, vx, vy, vz, left, 0.0, status
+        return x, y, z, vx, vy, vz, left, 0.0, k0, status
     new = 1.0 if _is_new(method.adaptive, chain, x, y, z) else 0.0
     rx, ry, rz = corner.total(reactions)
     f = 2.0 / h
@@ -377,7 +391,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     e, _balanced = energies.restored(
         method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
     )
-    return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, Status.DONE.value
+    return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, k0, Status.DONE.value
 
 
 @by_type
@@ -398,35 +412,55 @@ def _(adaptive, law, chain, surface, x, y, z, px, py, pz):
 
 
 @by_type_outlined
-def _impact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+def _impact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
     """The contact as exact impacts: the result of `hard_pass`."""
     raise NotImplementedError
 
 
 @_impact.register(Adaptive)
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
     speed2 = _first_speed2(energy, vx, vy, vz)
     shortest = adaptive.shortest_length / math.sqrt(speed2)
-    x, y, z, vx, vy, vz, used = impact(
-        None, chain, surface, x, y, z, vx, vy, vz, left, speed2, 0.5 / speed2, shortest, impulse, lane
+    touch = _SAME_INSTANT * adaptive.shortest_length
+    x, y, z, vx, vy, vz, used, _energy = impact(
+        None,
+        None,
+        chain,
+        None,
+        surface,
+        x,
+        y,
+        z,
+        vx,
+        vy,
+        vz,
+        left,
+        speed2,
+        0.5 / speed2,
+        shortest,
+        touch,
+        impulse,
+        lane,
     )
-    return x, y, z, vx, vy, vz, left - used, 1.0, Status.DONE.value
+    return x, y, z, vx, vy, vz, left - used, 1.0, k0, Status.DONE.value
 
 
 @_impact.register(type(None))
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, energy, surface, impulse, lane):
+def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
     speed2 = _first_speed2(energy, vx, vy, vz)
     remaining, hits = h, 0.0
     for _i in range(_MOST_BOUNCES):
-        time, wall = walls.first_hit(chain, x, y, z, vx, vy, vz)
+        time, wall = walls.first_hit(chain, None, x, y, z, vx, vy, vz)
         t = min(time, remaining)
         x, y, z, remaining = x + t * vx, y + t * vy, z + t * vz, remaining - t
         if not time < math.inf or remaining <= 0.0:
-            return x, y, z, vx, vy, vz, left - used, hits, Status.DONE.value
-        vx, vy, vz, given = exact(chain, wall, x, y, z, vx, vy, vz, speed2, 0.5 / speed2)
+            return x, y, z, vx, vy, vz, left - used, hits, k0, Status.DONE.value
+        if wall < 0.0:
+            continue
+        vx, vy, vz, given, _energy = exact(None, chain, None, wall, x, y, z, vx, vy, vz, speed2, 0.5 / speed2)
         impulse[int(wall), lane] += given
         hits += 1.0
-    return x, y, z, vx, vy, vz, left, hits, Status.STALLED.value
+    return x, y, z, vx, vy, vz, left, hits, k0, Status.STALLED.value
 
 
 @outlined

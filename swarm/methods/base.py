@@ -46,9 +46,23 @@ class Method:
         """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
         raise NotImplementedError
 
+    def too_fast(self, scene: Scene) -> str:
+        """The end of the sentence about a step that could jump over a solid."""
+        raise NotImplementedError
+
     def law(self) -> Any:
         """The regularisation whose stored energy counts as contact energy, or None for rigid walls."""
         return None
+
+
+def check_elastic(name: str, scene: Scene) -> None:
+    """Raise a `SceneError` if a surface loses energy, which a method of this name does not know."""
+    for i, surface in enumerate(scene.surfaces):
+        if surface.restitution < 1.0:
+            raise SceneError(
+                f"surfaces[{i}].restitution must be 1 with {name}, which conserves the energy, got "
+                f"{surface.restitution:g}; use Impact"
+            )
 
 
 def check_crossing(name: str, step: float | None, scene: Scene, particles: Particles) -> None:
@@ -68,8 +82,16 @@ def lane_constants(method, mass, energy, vx, vy, vz):
 
 
 @by_type
-def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
+def falls(method, gravity):
+    """Whether the time of the first hit comes from the safe steps of a fall: a constant for the compiler."""
+    return False
+
+
+@by_type
+def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
+
+    The arguments time and surface are `chain.first_hit` of a fall.
 
     `left` is what is left of the frame, in the method's unit; `surface` is the wall of the contact that follows, or -1
     for none; `HARD - wall` leaves the contact to `hard_pass`.
@@ -135,10 +157,16 @@ def turn(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, surface, kap
 
 
 @by_type
+def dissipates(method):
+    """Whether contacts may lose energy, so that k0, twice the energy per mass, changes: a constant for the compiler."""
+    return False
+
+
+@by_type
 def contact(
     method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned
 ):
-    """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits).
+    """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits, k0).
 
     (tx, ty, tz, turned) is what `turn` found.
 
@@ -151,7 +179,7 @@ def contact(
 
 @by_type_outlined
 def hard_pass(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, status).
+    """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, k0, status).
 
     Adds to `impulse[surface, lane]`, and writes the sweeps of a multiplier loop into `record[:, lane]`.
     """

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from .._jit import inlined, select
+from .._jit import by_type, inlined, select
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
@@ -34,15 +34,30 @@ def check_arguments(method: Any) -> None:
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
     """Raise a `SceneError` where the fastest particle can jump over a solid in one step."""
-    step = particles.fastest() * dt
-    for i, surface in enumerate(scene.surfaces):
-        solid = getattr(surface, "side", "inside") == "outside"
-        if solid and step > 2.0 * surface.size():
-            raise SceneError(
-                f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
-                f"fastest flies {step:.3g} m, and surfaces[{i}], {2.0 * surface.size():.3g} m thick; use "
-                f"dt < {2.0 * surface.size() / particles.fastest():.2g} s, or Impact"
-            )
+    step, longest = particles.fastest() * dt, longest_step(scene)
+    if longest is not None and step > longest:
+        raise SceneError(
+            f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
+            f"fastest flies {step:.3g} m, and {_thinnest(scene)}; use dt < {longest / particles.fastest():.2g} s, or "
+            "Impact"
+        )
+
+
+def longest_step(scene: Scene) -> float | None:
+    """The thickness of the thinnest solid [m], which no step may be longer than; None where there is no solid."""
+    solids = [2.0 * surface.size() for surface in scene.surfaces if surface.is_solid()]
+    return min(solids, default=None)
+
+
+def _thinnest(scene: Scene) -> str:
+    solids = [(2.0 * surface.size(), i) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
+    thickness, i = min(solids)
+    return f"surfaces[{i}] ({type(scene.surfaces[i]).__name__}), {thickness:.3g} m thick"
+
+
+def too_fast_failure(scene: Scene, dt: float) -> str:
+    """The end of the sentence about a step that was longer than a solid is thick."""
+    return f"with dt = {dt:g} s and {_thinnest(scene)}; use a smaller dt, or Impact"
 
 
 def whole_steps(name: str, duration: float, dt: float) -> float:
@@ -58,6 +73,17 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
             f"{duration / dt:.6g} steps"
         )
     return float(steps)
+
+
+@by_type
+def too_fast(longest, px, py, pz):
+    """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
+    return False
+
+
+@too_fast.register(float)
+def _(longest, px, py, pz):
+    return px * px + py * py + pz * pz > longest * longest
 
 
 @inlined

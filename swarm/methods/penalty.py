@@ -56,10 +56,14 @@ class Penalty(base.Method):
         fixed_step.check_arguments(self)
 
     def check(self, scene: Scene, particles: Particles) -> None:
+        base.check_elastic("Penalty", scene)
         fixed_step.check_solids(scene, particles, self.dt)
 
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
-        return PenaltyNumbers(self.dt, self.law(), form_of(self.gradient))
+        return PenaltyNumbers(self.dt, self.law(), form_of(self.gradient), fixed_step.longest_step(scene))
+
+    def too_fast(self, scene: Scene) -> str:
+        return fixed_step.too_fast_failure(scene, self.dt)
 
     def span(self, name: str, duration: float) -> float:
         return fixed_step.whole_steps(name, duration, self.dt)
@@ -74,6 +78,7 @@ class PenaltyNumbers(NamedTuple):
     dt: float
     law: Any
     form: Any  # of the discrete gradient
+    longest: Any  # step that jumps over no solid [m], None where there is none
 
 
 # --- One pass --------------------------------------------------------------------------------------------
@@ -86,12 +91,13 @@ def _(method, mass, energy, vx, vy, vz):
 
 
 @base.flight.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
     surface, count = walls.touched(chain, x, y, z, px, py, pz)
     # Several walls at once, or nested solves: the careful way.
     surface = select((count > 1.0) | nested(method.form), base.HARD - surface, surface)
+    surface = select(fixed_step.too_fast(method.longest, px, py, pz), base.HARD, surface)
     return x, y, z, vx, vy, vz, left, select(left > 0.0, surface, -1.0)
 
 
@@ -151,6 +157,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
         select(touching & (not solved), base.HARD - surface, surface),
         select(step, abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz), 0.0),
         select(new, 1.0, 0.0),
+        k0,
     )
 
 
@@ -161,6 +168,8 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
     h = method.dt
     px, py, pz = displacement(gravity, vx, vy, vz, h)
+    if fixed_step.too_fast(method.longest, px, py, pz):
+        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
     reactions = np.zeros((walls.length(chain), 4))
     x1, y1, z1, solved = corner.hold(method.form, method.law, None, chain, x, y, z, px, py, pz, k0, reactions)
     corner.add_impulses(reactions, h, impulse, lane)
@@ -171,4 +180,4 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     mass = 0.5 * h * h / k0
     e, balanced = energies.restored(method.law, chain, gravity, mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0)
     status = Status.DONE.value if solved and balanced else Status.UNSOLVED.value
-    return x1, y1, z1, wx * e, wy * e, wz * e, left - 1.0, new, status
+    return x1, y1, z1, wx * e, wy * e, wz * e, left - 1.0, new, k0, status

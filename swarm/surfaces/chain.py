@@ -4,6 +4,7 @@ The fold ends at None, and its neutral element (no hit, no gap) is a constant th
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from .._jit import by_type, select
@@ -18,9 +19,12 @@ class Chain(NamedTuple):
     rest: Any
 
 
-def chain_of(surfaces: tuple[base.Surface, ...]) -> Chain | None:
-    """The numbers of `surfaces` as a chain."""
-    return Chain(surfaces[0].numbers(), chain_of(surfaces[1:])) if surfaces else None
+def chain_of(surfaces: Sequence[base.Surface]) -> Chain | None:
+    """The walls of `surfaces` as a chain, in their order."""
+    chain = None
+    for wall in reversed([wall for surface in surfaces for wall in surface.walls()]):
+        chain = Chain(wall, chain)
+    return chain
 
 
 @by_type
@@ -39,46 +43,127 @@ def _(chain):
     return 0
 
 
+# --- Hits, with and without gravity ----------------------------------------------------------------------
+
+
 @by_type
-def first_hit(chain, x, y, z, vx, vy, vz):
-    """Time of the first hit of a straight flight, and the index of the surface."""
+def hit(gravity, surface, x, y, z, vx, vy, vz):
+    """When the free flight leaves the admissible side of one surface: (time, whether it does then)."""
+    raise NotImplementedError
+
+
+@hit.register(Nothing)
+def _(gravity, surface, x, y, z, vx, vy, vz):
+    return base.first_hit(surface, x, y, z, vx, vy, vz)
+
+
+@hit.register(Gravity)
+def _(gravity, surface, x, y, z, vx, vy, vz):
+    return base.falling_hit(surface, x, y, z, vx, vy, vz, gravity.x, gravity.y, gravity.z)
+
+
+@by_type
+def first_hit(chain, gravity, x, y, z, vx, vy, vz):
+    """Time of the first hit of a free flight, and the index of the surface.
+
+    The index is -1 where the flight is surely free until then, and more is not known yet.
+    """
     raise NotImplementedError
 
 
 @first_hit.register(Chain)
-def _(chain, x, y, z, vx, vy, vz):
-    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
-    later, index = first_hit(chain.rest, x, y, z, vx, vy, vz)
+def _(chain, gravity, x, y, z, vx, vy, vz):
+    time, found = hit(gravity, chain.first, x, y, z, vx, vy, vz)
+    later, index = first_hit(chain.rest, gravity, x, y, z, vx, vy, vz)
     sooner = later < time
-    return select(sooner, later, time), select(sooner, index + 1.0, 0.0)
+    here = select(found, 0.0, -1.0)
+    return select(sooner, later, time), select(sooner, select(index < 0.0, -1.0, index + 1.0), here)
 
 
 @first_hit.register(Nothing)
-def _(chain, x, y, z, vx, vy, vz):
+def _(chain, gravity, x, y, z, vx, vy, vz):
+    return math.inf, 0.0
+
+
+# A falling flight in lanes: what the safe steps of each wall know, in this many rows a wall.
+COURSE = 8
+
+
+@by_type
+def begin_fall(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
+    """The course of a falling flight for every wall into course[row:, lane]."""
+
+
+@begin_fall.register(Chain)
+def _(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
+    if base.is_quartic(chain.first):
+        c, b, a2, a3, a4, window = base.course(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
+        course[row, lane], course[row + 1, lane], course[row + 2, lane] = c, b, a2
+        course[row + 3, lane], course[row + 4, lane], course[row + 5, lane] = a3, a4, window
+        course[row + 6, lane], course[row + 7, lane] = 0.0, math.inf
+    else:
+        time, found = base.falling_hit(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
+        course[row + 5, lane], course[row + 6, lane], course[row + 7, lane] = 1.0, time, select(found, 0.0, math.inf)
+    begin_fall(chain.rest, course, row + COURSE, lane, x, y, z, vx, vy, vz, gx, gy, gz)
+
+
+@by_type
+def step_fall(chain, course, row, lane):
+    """One safe step of every wall that needs steps."""
+
+
+@step_fall.register(Chain)
+def _(chain, course, row, lane):
+    if base.is_quartic(chain.first):
+        course[row + 6, lane], course[row + 7, lane] = base.safe_step(
+            course[row, lane], course[row + 1, lane], course[row + 2, lane], course[row + 3, lane],
+            course[row + 4, lane], course[row + 5, lane], course[row + 6, lane], course[row + 7, lane],
+        )  # fmt: skip
+    step_fall(chain.rest, course, row + COURSE, lane)
+
+
+@by_type
+def end_fall(chain, course, row, lane):
+    """`first_hit` from the course."""
+    raise NotImplementedError
+
+
+@end_fall.register(Chain)
+def _(chain, course, row, lane):
+    time, found = course[row + 6, lane], base.arrived(course[row + 7, lane], course[row + 5, lane])
+    later, index = end_fall(chain.rest, course, row + COURSE, lane)
+    here = select(found, 0.0, -1.0)
+    sooner = later < time
+    return select(sooner, later, time), select(sooner, select(index < 0.0, -1.0, index + 1.0), here)
+
+
+@end_fall.register(Nothing)
+def _(chain, course, row, lane):
     return math.inf, 0.0
 
 
 @by_type
-def hit_of(chain, index, x, y, z, vx, vy, vz):
-    """Time of the first hit with surface `index`."""
+def hit_of(chain, gravity, index, x, y, z, vx, vy, vz):
+    """`hit` of surface `index`."""
     raise NotImplementedError
 
 
 @hit_of.register(Chain)
-def _(chain, index, x, y, z, vx, vy, vz):
-    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
-    other = hit_of(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
-    return select(index == 0.0, time, other)
+def _(chain, gravity, index, x, y, z, vx, vy, vz):
+    time, found = hit(gravity, chain.first, x, y, z, vx, vy, vz)
+    other, found_other = hit_of(chain.rest, gravity, index - 1.0, x, y, z, vx, vy, vz)
+    here = index == 0.0
+    return select(here, time, other), (here & found) | ((not here) & found_other)
 
 
 @hit_of.register(Nothing)
-def _(chain, index, x, y, z, vx, vy, vz):
-    return math.inf
+def _(chain, gravity, index, x, y, z, vx, vy, vz):
+    return math.inf, True
 
 
 @by_type
 def other_hit(chain, index, x, y, z, vx, vy, vz):
-    """Time and index of the first hit with any surface but `index`, which is one of the chain's."""
+    """Time until which a straight flight is free of any surface but `index`, one of the chain's, and the next one."""
     raise NotImplementedError
 
 
@@ -110,15 +195,18 @@ def _hit_but(chain, index, x, y, z, vx, vy, vz):
 
 @_hit_but.register(Chain)
 def _(chain, index, x, y, z, vx, vy, vz):
-    time = base.first_hit(chain.first, x, y, z, vx, vy, vz)
-    later, found = _hit_but(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
+    time, _found = base.first_hit(chain.first, x, y, z, vx, vy, vz)
+    later, other = _hit_but(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
     use = (later < time) | (index == 0.0)
-    return select(use, later, time), select(use, found + 1.0, 0.0)
+    return select(use, later, time), select(use, other + 1.0, 0.0)
 
 
 @_hit_but.register(Nothing)
 def _(chain, index, x, y, z, vx, vy, vz):
     return math.inf, 0.0
+
+
+# --- One of the surfaces ---------------------------------------------------------------------------------
 
 
 @by_type
@@ -315,7 +403,7 @@ def free_time(gravity, chain, x, y, z, vx, vy, vz):
 
 @free_time.register(Nothing)
 def _(gravity, chain, x, y, z, vx, vy, vz):
-    time, _index = first_hit(chain, x, y, z, vx, vy, vz)
+    time, _index = first_hit(chain, gravity, x, y, z, vx, vy, vz)
     return select(outside(chain, -1.0, x, y, z), 0.0, time)
 
 

@@ -12,9 +12,9 @@ from . import base
 _CHORD_SWEEPS = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ellipsoid(base.Surface):
-    """An ellipsoid with axes along x, y, z; its cavity or the space around the solid.
+    """An ellipsoid with axes along its own x, y, z; its cavity or the space around the solid.
 
     Args:
         semi_axes: three numbers > 0 [m].
@@ -33,22 +33,25 @@ class Ellipsoid(base.Surface):
     side: str = "inside"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         axes = vector("semi_axes", self.semi_axes)
         for i, axis in enumerate(axes):
             length(f"semi_axes[{i}]", axis)
         object.__setattr__(self, "semi_axes", axes)
-        object.__setattr__(self, "center", vector("center", self.center))
-        base.side_sign(self.side)
 
     def numbers(self) -> "EllipsoidNumbers":
         a, b, c = (1.0 / (axis * axis) for axis in self.semi_axes)
-        return EllipsoidNumbers(*self.center, a, b, c, base.side_sign(self.side))
+        return EllipsoidNumbers(*self.own_center(), a, b, c, base.side_sign(self.side))
 
     def size(self) -> float:
         return min(self.semi_axes)
 
     def bounds(self) -> base.Box:
-        return base.box_around(self.center, self.semi_axes, self.side)
+        box = base.box_around(self.center, self.semi_axes, self.side)
+        return base.rotated_box(self.rotation, box, self.center)
+
+    def extent(self) -> float:
+        return base.farthest(self.center) + max(self.semi_axes)
 
 
 class EllipsoidNumbers(NamedTuple):
@@ -95,10 +98,10 @@ def _(surface, x, y, z, vx, vy, vz):
     c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
     b = _dot(surface, dx, dy, dz, vx, vy, vz)
     a = _dot(surface, vx, vy, vz, vx, vy, vz)
-    return base.rise_time(surface.side * c, surface.side * b, surface.side * a)
+    return base.rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
-@base.safe_time.register(EllipsoidNumbers)
+@base.course.register(EllipsoidNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
@@ -108,9 +111,14 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     # q(r + v t + G t^2/2) - 1, a quartic in t
     a2 = a + _dot(surface, dx, dy, dz, gx, gy, gz)
     a3 = _dot(surface, vx, vy, vz, gx, gy, gz)
-    window = 1.0 / math.sqrt(a + math.sqrt(gg))
+    window = 2.0 / math.sqrt(a + math.sqrt(gg))
     side = surface.side
-    return base.safe_rise_time(side * c, side * b, side * a2, a3, side * 0.25 * gg, window)
+    return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
+
+
+@base.is_quartic.register(EllipsoidNumbers)
+def _(surface):
+    return True
 
 
 # --- Contact ---------------------------------------------------------------------------------------------

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from .._jit import select
-from ..checks import Vector, number, vector
-from ..errors import SceneError
+from ..checks import Vector, number
 from . import base
+from .rotation import turned, unit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plane(base.Surface):
     """A plane wall; admissible is normal.r <= offset, with the normal scaled to unit length.
 
@@ -29,18 +29,15 @@ class Plane(base.Surface):
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        normal = vector("normal", self.normal)
-        largest = max(abs(part) for part in normal)
-        if largest == 0.0:
-            raise SceneError("normal must not be the zero vector, got (0, 0, 0)")
-        # Scaled first: the length of the vector itself may not be a number.
-        scaled = [part / largest for part in normal]
-        length = math.hypot(*scaled)
-        object.__setattr__(self, "normal", tuple(part / length for part in scaled))
+        super().__post_init__()
+        object.__setattr__(self, "normal", unit("normal", self.normal))
         object.__setattr__(self, "offset", number("offset", self.offset))
 
     def numbers(self) -> "PlaneNumbers":
-        return PlaneNumbers(*self.normal, self.offset)
+        return PlaneNumbers(*turned(self.rotation, self.normal), self.offset)
+
+    def walls(self) -> tuple["PlaneNumbers"]:
+        return (self.numbers(),)
 
     def size(self) -> float:
         return math.inf
@@ -48,6 +45,12 @@ class Plane(base.Surface):
     def bounds(self) -> base.Box:
         # Half-spaces bound only together: scene.py does that.
         return base.UNBOUNDED
+
+    def half_spaces(self) -> list[base.HalfSpace]:
+        return [(turned(self.rotation, self.normal), self.offset)]
+
+    def extent(self) -> float:
+        return abs(self.offset)
 
 
 class PlaneNumbers(NamedTuple):
@@ -80,18 +83,27 @@ def _(surface, x, y, z, vx, vy, vz):
     approach = base.inner(surface, vx, vy, vz)
     distance = surface.offset - base.inner(surface, x, y, z)
     time = distance / approach
-    return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf)
+    return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
+
+
+@base.falling_hit.register(PlaneNumbers)
+def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
+    c = base.inner(surface, x, y, z) - surface.offset
+    return base.rise_time(c, 0.5 * base.inner(surface, vx, vy, vz), 0.5 * base.inner(surface, gx, gy, gz)), True
 
 
 @base.safe_time.register(PlaneNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    c = base.inner(surface, x, y, z) - surface.offset
-    b = 0.5 * base.inner(surface, vx, vy, vz)
-    a = 0.5 * base.inner(surface, gx, gy, gz)
-    return select(c > 0.0, 0.0, base.rise_time(c, b, a))
+    time, _found = base.falling_hit(surface, x, y, z, vx, vy, vz, gx, gy, gz)
+    return select(base.inner(surface, x, y, z) > surface.offset, 0.0, time)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
+
+
+@base.flat.register(PlaneNumbers)
+def _(surface):
+    return True
 
 
 @base.unit_normal.register(PlaneNumbers)
@@ -102,6 +114,16 @@ def _(surface, x, y, z):
 @base.chord_guess.register(PlaneNumbers)
 def _(surface, x, y, z, px, py, pz):
     return base.inner(surface, px, py, pz)
+
+
+@base.chord_improve.register(PlaneNumbers)
+def _(surface, x, y, z, px, py, pz, kappa):
+    return 0.0
+
+
+@base.chord_sweeps.register(PlaneNumbers)
+def _(surface):
+    return 0
 
 
 @base.chord_normal.register(PlaneNumbers)

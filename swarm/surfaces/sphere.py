@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import select
-from ..checks import Vector, length, vector
+from ..checks import Vector, length
 from . import base
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sphere(base.Surface):
     """A sphere; its cavity (`side="inside"`) or the space around the solid ball (`side="outside"`).
 
@@ -32,19 +32,24 @@ class Sphere(base.Surface):
     side: str = "inside"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "radius", length("radius", self.radius))
-        object.__setattr__(self, "center", vector("center", self.center))
-        base.side_sign(self.side)
 
     def numbers(self) -> "SphereNumbers":
         side = base.side_sign(self.side)
         return SphereNumbers(*self.center, self.radius, self.radius**2, side / self.radius, side)
+
+    def walls(self) -> tuple["SphereNumbers"]:
+        return (self.numbers(),)  # whatever its rotation
 
     def size(self) -> float:
         return self.radius
 
     def bounds(self) -> base.Box:
         return base.box_around(self.center, (self.radius,) * 3, self.side)
+
+    def extent(self) -> float:
+        return base.farthest(self.center) + self.radius
 
 
 class SphereNumbers(NamedTuple):
@@ -83,10 +88,10 @@ def _(surface, x, y, z, vx, vy, vz):
     c = dx * dx + dy * dy + dz * dz - surface.radius2
     b = dx * vx + dy * vy + dz * vz
     a = vx * vx + vy * vy + vz * vz
-    return base.rise_time(surface.side * c, surface.side * b, surface.side * a)
+    return base.rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
-@base.safe_time.register(SphereNumbers)
+@base.course.register(SphereNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     c = dx * dx + dy * dy + dz * dz - surface.radius2
@@ -96,9 +101,14 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
     a2 = a + dx * gx + dy * gy + dz * gz
     a3 = vx * gx + vy * gy + vz * gz
-    window = surface.radius / math.sqrt(a + surface.radius * math.sqrt(gg))
+    window = 2.0 * surface.radius / math.sqrt(a + surface.radius * math.sqrt(gg))
     side = surface.side
-    return base.safe_rise_time(side * c, side * b, side * a2, a3, side * 0.25 * gg, window)
+    return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
+
+
+@base.is_quartic.register(SphereNumbers)
+def _(surface):
+    return True
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
@@ -116,6 +126,16 @@ def _(surface, x, y, z, px, py, pz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     rp = 2.0 * (dx * px + dy * py + dz * pz)
     return (rp + px * px + py * py + pz * pz) / (4.0 * surface.radius2 + rp)
+
+
+@base.chord_improve.register(SphereNumbers)
+def _(surface, x, y, z, px, py, pz, kappa):
+    return 0.0
+
+
+@base.chord_sweeps.register(SphereNumbers)
+def _(surface):
+    return 0
 
 
 @base.chord_normal.register(SphereNumbers)

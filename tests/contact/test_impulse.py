@@ -1,11 +1,12 @@
 """The scalar equation (K) of a penalty step, kappa = c V[g0, g1] g[q0, q1], against 50 digits."""
 
+import itertools
 import math
 
 import mpmath as mp
 import numpy as np
 import pytest
-from conftest import EPSILON, LAWS, call, directions, every_quadric, numbers_of, wall_point
+from conftest import EPSILON, LAWS, call, directions, every_quadric, numbers_of, side_of, wall_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +51,7 @@ class Step:
         return call(base.inner_gradient, self.surface, point, point)
 
     def gap(self, point):
-        return getattr(self.surface, "side", 1.0) * base.phi(self.surface, *point)
+        return side_of(self.surface) * base.phi(self.surface, *point)
 
     def energy(self, point):
         """V with 50 digits; its exponent from the law."""
@@ -58,12 +59,14 @@ class Step:
         return mp.mpf(self.law.alpha) * max(self.gap(point), 0) ** (a + 1) / (a + 1)
 
     def end(self, kappa):
-        """r1 = r0 + p - kappa D(r0, r1), from D alone: in each component it is affine in r1."""
-        zero, one = (base.inner_gradient(self.surface, *map(mp.mpf, self.start), *([mp.mpf(k)] * 3)) for k in (0, 1))
-        return [
-            (mp.mpf(r) + mp.mpf(p) - kappa * a) / (1 + kappa * (b - a))
-            for r, p, a, b in zip(self.start, self.free, zero, one, strict=True)
-        ]
+        """r1 = r0 + p - kappa D(r0, r1), from D alone: it is affine in r1, D0 + B r1."""
+        start, corners = list(map(mp.mpf, self.start)), [[mp.mpf(i == k) for i in range(3)] for k in range(-1, 3)]
+        zero, *along = (base.inner_gradient(self.surface, *start, *corner) for corner in corners)
+        matrix = mp.matrix(3, 3)
+        for i, k in itertools.product(range(3), range(3)):
+            matrix[i, k] = (i == k) + kappa * (along[k][i] - zero[i])
+        right = [r + mp.mpf(p) - kappa * d for r, p, d in zip(start, self.free, zero, strict=True)]
+        return list(mp.lu_solve(matrix, mp.matrix(right)))
 
     def residual(self, kappa):
         """kappa - c (V1 - V0)/(q1 - q0)."""
@@ -106,7 +109,7 @@ def test_careful_finds_the_smallest_root(name, law, **step):
     """No change of sign of the residual before the root; a wall pushes, a cavity with kappa >= 0, a solid <= 0."""
     step = Step(name, law, **step, reachable=True)
     kappa, _ = step.careful()
-    assert kappa * getattr(step.surface, "side", 1.0) >= 0.0
+    assert kappa * side_of(step.surface) >= 0.0
     sign = mp.sign(step.residual(0.0))
     if abs(kappa) > 1e3 * step.slack():
         assert sign != 0
@@ -167,7 +170,7 @@ def test_careful_solves_steps_across_the_cavity(name, law, **step):
     step = Step(name, law, **step)
     kappa, solved = step.careful()
     assert solved
-    side, pole = getattr(step.surface, "side", 1.0), abs(base.farthest_push(step.surface))
+    side, pole = side_of(step.surface), abs(base.farthest_push(step.surface))
     assert 0.0 <= kappa * side < pole
     # F changes its sign within the round-off of the positions.
     width = 1e-9 * abs(kappa) + step.slack()

@@ -31,7 +31,7 @@ class Loop:
         self.chain = walls.chain_of(tuple(surfaces))
         self.method = swarm.AugmentedLagrangian(
             1.0, ALPHA, exponent, tolerance=tolerance, max_sweeps=max_sweeps, acceleration=acceleration
-        ).numbers(None)
+        ).numbers(swarm.Scene([swarm.Sphere(1.0)]))
         self.step = (*map(np.float64, (*start, *free)), np.float64(c))
         self.start, self.free = np.array(start), np.array(free)
 
@@ -72,8 +72,8 @@ class Described:
     def __init__(self, numbers):
         self._numbers = numbers
 
-    def numbers(self):
-        return self._numbers
+    def walls(self):
+        return (self._numbers,)
 
 
 def state_one(name, point, direction, lean, length):

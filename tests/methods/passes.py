@@ -12,6 +12,7 @@ from swarm.contact.energy import contact_energy
 from swarm.gravity import potential
 from swarm.methods import base
 from swarm.status import Status
+from swarm.surfaces import chain as walls
 
 
 class Pass(NamedTuple):
@@ -41,7 +42,11 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
     constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
-    *state, left, surface = call(base.flight, numbers, chain, gravity, position, velocity, left, *constants)
+    # What the safe steps of lanes.py find.
+    time, wall = call(walls.first_hit, chain, gravity, position, velocity)
+    *state, left, surface = call(
+        base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall)
+    )
     kappa, unsolved = 0.0, False
     if base.most_sweeps(numbers, chain) > 0:
         kappa, unsolved = call(base.guess, numbers, chain, gravity, *state, left, constants[0], surface)
@@ -52,7 +57,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     turned = (0.0, 0.0, 0.0, 0.0)
     if base.turns(numbers):
         turned = call(base.turn, numbers, chain, gravity, *state, left, *constants[:2], surface, kappa)
-    *state, left, surface, given, hits = call(
+    *state, left, surface, given, hits, _energy = call(
         base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, unsolved, *turned
     )
     impulse = np.zeros((len(scene.surfaces), 1))
@@ -60,7 +65,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     if hard:
         surface = base.HARD - surface
         with np.errstate(all="ignore"):
-            *state, left, hits, status = base.hard_pass(
+            *state, left, hits, _energy, status = base.hard_pass(
                 numbers,
                 chain,
                 gravity,

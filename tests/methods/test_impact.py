@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import EPSILON, call, chord_of, directions, every_surface, gap, scene_of, wall_point
+from conftest import EPSILON, call, chord_of, directions, every_surface, gap, scene_of, side_of, wall_point
 from hypothesis import given
 from hypothesis import strategies as st
 from passes import one_pass, run
@@ -17,7 +17,7 @@ lengths = st.floats(1e-4, 0.3)
 
 def approach(scene, point, direction, depth=0.1, lean=0.5):
     """A start `depth` away from the first wall, moving towards it with unit speed."""
-    numbers = scene.surfaces[0].numbers()
+    (numbers,) = scene.surfaces[0].walls()
     wall = wall_point(numbers, point)
     normal = np.array(call(surfaces.unit_normal, numbers, wall))
     along = direction - (direction @ normal) * normal
@@ -67,12 +67,12 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
     assert abs(gap(numbers, after.position)) <= 200 * EPSILON
     assert after.position - wall == pytest.approx(0.5 * used * (velocity + after.velocity), abs=100 * EPSILON)
     if used > 1e-12:
-        assert used == pytest.approx(h, abs=4 * EPSILON)
+        assert used == pytest.approx(h, abs=8 * EPSILON)
         normal = np.array(
             call(surfaces.chord_normal, numbers, wall, h * velocity, chord_of(numbers, wall, h * velocity))
         )
     else:
-        assert getattr(numbers, "side", 1.0) < 0.0 or name == "plane"
+        assert side_of(numbers) < 0.0 or name == "plane"
         normal = np.array(call(surfaces.unit_normal, numbers, wall))
     assert after.velocity == pytest.approx(velocity - 2.0 * (velocity @ normal) * normal, abs=100 * EPSILON)
 
@@ -81,7 +81,7 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
 def test_a_short_contact_step_tends_to_the_reflection(name):
     """First order in h, to the exact reflection."""
     scene = scene_of(name)
-    start = approach(scene, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.2, 0.0]), 0.1, 0.6)[1:]
+    start = approach(scene, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.2, 0.0]), 0.1, 0.9)[1:]
     exact = one_pass(swarm.Impact(), scene, *start, 1.0).velocity
     errors = [
         np.linalg.norm(one_pass(swarm.Impact(contact_step=h), scene, *start, 1.0).velocity - exact)

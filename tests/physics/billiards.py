@@ -57,8 +57,8 @@ def worst_energy(start, end):
 
 
 def ulps_outside(scene, result):
-    """The largest penetration of all frames in units of the last place of the smallest surface."""
-    return float(result.observables["max_penetration"].max() / np.spacing(scene.size()))
+    """The largest penetration of all frames in units of the last place of the scene's farthest coordinate."""
+    return float(result.observables["max_penetration"].max() / np.spacing(scene.extent()))
 
 
 def chord_numbers(particles, radius):

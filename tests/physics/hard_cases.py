@@ -121,7 +121,7 @@ def cusp():
     return facts
 
 
-def _graze_cusp(gap):
+def _graze_slit(gap):
     angle = np.linspace(0.9, 2.0, 8)
     wall = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0 * angle])
     along = np.array([np.sin(angle), -np.cos(angle), 0.0 * angle])
@@ -130,13 +130,8 @@ def _graze_cusp(gap):
 
 
 def graze_slit():
-    """Along the wall through the slit between it and a solid ball: both are tangent to the flight."""
-    return {str(gap): _graze_cusp(gap) for gap in (1e-3, 1e-6, 1e-10)}
-
-
-def graze_cusp():
-    """The same where the ball touches the wall, so that the slit is closed: the hardest of all."""
-    return {"closed": _graze_cusp(0.0)}
+    """Along the wall through the slit between it and a solid ball, and into the cusp where the slit is closed."""
+    return {str(gap): _graze_slit(gap) for gap in (1e-3, 1e-6, 1e-10, 0.0)}
 
 
 def _cap(depth):
@@ -162,7 +157,6 @@ CASES = {
     "graze_floor": graze_floor,
     "graze_ball": graze_ball,
     "graze_slit": graze_slit,
-    "graze_cusp": graze_cusp,
     "corner_circle": corner_circle,
     "corners": corners,
     "wedge": wedge,

@@ -13,7 +13,14 @@ from swarm.surfaces import base, chain
 
 every_chain = pytest.mark.parametrize(
     "names",
-    [(), ("sphere",), ("plane", "ellipsoid"), ("plane", "plane", "ball"), ("egg", "sphere", "plane", "ellipsoid")],
+    [
+        (),
+        ("sphere",),
+        ("plane", "ellipsoid"),
+        ("plane", "plane", "ball"),
+        ("egg", "sphere", "plane", "ellipsoid"),
+        ("torus", "rotated egg", "rotated torus"),
+    ],
     ids=", ".join,
 )
 
@@ -21,7 +28,7 @@ every_chain = pytest.mark.parametrize(
 def both(names):
     """The chain, and the surfaces' numbers one by one."""
     surfaces = tuple(SURFACES[name]() for name in names)
-    return chain.chain_of(surfaces), [surface.numbers() for surface in surfaces]
+    return chain.chain_of(surfaces), [wall for surface in surfaces for wall in surface.walls()]
 
 
 def is_out(numbers, point):
@@ -29,25 +36,40 @@ def is_out(numbers, point):
     return call(base.level_of, numbers, call(base.inner, numbers, point)) > 0.0
 
 
-def first_least(times):
-    """Least time and the first index that has it; infinity and 0 where there is none."""
-    return (min(times), float(np.argmin(times))) if times and min(times) < math.inf else (math.inf, 0.0)
+def first_least(hits):
+    """Least time and the first index that has it, -1 where that is not found; infinity and 0 where there is none."""
+    times = [time for time, _found in hits]
+    if not times or min(times) == math.inf:
+        return math.inf, 0.0
+    index = int(np.argmin(times))
+    return times[index], float(index) if hits[index][1] else -1.0
+
+
+@every_chain
+@pytest.mark.parametrize("falling", [False, True])
+@given(point=vectors, velocity=directions, pull=directions)
+def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
+    whole, single = both(names)
+    gravity = Gravity(*pull) if falling else None
+    one, more = (base.falling_hit, (pull,)) if falling else (base.first_hit, ())
+    hits = [call(one, numbers, point, velocity, *more) for numbers in single]
+    assert chain.length(whole) == len(names)
+    assert call(chain.first_hit, whole, gravity, point, velocity) == first_least(hits)
+    for index, hit in enumerate(hits):
+        assert call(chain.hit_of, whole, gravity, index, point, velocity) == hit
 
 
 @every_chain
 @given(point=vectors, velocity=directions)
-def test_first_hit_is_the_least_of_all(names, point, velocity):
+def test_other_hit_is_the_least_of_the_others(names, point, velocity):
     whole, single = both(names)
-    times = [call(base.first_hit, numbers, point, velocity) for numbers in single]
-    assert chain.length(whole) == len(names)
-    assert call(chain.first_hit, whole, point, velocity) == first_least(times)
-    for index, time in enumerate(times):
-        assert call(chain.hit_of, whole, index, point, velocity) == time
-        others = [math.inf if i == index else other for i, other in enumerate(times)]
-        least, found = call(chain.other_hit, whole, index, point, velocity)
-        assert least == min(others)
+    hits = [call(base.first_hit, numbers, point, velocity) for numbers in single]
+    for index in range(len(hits)):
+        others = [(math.inf, True) if i == index else hit for i, hit in enumerate(hits)]
+        least, other = call(chain.other_hit, whole, index, point, velocity)
+        assert least == min(time for time, _found in others)
         if least < math.inf:
-            assert found == first_least(others)[1]
+            assert other == np.argmin([time for time, _found in others])
 
 
 @every_chain
@@ -61,7 +83,7 @@ def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
     if any(is_out(numbers, point) for numbers in single):
         assert free == 0.0
     else:
-        assert free == call(chain.first_hit, whole, point, velocity)[0]
+        assert free == call(chain.first_hit, whole, None, point, velocity)[0]
 
 
 @every_chain

@@ -1,7 +1,5 @@
 """What every surface must be, whatever its formula: each fact runs over the table of conftest.py."""
 
-import functools
-import itertools
 import math
 
 import mpmath as mp
@@ -14,74 +12,22 @@ from conftest import (
     call,
     chord_of,
     directions,
-    every_quadric,
     every_surface,
     gap,
     numbers_of,
     scales,
+    side_of,
     vectors,
     wall_point,
 )
+from exact import exact, level_along, noise, steepness, surface_size
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.polynomial import Polynomial
 
 import swarm
 from swarm.surfaces import ALL_SURFACES, base
 
-mp.mp.dps = 50
-
 unit = st.floats(0.0, 1.0, allow_subnormal=False)
-
-
-def exact(*vectors):
-    """The same doubles with 50 digits, as an array."""
-    return np.array([mp.mpf(float(part)) for vector in vectors for part in vector], dtype=object)
-
-
-def level_along(surface, position, velocity, acceleration=(0.0, 0.0, 0.0)):
-    """The level along a flight as an exact polynomial of time: the surface's own formula, on polynomials."""
-    halves = exact(acceleration) / 2
-    flight = [Polynomial(np.array(axis)) for axis in zip(exact(position), exact(velocity), halves, strict=True)]
-    return base.level_of(surface, base.inner(surface, *flight))
-
-
-def noise(surface, level, position, velocity, time=0.0):
-    """The round-off of the level at a time of a flight: a few units in the last place of its largest terms."""
-    slope = np.linalg.norm(call(base.inner_gradient, surface, position, position))
-    terms = abs(call(base.inner, surface, position)) + abs(base.level_of(surface, 0.0))
-    terms += slope * (np.linalg.norm(position) + np.linalg.norm(velocity) * time)
-    return 16 * EPSILON * (terms + sum(abs(part) * mp.mpf(float(time)) ** k for k, part in enumerate(level.coef) if k))
-
-
-def real_roots(polynomial):
-    """Real roots of a polynomial to 40 digits, sorted: between its turning points, by bisection."""
-    coefficients = list(polynomial.coef)
-    while coefficients and abs(coefficients[-1]) <= mp.mpf(10) ** -45 * max(map(abs, polynomial.coef)):
-        coefficients.pop()
-    if len(coefficients) < 2:
-        return []
-
-    def value(t):
-        return functools.reduce(lambda sum_, part: sum_ * t + part, coefficients[::-1])
-
-    far = 1 + max(abs(part / coefficients[-1]) for part in coefficients)
-    stops = [-far, *real_roots(Polynomial(np.array(coefficients)).deriv()), far]
-    roots = []
-    for low, high in itertools.pairwise(stops):
-        if (value(low) > 0) == (value(high) > 0):
-            continue
-        while high - low > mp.mpf(10) ** -40 * max(abs(low), abs(high)) and high - low > mp.mpf(10) ** -60:
-            middle = (low + high) / 2
-            low, high = (low, middle) if (value(low) > 0) != (value(middle) > 0) else (middle, high)
-        roots.append((low + high) / 2)
-    return roots
-
-
-def highest(level, end):
-    """The largest value of a polynomial on [0, end]."""
-    stops = [mp.mpf(0), mp.mpf(end), *(root for root in real_roots(level.deriv()) if 0 < root < end)]
-    return max(level(stop) for stop in stops)
 
 
 # --- The level set ---------------------------------------------------------------------------------------
@@ -103,8 +49,13 @@ def test_phi_by_hand(surface, point, phi):
     assert surface.phi(np.array(point)[:, None]) == pytest.approx([phi], abs=1e-15)
 
 
+# Surfaces of the quadrics' table, or made of surfaces of these tables: test_quadrics.py, test_bodies.py.
+ELSEWHERE = {"box", "cone", "cylinder", "paraboloid", "quadric", "slab"}
+
+
 def test_the_table_holds_every_surface():
-    assert {type(make()) for make in SURFACES.values()} == set(ALL_SURFACES.values())
+    here = {type(make()) for make in SURFACES.values()}
+    assert here == {kind for name, kind in ALL_SURFACES.items() if name not in ELSEWHERE}
 
 
 @every_surface
@@ -140,7 +91,7 @@ def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
     assert gap(surface, point - 1e-6 * scale * normal) < 0.0 < gap(surface, point + 1e-6 * scale * normal)
     gradient = np.array(call(base.gradient, surface, point))
-    side = getattr(surface, "side", 1.0)
+    side = side_of(surface)
     assert normal == pytest.approx(side * gradient / np.linalg.norm(gradient), abs=8 * EPSILON)
 
 
@@ -148,7 +99,7 @@ def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
 @given(point=directions, scale=scales)
 def test_level_and_phi_have_the_sign_of_the_gap(name, point, scale):
     surface, point = numbers_of(name, scale), scale * point
-    side = getattr(surface, "side", 1.0)
+    side = side_of(surface)
     q = call(base.inner, surface, point)
     g = gap(surface, point)
     assert side * call(base.phi, surface, point) == pytest.approx(g, rel=1e-12, abs=1e-15 * scale)
@@ -197,29 +148,117 @@ flights = {
 }
 
 
-@every_quadric
-@given(**flights)
-def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
-    """Against the exact quadratic: nothing outside before the hit, on the wall and on the way out at it."""
-    surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
-    time = call(base.first_hit, surface, position, velocity)
-    level = level_along(surface, position, velocity)
-    slack = noise(surface, level, position, velocity, time if time < math.inf else scale / np.linalg.norm(velocity))
+def check_hit(surface, position, velocity, pull, time, found, horizon):
+    """Nothing outside before the hit; at a hit that is found, on the wall and on the way out."""
+    level = level_along(surface, position, velocity, pull)
+    until = min(time, horizon)
+    slack = noise(surface, level, position, velocity, until, pull)
     outside_at_start = max(level(mp.mpf(0)), 0)
     assert time >= 0.0
-    if time == math.inf:
-        horizon = 1e3 * scale / np.linalg.norm(velocity)
-        assert highest(level, horizon) <= 1e3 * slack + outside_at_start
+    if time > horizon:
+        # A flight that only touches may count as a miss.
+        assert level.highest(horizon) <= 1e3 * slack + outside_at_start
         return
-    assert highest(level, time) <= slack + outside_at_start
-    assert abs(level(mp.mpf(float(time)))) <= slack + outside_at_start
-    slope, bend = level.deriv()(mp.mpf(float(time))), abs(level.deriv(2)(mp.mpf(0)))
-    steep = np.linalg.norm(call(base.inner_gradient, surface, position, position)) * np.linalg.norm(velocity)
-    graze = 4 * mp.sqrt(bend * (slack + outside_at_start)) + 16 * EPSILON * (steep + bend * mp.mpf(float(time)))
+    assert level.highest(time) <= slack + outside_at_start
+    if not found:
+        return
+    now = mp.mpf(float(time))
+    slope, bend = level.slope(now), max(abs(level.slope(stop, 2)) for stop in (mp.mpf(0), now))
+    steep = steepness(surface, position, velocity, until, pull)
+    graze = 4 * mp.sqrt(bend * (slack + outside_at_start)) + 16 * EPSILON * (steep + bend * now)
+    crossing = max(time, min(horizon, surface_size(surface) / np.linalg.norm(velocity)))
+    if abs(level(now)) > slack + outside_at_start:
+        assert min((abs(root - now) for root in level.exits()), default=mp.inf) <= 1e-12 * crossing
     assert slope >= -graze
-    if slope > 100 * graze and time > 0.0:
-        root = min(real_roots(level), key=lambda root: abs(root - time))
-        assert abs(root - time) <= 2 * slack / slope
+    if slope > 100 * graze and time > 0.0 and outside_at_start == 0:
+        root = min(level.exits(), key=lambda root: abs(root - now), default=mp.inf)
+        assert abs(root - now) <= 2 * slack / slope + 1e-12 * crossing * bool(any(pull))
+
+
+@every_surface
+@given(**flights)
+def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
+    """Against the exact polynomial."""
+    surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
+    horizon = 1e3 * scale / np.linalg.norm(velocity)
+    for _ask in range(100):
+        time, found = call(base.first_hit, surface, position, velocity)
+        check_hit(surface, position, velocity, np.zeros(3), time, found, horizon)
+        if found:
+            return
+        position = position + time * velocity
+    raise AssertionError("not found")
+
+
+@every_surface
+@given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
+def test_falling_hits_lead_to_the_exact_first_root(name, point, direction, depth, lean, scale, speed, pull, heavy):
+    """Asked again from where the last answer ended: never past the exit, and there in the end."""
+    surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
+    pull = heavy * speed * speed * scale * (pull + 1e-3)
+    # Until it has fallen several sizes: the further it falls the shorter are the steps of a quartic.
+    left, asked = 5.0 / (speed * max(1.0, math.sqrt(heavy))), 0
+    while left > 0.0:
+        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        check_hit(surface, position, velocity, pull, time, found, left)
+        if found:
+            return
+        assert time > 0.0
+        position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
+        left, asked = left - time, asked + 1
+        assert asked < 500
+
+
+@every_surface
+@pytest.mark.parametrize("depth", [0.0, 2e-16, -2e-16])
+def test_falling_from_the_wall_the_direction_decides(name, depth):
+    """Outward: now. Inward: not now. Resting: now where gravity presses, not now where it pulls off the wall."""
+    surface, position, velocity = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), depth, 0.6, 1.0, 1.0)
+    normal = np.array(call(base.unit_normal, surface, position))
+    for pull in (0.1 * normal, -0.1 * normal):
+        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        assert found
+        assert time <= 1e-15
+        assert call(base.falling_hit, surface, position, -velocity, pull)[0] > 0.1
+
+
+@every_surface
+def test_at_rest_on_the_wall_gravity_decides(name):
+    """It presses: a hit now, up to the fall through round-off. It pulls off the wall: no hit."""
+    surface, position, _ = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), 0.0, 0.6, 1.0, 1.0)
+    normal, at_rest = np.array(call(base.unit_normal, surface, position)), np.zeros(3)
+    position = np.array(call(base.settle, surface, position))
+    time, found = call(base.falling_hit, surface, position, at_rest, normal)
+    assert found
+    assert time <= 1e-7
+    assert call(base.falling_hit, surface, position, at_rest, -normal)[0] > 0.1
+
+
+@every_surface
+@pytest.mark.parametrize("off", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_a_parabola_that_just_touches(name, off, scale):
+    """Double roots, missed or crossed by a little: no hit is skipped, and none is made up."""
+    surface = numbers_of(name, scale)
+    wall = wall_point(surface, scale * np.array([0.3, 0.5, -0.4]))
+    normal = np.array(call(base.unit_normal, surface, wall))
+    along = np.cross(normal, [0.3, -0.2, 0.5])
+    along /= np.linalg.norm(along)
+    # Thrown up along the wall: at its summit the parabola is `off` outside, and more curved than any wall.
+    pull = -40.0 * scale * normal
+    summit, flying = wall + off * scale * normal, 0.05
+    position, velocity = summit + 0.5 * flying**2 * pull - flying * scale * along, scale * along - flying * pull
+    left, hit = 2.0 * flying, False
+    while left > 0.0 and not hit:
+        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        check_hit(surface, position, velocity, pull, time, found, left)
+        assert time > 0.0
+        hit, left = found and time <= left, left - time
+        if left < 0.0:
+            break
+        position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
+    if off != 0.0:
+        assert hit == (off > 0.0)
 
 
 @every_surface
@@ -230,17 +269,19 @@ def test_head_on_the_hit_is_at_depth_over_speed(name, scale, speed, depth):
     """No absolute threshold anywhere: the same flight at every scale and speed."""
     point, direction = np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0])
     surface, position, velocity = start(name, point, direction, depth, 1.0, scale, speed)
-    assert call(base.first_hit, surface, position, velocity) * speed == pytest.approx(depth, rel=1e-12, abs=1e-15)
+    time, found = call(base.first_hit, surface, position, velocity)
+    assert found
+    assert time * speed == pytest.approx(depth, rel=1e-12, abs=1e-15)
     sideways = start(name, point, direction, depth, 0.0, scale, speed)[2]
-    grazing = call(base.first_hit, surface, position, 1e-4 * velocity + sideways) * speed
-    assert grazing >= 0.9 * depth
+    grazing, _found = call(base.first_hit, surface, position, 1e-4 * velocity + sideways)
+    assert grazing * speed >= 0.9 * depth
 
 
 @every_surface
 @given(point=directions, depth=depths)
 def test_at_rest_there_is_no_hit(name, point, depth):
     surface, position, _ = start(name, point, point, depth, 0.0, 1.0, 1.0)
-    assert call(base.first_hit, surface, position, np.zeros(3)) == math.inf
+    assert call(base.first_hit, surface, position, np.zeros(3)) == (math.inf, True)
 
 
 @every_surface
@@ -248,11 +289,13 @@ def test_at_rest_there_is_no_hit(name, point, depth):
 def test_from_the_wall_the_direction_decides(name, depth):
     """Outward: now. Inward: not now, and not an instant after."""
     surface, position, velocity = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), depth, 0.6, 1.0, 1.0)
-    assert call(base.first_hit, surface, position, velocity) <= 1e-15
-    assert call(base.first_hit, surface, position, -velocity) > 0.1
+    time, found = call(base.first_hit, surface, position, velocity)
+    assert found
+    assert time <= 1e-15
+    assert call(base.first_hit, surface, position, -velocity)[0] > 0.1
 
 
-@every_quadric
+@every_surface
 @given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
@@ -261,24 +304,25 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
     level = level_along(surface, position, velocity, pull)
     assert time >= 0.0
     if time == math.inf:
-        assert highest(level, 1e3 / (speed * math.sqrt(heavy))) <= noise(surface, level, position, velocity)
+        horizon = 1e3 / (speed * math.sqrt(heavy))
+        assert level.highest(horizon) <= noise(surface, level, position, velocity)
     elif time > 0.0:
-        slack = noise(surface, level, position, velocity, time)
-        assert highest(level, time) <= slack
+        slack = noise(surface, level, position, velocity, time, pull)
+        assert level.highest(time) <= slack
         assert all(level(mp.mpf(float(time)) * k / 20) <= slack for k in range(21))
     if depth >= 1e-3:
         assert time > 0.0
 
 
-@every_quadric
+@every_surface
 @settings(max_examples=10)
 @given(point=directions, direction=directions, pull=directions, lean=st.floats(0.3, 1.0))
 def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
-    """The same as the exact root of the quartic, after a few dozen safe steps."""
+    """The same as the exact root, after a few dozen safe steps."""
     surface, position, velocity = start(name, point, direction, 0.2, lean, 1.0, 1.0)
     level = level_along(surface, position, velocity, pull)
-    exits = [root for root in real_roots(level) if root > 0 and level.deriv()(root) > mp.mpf("0.05")]
-    leaves = [root for root in exits if highest(level, root * (1 - mp.mpf(10) ** -12)) < 0]
+    exits = [root for root in level.exits() if root > 0 and level.slope(root) > mp.mpf("0.05")]
+    leaves = [root for root in exits if level.highest(root * (1 - mp.mpf(10) ** -12)) < 0]
     time = 0.0
     for _ in range(60):
         if time == math.inf:
@@ -324,7 +368,7 @@ def test_chain_rule_of_gap_and_inner(name, point, scale, near):
     surface, point = numbers_of(name, scale), scale * point
     q = call(base.inner, surface, point)
     slope, _ = call(base.gap_slope, surface, q, q * (1.0 + near))
-    gradient = getattr(surface, "side", 1.0) * np.array(call(base.gradient, surface, point))
+    gradient = side_of(surface) * np.array(call(base.gradient, surface, point))
     chained = slope * np.array(call(base.inner_gradient, surface, point, point))
     assert chained == pytest.approx(gradient, abs=(abs(near) + 16 * EPSILON) * np.linalg.norm(gradient))
 
@@ -379,8 +423,8 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
     size = min(SURFACES[name](scale).size(), scale)
-    # A torus is pushed by an iteration, which a step of its size need not contract.
-    size *= 1.0 if name in QUADRICS else 0.3
+    # Newton's method finds the chord of a step that is well below the size, a chord into the depth least of all.
+    size *= 0.6 if name in QUADRICS else 0.3
     free = length * size * direction / np.linalg.norm(direction)
     normal = np.array(call(base.chord_normal, surface, wall, free, chord_of(surface, wall, free)))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
@@ -388,7 +432,9 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
     assert np.linalg.norm(reflected) == pytest.approx(np.linalg.norm(free), rel=8 * EPSILON)
     end = wall + 0.5 * (free + reflected)
     slope = np.linalg.norm(call(base.gradient, surface, wall))
-    assert abs(call(base.phi, surface, end)) <= 64 * EPSILON * slope * scale
+    # Where the chord crosses the end of a capsule's cylinder, H jumps and the iteration only creeps.
+    round_off = 64 * EPSILON if name not in ("capsule", "rod") else 1e-12
+    assert abs(call(base.phi, surface, end)) <= round_off * slope * scale
 
 
 @every_surface
@@ -423,7 +469,7 @@ def test_a_normal_of_any_length_is_scaled_to_one():
         (lambda: swarm.Ellipsoid((1.0, 0.0, 2.0)), ["semi_axes[1]", "above 0", "got 0"]),
         (lambda: swarm.Ellipsoid(1.0), ["semi_axes", "three numbers", "got 1.0"]),
         (lambda: swarm.Ellipsoid((1.0, 1.0, 1.0), side="in"), ["side", "did you mean 'inside'?"]),
-        (lambda: swarm.Plane((0.0, 0.0, 0.0)), ["normal", "zero vector"]),
+        (lambda: swarm.Plane((0.0, 0.0, 0.0)), ["normal", "length 0"]),
         (lambda: swarm.Plane((0.0, 0.0, 1.0), offset=math.nan), ["offset", "finite", "nan"]),
         (lambda: swarm.Sphere(1.0).phi(np.zeros((2, 3))), ["points", "(3, N)", "(2, 3)"]),
         (lambda: swarm.Sphere(1.0).phi("abc"), ["points", "array of numbers", "got str"]),
@@ -441,10 +487,10 @@ def test_bounds_hold_the_admissible_side(name):
     """Random points, those of the admissible side all in the box; a solid and a plane bound nothing."""
     points = np.random.default_rng(2).uniform(-2.0, 2.0, (3, 4000))
     surface = SURFACES[name]()
-    side = getattr(numbers_of(name), "side", 1.0)
+    side = side_of(numbers_of(name))
     low, high = (np.array(corner)[:, None] for corner in surface.bounds())
     admissible = points[:, side * surface.phi(points) <= 0.0]
     assert admissible.shape[1] > 10
     assert ((admissible >= low) & (admissible <= high)).all()
-    assert np.isfinite(high - low).all() == (name in {"sphere", "ellipsoid", "torus"})
+    assert np.isfinite(high - low).all() == (side > 0.0 and name != "plane")
     assert np.isfinite(surface.size()) == (name != "plane")

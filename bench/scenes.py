@@ -1,0 +1,82 @@
+"""Nanoseconds an impact of `Impact` in scenes from one sphere to the fullest: a scene pays for what is in it.
+
+One thread, kernels only, minimum and median; `ratio` is to the sphere of the same run.
+"""
+
+import swarm
+from swarm.surfaces import Surface
+
+from .throughput import Row, advance_seconds, repeated, show, write
+
+GRAVITY = (0.0, 0.0, -1.0)
+
+
+def _balls(count: int) -> list[Surface]:
+    """A sphere with this many solid balls in it."""
+    places = [(s, 0.0, 0.0) for s in (0.25, -0.25)] + [(0.0, s, 0.0) for s in (0.25, -0.25)]
+    places += [(0.0, 0.0, s) for s in (0.25, -0.25)]
+    return [swarm.Sphere(0.5), *(swarm.Sphere(0.1, place, "outside") for place in places[:count])]
+
+
+SPHERE = swarm.Sphere(0.5)
+ELLIPSOID = swarm.Ellipsoid((0.3, 0.3, 0.6))
+TURN = (0.9, 0.1, 0.2, 0.3)
+# name -> (surfaces, gravity, bar)
+SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] = {
+    "sphere": ([SPHERE], None, "6"),
+    "ellipsoid": ([ELLIPSOID], None, "7.5"),
+    "ellipsoid, rotated": ([swarm.Ellipsoid((0.3, 0.3, 0.6), rotation=TURN)], None, ""),
+    "box": ([swarm.Box((0.5, 0.4, 0.3))], None, "10"),
+    "box, rotated": ([swarm.Box((0.5, 0.4, 0.3), rotation=TURN)], None, ""),
+    "capped cylinder": ([swarm.Cylinder(0.4, length=1.0)], None, "14"),
+    "general quadric": ([swarm.Quadric(((9.0, 1.0, 0.0), (1.0, 6.0, 0.0), (0.0, 0.0, 4.0)), constant=-1.0)], None, ""),
+    "sphere, 1 ball": (_balls(1), None, ""),
+    "sphere, 2 balls": (_balls(2), None, ""),
+    "sphere, 4 balls": (_balls(4), None, ""),
+    "sphere, 6 balls": (_balls(6), None, ""),
+    "sphere, gravity": ([SPHERE], GRAVITY, "40"),
+    "ellipsoid, gravity": ([ELLIPSOID], GRAVITY, "45"),
+    "box, gravity": ([swarm.Box((0.5, 0.4, 0.3))], GRAVITY, ""),
+    "sphere, 2 balls, gravity": (_balls(2), GRAVITY, ""),
+    "sphere, restitution 0.999": ([swarm.Sphere(0.5, restitution=0.999)], None, ""),
+    "capsule": ([swarm.Capsule(0.3, 0.6)], None, ""),
+    "torus": ([swarm.Torus(0.5, 0.2)], None, ""),
+    "formula of the ellipsoid": ([swarm.Formula("x**2/0.09 + y**2/0.09 + z**2/0.36 - 1")], None, "12 x 8"),
+    "sphere, box, cylinder, capsule, torus, gravity": (
+        [
+            swarm.Sphere(0.5),
+            swarm.Box((0.06, 0.05, 0.04), (0.25, 0.0, 0.0), "outside", rotation=TURN),
+            swarm.Cylinder(0.05, length=0.1, center=(-0.25, 0.0, 0.0), side="outside"),
+            swarm.Capsule(0.03, 0.1, center=(0.0, 0.25, 0.0), side="outside"),
+            swarm.Torus(0.1, 0.03, (0.0, -0.25, 0.0), "outside"),
+        ],
+        GRAVITY,
+        "",
+    ),
+}
+
+
+# Every scene compiles kernels of its own: a quick run takes one of each kind of flight.
+QUICK = ("sphere", "capped cylinder", "sphere, gravity", "formula of the ellipsoid")
+
+
+def main(quick: bool) -> None:
+    """Measure, print, and write the table of this machine."""
+    n, until, repeats = (500, 100.0, 1) if quick else (10_000, 40.0, 5)
+    rows = []
+    for name in QUICK if quick else SCENES:
+        surfaces, gravity, bar = SCENES[name]
+        scene = swarm.Scene(surfaces, gravity)
+        # Scenes without vectorised lanes are an order slower.
+        slow = any(isinstance(surface, swarm.Torus | swarm.Capsule | swarm.Formula) for surface in surfaces)
+        measure = advance_seconds(scene, swarm.Impact(), n // 10 if slow else n, until)
+
+        def per_impact(measure=measure) -> float:  # type: ignore[no-untyped-def]
+            seconds, impacts = measure()
+            return 1e9 * seconds / impacts
+
+        best, median = repeated(per_impact, repeats)
+        rows.append(Row(name, best, median, "ns/impact", bar, best / rows[0].best if rows else 1.0))
+    show(rows)
+    if not quick:
+        write(rows, "scenes")

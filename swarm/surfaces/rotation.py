@@ -1,0 +1,129 @@
+"""Rotations as unit quaternions (w, x, y, z): what an argument may say, and what follows from it."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Vector, number, vector
+from ..errors import SceneError
+
+Quaternion = tuple[float, float, float, float]
+
+
+def quaternion(name: str, value: Any) -> Quaternion | None:
+    """A rotation as a unit quaternion; None where it turns nothing.
+
+    Args:
+        name: the argument's name, for errors.
+        value: None, four numbers (w, x, y, z) not all 0, or {"axis": three numbers not all 0, "angle": radians}.
+
+    Raises:
+        SceneError: it is none of these, or of length 0.
+
+    >>> quaternion("rotation", {"axis": (0, 0, 2), "angle": math.pi})
+    (6.123233995736766e-17, 0.0, 0.0, 1.0)
+    """
+    if value is None:
+        return None
+    if isinstance(value, Mapping):
+        if set(value) != {"axis", "angle"}:
+            raise SceneError(f"{name} must have the keys axis and angle, got {sorted(map(str, value))}")
+        axis = unit(f"{name}.axis", value["axis"])
+        half = 0.5 * number(f"{name}.angle", value["angle"], "a finite number of radians")
+        turn = math.cos(half), *(math.sin(half) * part for part in axis)
+    else:
+        turn = unit(name, value, 4)
+    return None if turn[0] in (1.0, -1.0) else turn  # type: ignore[return-value]
+
+
+def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
+    """`value` as that many numbers scaled to length 1, whatever their magnitude."""
+    parts: tuple[float, ...] = ()
+    if count == 3:
+        parts = vector(name, value)
+    else:
+        try:
+            parts = tuple(number(f"{name}[{i}]", part) for i, part in enumerate(value))
+        except TypeError:
+            parts = ()
+        if isinstance(value, (str, bytes)) or len(parts) != count:
+            raise SceneError(
+                f"{name} must be a quaternion of four numbers (w, x, y, z), or a table of axis and angle, got {value!r}"
+            )
+    largest = max(map(abs, parts))
+    if largest == 0.0:
+        raise SceneError(f"{name} must not be of length 0, got {tuple(parts)}")
+    # Scaled first: the square of a part itself may not be a number.
+    scaled = [part / largest for part in parts]
+    length = math.hypot(*scaled)
+    return tuple(part / length for part in scaled)
+
+
+def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
+    """The rotation matrix of a unit quaternion: from the surface's own frame to the scene's."""
+    if turn is None:
+        return np.eye(3)
+    w, x, y, z = turn
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+
+
+def onto(axis: Vector) -> Quaternion | None:
+    """The shortest rotation of the z axis onto the unit vector `axis`."""
+    x, y, z = axis
+    if x == 0.0 and y == 0.0:
+        return None if z > 0.0 else (0.0, 1.0, 0.0, 0.0)
+    # Half way between z and the axis; near -z their sum cancels, but not for the quaternion's purpose.
+    return unit("axis", (1.0 + z, -y, x, 0.0), 4)  # type: ignore[return-value]
+
+
+def after(second: Quaternion | None, first: Quaternion | None) -> Quaternion | None:
+    """The rotation `first`, followed by `second`."""
+    if first is None or second is None:
+        return second if first is None else first
+    a, b, c, d = second
+    w, x, y, z = first
+    return (
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    )
+
+
+def turned(turn: Quaternion | None, point: Vector) -> Vector:
+    """A vector, rotated."""
+    return point if turn is None else tuple((matrix(turn) @ np.array(point)).tolist())
+
+
+def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
+    """A vector of the scene in the surface's own frame."""
+    return point if turn is None else tuple((matrix(turn).T @ np.array(point)).tolist())
+
+
+class Rotated(NamedTuple):
+    """A surface `body` in its own frame, and the matrix from that frame to the scene's."""
+
+    body: Any
+    xx: float
+    xy: float
+    xz: float
+    yx: float
+    yy: float
+    yz: float
+    zx: float
+    zy: float
+    zz: float
+
+
+def rotated(turn: Quaternion | None, body: Any) -> Any:
+    """What kernels take of a rotated surface; `body` has its centre in its own frame, `turned_back(turn, center)`."""
+    return body if turn is None else Rotated(body, *map(float, matrix(turn).ravel()))

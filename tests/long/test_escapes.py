@@ -1,0 +1,134 @@
+"""1e9 impacts in all kinds of scenes: no particle is ever outside of its walls, no energy is lost.
+
+At every frame no particle is outside any wall by more than 1e-12 of the scene's size, and the energy of every particle,
+with what restitution took of it, is that of the start to 1e-11. The bulk is flown in the scenes whose impacts cost
+nanoseconds; the others fly a million and more. `pytest -m long -s` prints what was counted.
+"""
+
+import math
+import time as clock
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm import scene_file
+
+pytestmark = pytest.mark.long
+
+FILES = sorted((Path(__file__).parents[2] / "examples" / "scenes").glob("*.toml"))
+OUTSIDE, LOST = 1e-12, 1e-11
+FRAMES = 50
+BILLION = 1_000_000_000
+
+TURN = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
+DOWN = (0.3, -0.2, -9.81)
+LID = swarm.Plane((0.0, 0.0, 1.0), 0.6)
+
+# Scenes, and how many impacts each flies at least. Those of a contact step or of little gravity are as fast.
+SCENES = {
+    "sphere": ([swarm.Sphere(0.5)], None, 250e6),
+    "ellipsoid": ([swarm.Ellipsoid((0.3, 0.4, 0.6), (0.1, 0.2, 0.3), rotation=TURN)], None, 250e6),
+    "ball in ellipsoid": ([swarm.Ellipsoid((0.3, 0.3, 0.6)), swarm.Sphere(0.15, (0, 0, 0.2), "outside")], None, 150e6),
+    "box": ([swarm.Box((0.5, 0.4, 0.3), (0.1, 0.2, 0.3), rotation=TURN)], None, 150e6),
+    "can": ([swarm.Cylinder(0.4, (1.0, 0.5, -1.0), 0.9, (0.1, 0.2, 0.3))], None, 150e6),
+    "corners": ([swarm.Sphere(0.5), swarm.Plane((1, 0.2, 0), 0.2), swarm.Plane((0, 1, 0.3), 0.1)], None, 50e6),
+    "sphere, falling": ([swarm.Sphere(0.5)], DOWN, 20e6),
+    "box, falling": ([swarm.Box((0.5, 0.4, 0.3), rotation=TURN)], DOWN, 10e6),
+    "can, falling": ([swarm.Cylinder(0.4, (1.0, 0.5, -1.0), 0.9)], DOWN, 10e6),
+    "cone and lid": ([swarm.Cone(0.6), LID], None, 10e6),
+    "cone and lid, falling": ([swarm.Cone(0.6), LID], DOWN, 2e6),
+    "bowl and lid, falling": ([swarm.Paraboloid(0.2), LID], DOWN, 2e6),
+    "torus": ([swarm.Torus(0.5, 0.2, rotation=TURN)], None, 10e6),
+    "torus, falling": ([swarm.Torus(0.5, 0.2)], DOWN, 2e6),
+    "capsule": ([swarm.Capsule(0.3, 0.5, (1.0, 0.5, -1.0))], None, 10e6),
+    "capsule, falling": ([swarm.Capsule(0.3, 0.5)], DOWN, 2e6),
+    "formula": ([swarm.Formula("x**2/0.09 + y**2/0.09 + z**4/0.13 - 1")], None, 5e6),
+    "formula, falling": ([swarm.Formula("x**2/0.09 + y**2/0.09 + z**4/0.13 - 1")], DOWN, 1e6),
+    "hourglass": ([swarm.Quadric(np.diag([1.0, 2.0, -1.5]), constant=-0.05), swarm.Box((0.5, 0.4, 0.5))], None, 5e6),
+    "solids in a sphere": (
+        [
+            swarm.Sphere(1.0),
+            swarm.Box((0.15, 0.1, 0.2), (0.1, 0.0, -0.6), "outside", rotation=TURN),
+            swarm.Cylinder(0.1, (1.0, 1.0, 0.0), 0.5, (0.0, 0.0, 0.6), "outside"),
+            swarm.Torus(0.5, 0.1, side="outside"),
+        ],
+        None,
+        2e5,
+    ),
+    "lossy box, falling": ([swarm.Box((0.5, 0.4, 0.3), rotation=TURN, restitution=0.9)], DOWN, 1e6),
+    "lossy sphere": ([swarm.Sphere(0.5, restitution=0.99)], None, 1e6),
+    "lossy sphere, falling": ([swarm.Sphere(0.5, restitution=0.8)], DOWN, 1e6),
+}
+COUNTED = {}
+
+
+def checked(scene, particles, method, until, name):
+    """Run to `until` and look at every frame: the number of impacts."""
+    result = swarm.simulate(scene, particles, method, until=until, every=until / FRAMES, threads=2, progress=False)
+    seen, size = result.observables, scene.finite_size()
+    outside, lost = float(seen["max_penetration"].max()) / size, float(seen["energy_error"].max())
+    worst = COUNTED.setdefault(name, [0, 0.0, 0.0])
+    impacts = int(seen["impacts"][-1])
+    COUNTED[name] = [worst[0] + impacts, max(worst[1], outside), max(worst[2], lost)]
+    assert outside <= OUTSIDE
+    assert lost <= LOST
+    # Independently of the observables: no wall has the particle behind it.
+    gaps = scene.gaps(result.particles.position)
+    assert np.isfinite(result.particles.position).all()
+    assert gaps.max() <= 1e-9
+    return impacts
+
+
+def told(name, began, capsys):
+    """One line on what was counted."""
+    impacts, outside, lost = COUNTED[name]
+    with capsys.disabled():
+        print(
+            f"\n{name:28} {impacts:>13,} impacts, outside by {outside:.1e} of the size, energy off by {lost:.1e},"
+            f" {clock.perf_counter() - began:.1f} s",
+            end="",
+        )
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_nothing_escapes_in_the_shipped_scenes(path, capsys):
+    began, job = clock.perf_counter(), scene_file.read(path)
+    if not isinstance(job.method, swarm.Impact):
+        pytest.skip("soft walls, or frames that fall on steps")
+    checked(job.scene, job.particles(), job.method, job.run.until, path.stem)
+    told(path.stem, began, capsys)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_nothing_escapes(name, capsys):
+    began = clock.perf_counter()
+    surfaces, gravity, wanted = SCENES[name]
+    scene = swarm.Scene(surfaces, gravity=gravity)
+    particles = swarm.fill(scene, 2000, speed=1.0, seed=9)
+    # A resting particle slides in as many steps as it likes: coarse ones are as good to escape from.
+    method = swarm.Impact(shortest_flight=1e-3) if gravity else swarm.Impact()
+    trial = 2.0
+    impacts = checked(scene, particles, method, trial, name)
+    if impacts < wanted:
+        # Losses bring impacts to an end, or slides to no end.
+        until = trial * min(wanted / max(impacts, 1), 1e7)
+        if surfaces[0].restitution < 1.0:
+            until = min(until, 50.0 * trial)
+        else:
+            until *= 1.1
+        impacts = checked(scene, particles, method, until, name)
+    told(name, began, capsys)
+    assert impacts >= (wanted if surfaces[0].restitution == 1.0 else 1e4)
+    assert math.isfinite(COUNTED[name][2])
+
+
+def test_they_were_a_billion(request, capsys):
+    """The last one: the sum over the others, where all of them ran."""
+    if len(COUNTED) < len(SCENES):
+        pytest.skip("not all scenes ran")
+    total = sum(impacts for impacts, _outside, _lost in COUNTED.values())
+    with capsys.disabled():
+        print(f"\n{total:,} impacts, no escape", end="")
+    assert total >= BILLION

@@ -1,0 +1,336 @@
+"""The first hit of 1e5 flights a surface, straight and falling, against the exact first root: none is missed.
+
+What is compared. Every flight is asked as the lanes ask it: `first_hit` of all walls of the surface, again from where
+the answer only said that it is free until then. The level along each leg is a polynomial of time, built from the same
+doubles with 32 digits (see `roots`); its roots and turning points tell when the flight leaves. An answer is EXACT where
+the time is that of the first exit to 1e-12 of itself or of the crossing time; TOUCHED where it is none (a double root,
+a start on the wall) but the level is 0 to 1e-14 of the size of its terms, there and everywhere before. It is MISSED
+where the flight was outside by more before, and EARLY where it is still inside: of both there must be none.
+Of each surface 2000 flights more are judged with fractions, that is without any rounding.
+
+The flights: sizes 1e-6 to 1e6 m, speeds 1e-6 to 1e6 m/s, falls from 1e-3 to 1e3 times as strong as one that crosses the
+surface in its crossing time; a third from random places, a third from the wall or 1e-16 to 1e-3 sizes from it at angles
+down to 1e-15, a third past a point that touches the wall, or misses it by 1e-15 to 1e-6 sizes.
+"""
+
+import itertools
+import math
+import time as clock
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from roots import EARLY, EXACT, MISSED, TOUCHED, Course, Exact, Terms, exact_course, judge, judge_all
+
+import swarm
+from swarm._jit import kernel
+from swarm.gravity import Gravity
+from swarm.surfaces import base
+from swarm.surfaces.capsule import CapsuleNumbers
+from swarm.surfaces.chain import chain_of, first_hit
+from swarm.surfaces.owned import OwnNumbers
+from swarm.surfaces.rotated import _own
+from swarm.surfaces.rotation import Rotated
+from swarm.surfaces.solid import SolidNumbers
+from swarm.surfaces.torus import TorusNumbers
+
+pytestmark = pytest.mark.long
+
+FLIGHTS = 100_000
+EXACTLY = 1000  # straight, and as many falling
+SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
+# Of the time or the crossing time; of the size of the level's terms.
+NEAR, TOUCH = 1e-12, 1e-14
+# Legs of a flight at most, and sizes from the surface within which it is followed.
+LEGS, FAR = 100, 30.0
+
+TURN = {"axis": (1.0, -2.0, 3.0), "angle": 1.2}
+CENTER = np.array([0.2, -0.3, 0.1])
+AXIS = (1.0, 0.5, -1.0)
+
+
+def quadric(diagonal, linear=(0.0, 0.0, 0.0), constant=0.0, turn=TURN):
+    return lambda s, **more: swarm.Quadric(
+        np.diag(diagonal) / s**2, np.array(linear) / s, constant, CENTER * s, rotation=turn, **more
+    )
+
+
+def formula(turn):
+    return lambda s, **more: swarm.Formula(
+        "(x/a)**2 + (y/b)**2 + (z/c)**4 - 1",
+        parameters={"a": 0.5 * s, "b": 0.7 * s, "c": 0.6 * s},
+        center=tuple(CENTER * s),
+        rotation=turn,
+        **more,
+    )
+
+
+BODIES = {
+    "sphere": lambda s, **more: swarm.Sphere(0.7 * s, CENTER * s, **more),
+    "ellipsoid": lambda s, **more: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), CENTER * s, **more),
+    "rotated ellipsoid": lambda s, **more: swarm.Ellipsoid(
+        (0.4 * s, 0.5 * s, 0.8 * s), CENTER * s, rotation=TURN, **more
+    ),
+    "slab": lambda s, **more: swarm.Slab((1.0, 2.0, -2.0), 0.4 * s, CENTER * s, rotation=TURN, **more),
+    "box": lambda s, **more: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s, **more),
+    "rotated box": lambda s, **more: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s, rotation=TURN, **more),
+    "pipe": lambda s, **more: swarm.Cylinder(0.6 * s, center=CENTER * s, **more),
+    "oblique pipe": lambda s, **more: swarm.Cylinder(0.6 * s, AXIS, None, CENTER * s, **more),
+    "can": lambda s, **more: swarm.Cylinder(0.4 * s, AXIS, 0.9 * s, CENTER * s, **more),
+    "cone": lambda s, **more: swarm.Cone(0.6, AXIS, CENTER * s, **more),
+    "bowl": lambda s, **more: swarm.Paraboloid(0.3 * s, (0.0, 1.0, -1.0), CENTER * s, **more),
+    "egg": quadric((1.0, 2.0, 3.0), (0.5, -0.3, 0.7), -0.5),
+    "one sheet": quadric((1.0, 2.0, -1.5), constant=-0.5),
+    "two sheets": quadric((1.0, 2.0, -1.5), constant=0.5),
+    "saddle": quadric((1.0, -2.0, 0.0), (0.0, 0.0, -1.0), turn=None),
+    "torus": lambda s, **more: swarm.Torus(0.7 * s, 0.3 * s, CENTER * s, **more),
+    "rotated torus": lambda s, **more: swarm.Torus(0.7 * s, 0.3 * s, CENTER * s, rotation=TURN, **more),
+    "capsule": lambda s, **more: swarm.Capsule(0.5 * s, 0.6 * s, center=CENTER * s, **more),
+    "oblique capsule": lambda s, **more: swarm.Capsule(0.5 * s, 0.6 * s, AXIS, CENTER * s, **more),
+    "formula": formula(None),
+    "rotated formula": formula(TURN),
+}
+CASES = [("plane", "inside"), *itertools.product(BODIES, ("inside", "outside"))]
+
+
+def surface_of(name, side, scale):
+    """One surface of the table, of this size."""
+    if name == "plane":
+        return swarm.Plane((1.0, -2.0, 0.5), 0.3 * scale)
+    return BODIES[name](scale, side=side)
+
+
+# --- Flights ---------------------------------------------------------------------------------------------
+
+
+def _directions(random, n):
+    normal = random.standard_normal((3, n))
+    return normal / np.sqrt((normal**2).sum(axis=0))
+
+
+def _distance(surface, points):
+    """phi in lengths, to first order, of the wall farthest behind; above 0 outside of the admissible part."""
+    sign, off = -1.0 if surface.is_solid() else 1.0, -math.inf
+    with np.errstate(all="ignore"):
+        for wall in surface.walls():
+            slope = np.sqrt(sum(part * part for part in base.gradient(wall, *points)))
+            off = np.maximum(off, sign * base.phi(wall, *points) / slope)
+    return off
+
+
+def _onto(surface, points):
+    """Points moved onto the surface, and the unit normals out of the admissible part there."""
+    with np.errstate(all="ignore"):
+        for _ in range(30):
+            slope = surface.gradient(points)
+            points = points - surface.phi(points) / (slope**2).sum(axis=0) * slope
+        normal = (-1.0 if surface.is_solid() else 1.0) * surface.gradient(points)
+        return points, normal / np.sqrt((normal**2).sum(axis=0))
+
+
+def flights(surface, scale, n, falls, seed):
+    """Positions, velocities and accelerations (3, n)."""
+    random = np.random.default_rng(seed)
+    chosen, have = [], 0
+    small = [0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6]
+    while have < n:
+        points = (CENTER[:, None] + 1.5 * random.uniform(-1.0, 1.0, (3, n)) * 10.0 ** random.uniform(-1, 1, n)) * scale
+        speed = 10.0 ** random.uniform(-6.0, 6.0, n)
+        along = _directions(random, n)
+        pull = np.zeros((3, n))
+        if falls:
+            pull = _directions(random, n) * speed**2 / scale * 10.0 ** random.uniform(-3.0, 3.0, n)
+        kind = random.integers(0, 3, n)
+        places, normal = _onto(surface, points)
+        tangent = np.cross(normal.T, along.T).T
+        tangent /= np.maximum(np.sqrt((tangent**2).sum(axis=0)), 1e-3)
+        depth = random.choice([0.0, 0.0, 1e-16, -1e-16, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3], n)
+        lean = np.where(random.random(n) < 0.3, random.uniform(-1.0, 1.0, n), random.choice([*small, 1.0, -1.0], n))
+        slanted = lean * normal + np.sqrt(1.0 - lean**2) * tangent
+        back = scale / speed * 10.0 ** random.uniform(-3.0, 0.3, n)
+        aside = places + random.choice(small, n) * scale * normal
+        graze = speed * (tangent + random.choice([0.0, 0.0, *small], n) * normal)
+        position = np.where(kind == 0, points, places - depth * scale * normal)
+        position = np.where(kind == 2, aside - back * graze + 0.5 * back**2 * pull, position)
+        velocity = np.where(kind == 0, speed * along, np.where(kind == 1, speed * slanted, graze - back * pull))
+        off = _distance(surface, position)
+        good = np.isfinite(position).all(axis=0) & np.isfinite(velocity).all(axis=0) & (off <= 4e-16 * scale)
+        # The wall itself must have been found, and not an edge.
+        good &= (kind == 0) | (np.abs(_distance(surface, places)) <= 1e-13 * scale)
+        chosen.append(np.array([position, velocity, pull])[:, :, good])
+        have += np.count_nonzero(good)
+    return np.concatenate(chosen, axis=2)[:, :, :n]
+
+
+@kernel
+def straight_hits(chain, position, velocity, pull, times, index):
+    """`first_hit` of every straight flight."""
+    for i in range(times.size):
+        times[i], index[i] = first_hit(
+            chain, None, position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i]
+        )
+
+
+@kernel
+def falling_hits(chain, position, velocity, pull, times, index):
+    """`first_hit` of every falling flight, each with an acceleration of its own."""
+    for i in range(times.size):
+        times[i], index[i] = first_hit(
+            chain, Gravity(pull[0, i], pull[1, i], pull[2, i]),
+            position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i],
+        )  # fmt: skip
+
+
+# --- The level along a flight ----------------------------------------------------------------------------
+
+
+def levels(surface, kind, position, velocity, half_pull):
+    """How the polynomials of a surface make its level, and these, as courses of `kind`."""
+    rows = [position, velocity] if half_pull is None else [position, velocity, half_pull]
+    path = [kind([kind.number(row[i]) for row in rows]) for i in range(3)]
+    found = surface.walls()
+    body = found[0].body if isinstance(found[0], Rotated) else found[0]
+    if isinstance(body, SolidNumbers):
+        parts, rest = [], body.parts
+        while rest is not None:
+            parts, rest = [*parts, base.level_of(rest.first, base.inner(rest.first, *path))], rest.rest
+        return 1, parts
+    if isinstance(body, (TorusNumbers, CapsuleNumbers, OwnNumbers)):
+        path = _own(found[0], *path) if isinstance(found[0], Rotated) else path
+        return _by_hand(surface, body, *(axis - c for axis, c in zip(path, body[:3], strict=True)))
+    return 0, [base.level_of(wall, base.inner(wall, *path)) for wall in found]
+
+
+def _by_hand(surface, body, x, y, z):
+    """The same for what is no quadric."""
+    if isinstance(body, TorusNumbers):
+        # (|r|^2 + R^2 - a^2)^2 - 4 R^2 rho^2
+        major, minor = Fraction(body.major), Fraction(body.minor)
+        both = x * x + y * y + z * z + (major**2 - minor**2)
+        return 0, [body.side * (both * both - 4 * major**2 * (x * x + y * y))]
+    if isinstance(body, CapsuleNumbers):
+        radius2, up, down = Fraction(body.radius) ** 2, z - body.half, z + body.half
+        across = x * x + y * y - radius2
+        return 2, [body.side * across, body.side * (across + up * up), body.side * (across + down * down), up, -down]
+    a, b, c = (1 / Fraction(surface.parameters[name]) for name in "abc")
+    return 0, [body.side * (a**2 * (x * x) + b**2 * (y * y) + c**4 * (z * z * z * z) - 1.0)]
+
+
+def units(scale, velocity, pull):
+    """The crossing time of every flight, as a power of 2."""
+    speed, fall = np.sqrt((velocity**2).sum(axis=0)), np.sqrt((pull**2).sum(axis=0))
+    with np.errstate(divide="ignore"):
+        return 2.0 ** np.round(np.log2(np.minimum(scale / speed, np.sqrt(scale / fall))))
+
+
+def _table(courses, part):
+    """One array (flights, polynomials, degree + 1)."""
+    degree = max(len(course.parts) for course in courses)
+    n = max(np.size(part(one)) for one in courses[0].parts)
+    table = np.zeros((n, len(courses), degree))
+    for k, course in enumerate(courses):
+        for j, one in enumerate(course.parts):
+            table[:, k, j] = part(one)
+    return table
+
+
+class Tally:
+    """What came of the flights of one surface."""
+
+    def __init__(self):
+        self.counts, self.error, self.residual, self.legs, self.aloft = np.zeros(4, np.int64), 0.0, 0.0, 0, 0
+        self.unfinished = 0
+        self.exactly, self.examples = 0, []
+        self.too_early, self.depth, self.late = 0.0, 0.0, 0.0
+
+    def add(self, verdicts, errors, residuals):
+        self.counts += np.bincount(verdicts, minlength=4)
+        self.error = max(self.error, errors[verdicts == EXACT].max(initial=0.0))
+        self.residual = max(self.residual, residuals[verdicts <= TOUCHED].max(initial=0.0))
+        self.too_early = max(self.too_early, errors[verdicts == EARLY].max(initial=0.0))
+        self.depth = max(self.depth, residuals[verdicts == EARLY].max(initial=0.0))
+        self.late = max(self.late, residuals[verdicts == MISSED].max(initial=0.0))
+
+
+def judged(surface, scale, position, velocity, pull, times, found, tally, seed):
+    """Verdicts of the answers to these flights; some of them once more in exact arithmetic."""
+    unit = units(scale, velocity, pull)
+    moved, half_pull = velocity * unit, 0.5 * pull * unit**2 if pull.any() else None
+    kind, courses = levels(surface, Course, position, moved, half_pull)
+    _, sizes = levels(surface, Terms, *(None if row is None else np.abs(row) for row in (position, moved, half_pull)))
+    high = _table(courses, lambda one: Course.number(one).high)
+    low = _table(courses, lambda one: Course.number(one).low)
+    terms, scaled = _table(sizes, lambda one: one), times / unit
+    verdicts, errors, residuals = np.zeros(times.size, np.int64), np.zeros(times.size), np.zeros(times.size)
+
+    def half(part):
+        judge_all(
+            kind, high[part], low[part], terms[part], scaled[part], found[part], NEAR, TOUCH,
+            verdicts[part], errors[part], residuals[part],
+        )  # fmt: skip
+
+    middle = times.size // 2
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(half, (slice(0, middle), slice(middle, times.size))))
+    tally.add(verdicts, errors, residuals)
+    for i in np.flatnonzero(verdicts > TOUCHED)[:3]:
+        words = {MISSED: "missed", EARLY: "early"}[int(verdicts[i])]
+        tally.examples.append(
+            f"{surface!r}: {words}, r={position[:, i].tolist()} v={velocity[:, i].tolist()} g={pull[:, i].tolist()}"
+            f" t={times[i]!r} found={bool(found[i])} residual={residuals[i]:.2g}"
+        )
+    some = np.random.default_rng(seed).permutation(np.flatnonzero(found & np.isfinite(times)))
+    for i in some[: EXACTLY // len(SCALES) if times.size > EXACTLY else 0]:
+        _judge_exactly(surface, position[:, i], moved[:, i], None if half_pull is None else half_pull[:, i], scaled[i],
+                       terms[i], tally)  # fmt: skip
+
+
+def _judge_exactly(surface, position, velocity, half_pull, time, terms, tally):
+    rows = [None if row is None else [Fraction(float(one)) for one in row] for row in (position, velocity, half_pull)]
+    kind, courses = levels(surface, Exact, *rows)
+    course = exact_course(kind, [course.parts for course in courses], terms, float(time))
+    verdict, _error, _residual = judge(*course, float(time), True, NEAR, TOUCH)
+    tally.exactly += 1
+    if verdict > TOUCHED:
+        tally.examples.append(f"exactly: {surface!r} {position} {velocity} {half_pull} {time}")
+
+
+@pytest.mark.parametrize("falls", [False, True], ids=["straight", "falling"])
+@pytest.mark.parametrize(("name", "side"), CASES, ids=lambda part: part)
+def test_no_first_hit_is_missed(name, side, falls, capsys):
+    began = clock.perf_counter()
+    tally = Tally()
+    for seed, scale in enumerate(SCALES):
+        surface = surface_of(name, side, scale)
+        chain = chain_of([surface])
+        position, velocity, pull = flights(surface, scale, FLIGHTS // len(SCALES), falls, seed)
+        for leg in range(LEGS):
+            times, index = np.empty(position.shape[1]), np.empty(position.shape[1])
+            (falling_hits if falls else straight_hits)(chain, position, velocity, pull, times, index)
+            found = index >= 0.0
+            judged(surface, scale, position, velocity, pull, times, found, tally, seed)
+            on = ~found & np.isfinite(times)
+            tally.legs = max(tally.legs, leg + 1)
+            position, velocity, pull, times = position[:, on], velocity[:, on], pull[:, on], times[on]
+            position, velocity = position + (velocity + 0.5 * pull * times) * times, velocity + pull * times
+            if not times.size:
+                break
+            # What falls away from a solid is followed to here only.
+            near = (abs(position - CENTER[:, None] * scale) < FAR * scale).all(axis=0)
+            position, velocity, pull = position[:, near], velocity[:, near], pull[:, near]
+            tally.aloft += np.count_nonzero(~near)
+        tally.unfinished += position.shape[1]
+    exact, touched, missed, early = tally.counts
+    with capsys.disabled():
+        print(
+            f"\n{name + ', ' + side + (', falling' if falls else ''):36}"
+            f" {FLIGHTS} flights, {exact:6} exact to {tally.error:.1e}, {touched:5} touched to {tally.residual:.1e},"
+            f" {missed} missed ({tally.late:.0e}), {early} early (t {tally.too_early:.0e}, level {tally.depth:.0e});"
+            f" {tally.exactly} by fractions, {tally.legs:2} legs, {tally.aloft} fell away,"
+            f" {tally.unfinished} unfinished, {clock.perf_counter() - began:.1f} s",
+            end="",
+        )
+    assert not tally.examples, "\n".join(tally.examples)
+    assert exact + touched >= FLIGHTS
+    assert math.isfinite(tally.error)

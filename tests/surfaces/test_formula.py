@@ -1,0 +1,267 @@
+"""Formulas against the surfaces they describe, and the bounds that make their first hits sure."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+from conftest import call
+from hypothesis import given
+from hypothesis import strategies as st
+
+import swarm
+from swarm import tables
+from swarm.surfaces import base, own, smooth
+from swarm.surfaces.interval import Interval, bounds_of
+
+ELLIPSOID = "x**2/0.09 + y**2/0.16 + z**2/0.25 - 1"
+PILL = "x**2/0.09 + y**2/0.09 + z**4/0.13 - 1"
+TORUS = "(x**2 + y**2 + z**2 + 0.7**2 - 0.3**2)**2 - 4*0.7**2*(x**2 + y**2)"
+GYROID = "sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)"
+MANY = (
+    "exp(x)*cosh(y)/(2 + tanh(z)) + log(3 + x)*sqrt(2 + y)**3 - tan(z/4)*sinh(x)*cos(y)**2 - x**-2 + (2 + z)**1.7 - 9"
+)
+
+
+# --- Derivatives -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", [ELLIPSOID, PILL, TORUS, GYROID, MANY])
+def test_derivatives(text):
+    """phi, its gradient and half its second derivatives against SymPy's in 40 digits."""
+    numbers = swarm.Formula(text, bounds=((0.1, -1, -1), (1.5, 1, 1)), curvature=1.0)._form.numbers((0.0, 0.0, 0.0))
+    point = np.array([0.37, -0.61, 0.23])
+    axes = sympy.symbols("x y z")
+    exact = sympy.sympify(text)
+    at = {axis: sympy.Float(float(value), 40) for axis, value in zip(axes, point, strict=True)}
+    value = lambda expression: float(expression.evalf(40, subs=at))  # noqa: E731
+    assert call(base.phi, numbers, point) == pytest.approx(value(exact), rel=1e-13, abs=1e-14)
+    gradient = [value(exact.diff(axis)) for axis in axes]
+    assert call(base.gradient, numbers, point) == pytest.approx(gradient, rel=1e-13, abs=1e-13)
+    x, y, z = axes
+    seconds = [value(exact.diff(*pair)) / 2 for pair in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))]
+    assert call(smooth.hessian, numbers, point) == pytest.approx(seconds, rel=1e-12, abs=1e-13)
+
+
+def test_small_powers_are_products(monkeypatch):
+    written = []
+    monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_none()))
+    from swarm.surfaces import formula
+
+    formula._derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
+    assert written
+    assert not any("**" in text for text in written)
+
+
+def _none():
+    return dict.fromkeys(("phi", "gradient", "hessian"))
+
+
+# --- Against the surfaces with a closed form -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+@pytest.mark.parametrize(
+    ("text", "other"), [(ELLIPSOID, swarm.Ellipsoid((0.3, 0.4, 0.5))), (TORUS, swarm.Torus(0.7, 0.3))]
+)
+def test_first_hits_are_those_of_the_closed_form(text, other, side):
+    center = (0.1, -0.2, 0.3)
+    formula = swarm.Formula(text, side=side, center=center).numbers()
+    other = type(other)(
+        *[getattr(other, name) for name in list(other.__dataclass_fields__)[2:-2]], center, side
+    ).numbers()
+    random = np.random.default_rng(1)
+    compared = 0
+    while compared < 200:
+        point, velocity = np.array(center) + random.uniform(-1.2, 1.2, 3), random.standard_normal(3)
+        if other.side * call(base.phi, other, point) > -1e-6:
+            continue
+        compared += 1
+        (time, found), (expected, _) = (call(base.first_hit, one, point, velocity) for one in (formula, other))
+        assert found
+        # A flight that all but touches may hit for one and miss for the other.
+        if math.isfinite(time) and math.isfinite(expected):
+            assert time == pytest.approx(expected, rel=1e-9, abs=1e-12)
+        else:
+            assert time == expected or _grazes(other, point, velocity, min(time, expected))
+
+
+def _grazes(surface, point, velocity, time):
+    place = point + time * velocity
+    normal = np.array(call(base.unit_normal, surface, place))
+    return abs(normal @ velocity) < 1e-6 * np.linalg.norm(velocity)
+
+
+@pytest.mark.parametrize("text", [ELLIPSOID, "x**2/a**2 + y**2/b**2 + z**2/0.25 - 1"])
+def test_the_trajectory_is_that_of_the_ellipsoid(text):
+    parameters = {"a": 0.3, "b": 0.4} if "a" in text else None
+    ours = swarm.Scene([swarm.Formula(text, parameters=parameters)])
+    reference = swarm.Scene([swarm.Ellipsoid((0.3, 0.4, 0.5))])
+    particles = swarm.fill(reference, 20, speed=1.0, seed=1)
+    ends = [swarm.simulate(scene, particles, swarm.Impact(), until=12.0) for scene in (ours, reference)]
+    assert ends[0].observables["impacts"][-1] == ends[1].observables["impacts"][-1] > 20 * 20
+    assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-10
+    assert ends[0].observables["energy_error"].max() < 1e-14
+
+
+def test_turned_and_moved():
+    rotation = (0.5, 0.1, -0.3, 0.7)
+    place = {"center": (0.3, -0.1, 0.2), "rotation": rotation}
+    scenes = [
+        swarm.Scene([swarm.Formula(ELLIPSOID, **place)]),
+        swarm.Scene([swarm.Ellipsoid((0.3, 0.4, 0.5), **place)]),
+    ]
+    particles = swarm.fill(scenes[1], 3, speed=1.0, seed=1)
+    ends = [swarm.simulate(scene, particles, swarm.Impact(), until=3.0).particles.position for scene in scenes]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-12
+    assert np.allclose(*(scene.bounds() for scene in scenes), atol=0.01)
+
+
+def test_a_pill_keeps_energy_and_particles_with_gravity_and_soft_walls():
+    scene = swarm.Scene([swarm.Formula(PILL)], gravity=(0.0, 0.0, -1.0))
+    particles = swarm.fill(scene, 10, speed=0.5, seed=2)
+    result = swarm.simulate(scene, particles, swarm.Penalty(dt=1e-3, penalty=1e3), until=2.0)
+    assert result.observables["energy_error"].max() < 1e-11
+    assert result.observables["impacts"][-1] > 10
+
+
+# --- Bounds ----------------------------------------------------------------------------------------------
+
+_ends = st.tuples(st.floats(-3.0, 3.0), st.floats(0.0, 2.0)).map(lambda pair: (pair[0], pair[0] + pair[1]))
+X, Y = sympy.symbols("x y")
+EXPRESSIONS = [
+    X + Y, X * Y, X**2, X**3, X**4, X**-1, X**-2, sympy.sqrt(X), X ** sympy.Rational(-1, 3), X ** sympy.Rational(5, 2),
+    sympy.exp(X), sympy.log(X), sympy.sin(X), sympy.cos(X), sympy.tan(X), sympy.sinh(X), sympy.cosh(X), sympy.tanh(X),
+    (X**2 - Y) / (X - 2 * Y), sympy.sin(X * Y) * sympy.exp(-X),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
+@given(across=_ends, along=_ends)
+def test_an_interval_holds_every_value(expression, across, along):
+    found = bounds_of(expression, {X: Interval(*across), Y: Interval(*along)}, {})
+    value = sympy.lambdify((X, Y), expression, "numpy")
+    points = np.meshgrid(np.linspace(*across, 9), np.linspace(*along, 9))
+    with np.errstate(all="ignore"):
+        values = np.broadcast_to(value(*points), points[0].shape)
+    values = values[np.isfinite(values)]
+    assert (found.low <= values).all()
+    assert (values <= found.high).all()
+
+
+@pytest.mark.parametrize("text", [ELLIPSOID, PILL, TORUS])
+def test_the_box_is_found_and_tight(text):
+    surface = swarm.Formula(text)
+    half = {ELLIPSOID: (0.3, 0.4, 0.5), PILL: (0.3, 0.3, 0.13**0.25), TORUS: (1.0, 1.0, 0.3)}[text]
+    for corner, sign in zip(surface.bounds(), (-1.0, 1.0), strict=True):
+        assert all(h <= sign * c <= 1.2 * h for c, h in zip(corner, half, strict=True))
+    assert surface.size() == pytest.approx(min(half), rel=0.2)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3])
+def test_the_box_is_found_at_every_scale(scale):
+    surface = swarm.Formula("(x/s)**2 + (y/s)**2 + 4*(z/s)**4 - 1", parameters={"s": scale})
+    assert np.allclose(surface.bounds()[1], scale * np.array([1.0, 1.0, 0.5**0.5]), rtol=0.05)
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+@pytest.mark.parametrize("text", [ELLIPSOID, PILL, TORUS, GYROID])
+def test_the_bend_bounds_second_derivatives(text, side):
+    surface = swarm.Formula(text, side=side, bounds=((-3, -3, -3), (3, 3, 3)) if text == GYROID else None)
+    form, random = surface._form, np.random.default_rng(1)
+    numbers = form.numbers((0.0, 0.0, 0.0))
+    low, high = np.array(form.box)
+    for point in random.uniform(low, high, (200, 3)):
+        if numbers.side * call(base.phi, numbers, point) > 0.0:
+            continue
+        xx, yy, zz, xy, yz, zx = (numbers.side * part for part in call(smooth.hessian, numbers, point))
+        matrix = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+        values = np.linalg.eigvalsh(matrix)
+        assert form.bend.least <= values[0] + 1e-12
+        assert values[-1] <= form.bend.most + 1e-12
+        entries = np.array([xx, yy, zz, xy, yz, zx])
+        assert (np.array(form.bend.low) <= entries + 1e-12).all()
+        assert (entries <= np.array(form.bend.high) + 1e-12).all()
+
+
+def test_an_open_volume_is_open():
+    tube = swarm.Formula("x**2 + y**2 - 0.25")
+    assert tube.bounds() == base.UNBOUNDED
+    scene = swarm.Scene([tube, swarm.Plane((0, 0, 1), 0.5), swarm.Plane((0, 0, -1), 0.5)])
+    start = swarm.Particles([[0.1], [0.0], [0.0]], [[1.0], [0.0], [0.5]])
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0)
+    expected = swarm.simulate(scene_of_cylinder(), start, swarm.Impact(), until=1.0)
+    assert np.allclose(result.particles.position, expected.particles.position, atol=1e-13)
+
+
+def scene_of_cylinder():
+    planes = [swarm.Plane((0, 0, 1), 0.5), swarm.Plane((0, 0, -1), 0.5)]
+    return swarm.Scene([swarm.Cylinder(0.5), *planes])
+
+
+# --- Errors and tables -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "keywords", "parts"),
+    [
+        ("x + wall", {}, ["unknown name 'wall'"]),
+        ("x**2 + 1", {}, ["0 somewhere", "above 0 everywhere"]),
+        ("x**2 + 1", {"bounds": ((-1, -1, -1), (1, 1, 1))}, ["0 somewhere in the bounds", "above 0"]),
+        ("x**3 - 50", {"bounds": ((-1, -1, -1), (1, 1, 1))}, ["0 somewhere in the bounds", "below 0"]),
+        ("log(x) + y**2", {"bounds": ((-1, -1, -1), (1, 1, 1))}, ["phi must be a finite number", "nan"]),
+        ("(x**2 + y**2 + z**2 - 1)**3", {}, ["a gradient on its surface"]),
+        ("sqrt(x**2 + y**2) + z**2 - 1", {}, ["curvature must be given", "not bounded"]),
+        (GYROID, {}, ["bounds must be given", "curvature"]),
+        (PILL, {"bounds": (1, 2)}, ["bounds[0]", "three numbers"]),
+        (PILL, {"bounds": ((0, 0, 0), (1, 0, 1))}, ["a lower and an upper corner"]),
+        (PILL, {"bounds": 3}, ["two corners", "got 3"]),
+        (PILL, {"size": -1.0}, ["size", "above 0"]),
+        (PILL, {"curvature": -1.0}, ["curvature", "0 or more"]),
+        (PILL, {"side": "in"}, ["side", "did you mean 'inside'?"]),
+        (PILL, {"centre": (0, 0, 0)}, ["no argument 'centre'", "'center'"]),
+        (PILL, {"parameters": {"x": 1.0}}, ["parameters", "names other than x", "got 'x'"]),
+        (PILL, {"parameters": {"a": "b"}}, ["parameters.a", "got 'b'"]),
+        (PILL, {"parameters": [1.0]}, ["by their names"]),
+        ("*".join(f"(x-{i}-y*z)" for i in range(30)), {}, ["operations", "shorten it"]),
+    ],
+)
+def test_errors_name_the_argument(text, keywords, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        swarm.Formula(text, **keywords)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_its_table_and_back():
+    surface = swarm.Formula(
+        "x**2/a**2 + y**2 + z**2 - 1", parameters={"a": 0.5}, bounds=((-1, -2, -2), (1, 2, 2)), size=0.5
+    )
+    table = tables.table_of(surface)
+    assert table["kind"] == "formula"
+    assert table["phi"] == surface.formula
+    assert {"bounds", "size", "parameters"} <= set(table)
+    assert tables.scene_of([table], None).surfaces == (surface,)
+    assert eval(repr(surface), {"Formula": swarm.Formula}) == surface
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({}, r"surface\[0\].phi: expected"),
+        ({"phi": 3}, r"surface\[0\].phi: expected str, got int \(in phi = 3\)"),
+        ({"phi": "x + q"}, r"surface\[0\].phi has an unknown name 'q'"),
+        ({"formula": "x"}, r"surface\[0\].formula: unknown key"),
+        ({"phi": PILL, "size": "big"}, r"surface\[0\].size: expected float"),
+        ({"phi": PILL, "bounds": [1, 2]}, r"surface\[0\].bounds"),
+        ({"phi": "__import__('os').system('touch /tmp/owned')"}, r"surface\[0\].phi must call only"),
+    ],
+)
+def test_a_scene_file_names_its_key(table, said):
+    with pytest.raises(swarm.SceneError, match=said):
+        tables.scene_of([{"kind": "formula", **table}], None)
+
+
+def test_other_values_of_parameters_are_the_same_code():
+    kinds = {swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": r})._form.kind for r in (0.1, 2.0)}
+    assert len(kinds) == 1
+    assert issubclass(kinds.pop(), own.OwnNumbers)

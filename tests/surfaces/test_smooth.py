@@ -1,0 +1,157 @@
+"""The march to the first hit of what is no quadric, and the capsule, whose level is a polynomial in pieces."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from conftest import EPSILON, ITERATED, TURN, body_of, call, numbers_of
+from exact import level_along, noise
+from test_surfaces import check_hit, start
+
+import swarm
+from swarm.surfaces import base, smooth
+from swarm.surfaces import rotation as rotations
+
+every_march = pytest.mark.parametrize("name", ITERATED)
+DEPTHS = [0.1, 1e-3, 1e-9, 1e-12, 1e-15, 0.0, -1e-15]
+LEANS = [0.7, 1e-5, 1e-9, 1e-15, 0.0, -1e-15, -1e-9, -1e-5, -0.7]
+
+
+@every_march
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("heavy", [0.0, 1e-6, 1.0, 100.0])
+def test_grazing_starts_next_to_the_wall(name, scale, heavy):
+    """Some of every depth with every lean, against the exact polynomials."""
+    rng = np.random.default_rng([int(math.log10(scale)) + 6, int(heavy * 1e6)])
+    starts = [(depth, lean) for depth in DEPTHS for lean in LEANS]
+    for k in rng.permutation(len(starts))[:4]:
+        depth, lean = starts[k]
+        surface, position, velocity = start(name, rng.uniform(-1, 1, 3), rng.normal(size=3), depth, lean, scale, 1.0)
+        pull = heavy * scale * rng.uniform(-1.0, 1.0, 3)
+        left = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
+        for _ask in range(100):
+            time, found = call(smooth._march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
+            check_hit(surface, position, velocity, pull, time, found, left)
+            left -= time
+            if found or left < 0.0:
+                break
+            position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
+        else:
+            raise AssertionError("not found")
+
+
+def in_own_frame(surface, *vectors):
+    """Vectors as the surface's body sees them."""
+    turn = np.array(surface[1:]).reshape(3, 3) if surface is not body_of(surface) else np.eye(3)
+    return [turn.T @ vector for vector in vectors]
+
+
+@pytest.mark.parametrize("name", ["ring", "rod"])
+@pytest.mark.parametrize("speed", [0.0, 1e-3, 10.0])
+def test_a_long_fall_does_not_outrun_its_clearance(name, speed):
+    """From far away gravity makes it faster on the way: the clearance is a way, not a time at the first speed."""
+    surface = numbers_of(name)
+    position, pull = np.array([0.5, 0.2, 40.0]), np.array([0.0, 0.0, -9.81])
+    velocity, total = np.array([0.0, 0.0, -speed]), 0.0
+    for _ask in range(50):
+        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        level = level_along(surface, position, velocity, pull)
+        assert level.highest(time) <= noise(surface, level, position, velocity, time, pull)
+        total += time
+        position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
+        if found:
+            break
+    assert found
+    assert abs(call(base.phi, surface, position)) <= 1e-14
+
+
+# --- The capsule -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_the_closed_form_of_the_capsule_is_the_march(side):
+    capsule, rng = swarm.Capsule(0.4, 1.0, side=side).numbers(), np.random.default_rng(9)
+    hits = 0
+    for _ in range(500):
+        position, velocity = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
+        if capsule.side * call(base.phi, capsule, position) > 0.0:
+            continue
+        time, found = call(base.first_hit, capsule, position, velocity)
+        marched, _found = call(smooth._march, capsule, position, velocity, np.zeros(3))
+        assert found
+        if time == math.inf:
+            assert marched > 1e9
+        else:
+            assert time == pytest.approx(marched, rel=1e-12, abs=1e-14)
+            hits += 1
+    assert hits > 50
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_along_the_axis_of_a_capsule(scale):
+    """Parallel to the cylinder, where it has no root: the caps at both ends."""
+    cavity = swarm.Capsule(0.5 * scale, 2.0 * scale).numbers()
+    for off in (0.0, 0.25, 0.5 - 1e-9):
+        for sign in (1.0, -1.0):
+            way = np.array([0.0, 0.0, sign])
+            exact = mp.mpf(1) + mp.sqrt(mp.mpf(0.5 * scale) ** 2 - mp.mpf(off * scale) ** 2) / mp.mpf(scale)
+            time, _found = call(base.first_hit, cavity, scale * np.array([off, 0.0, 0.0]), way)
+            assert time == pytest.approx(float(exact) * scale, rel=1e-14, abs=1e-7 * scale * (off > 0.4))
+    rod = cavity._replace(side=-1.0)
+    time, _found = call(base.first_hit, rod, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
+    assert time == pytest.approx(4.0 - 0.4, rel=1e-14)
+    for position in ([0.3, 0.0, 5.0], [0.6, 0.0, -5.0], [0.5 + 1e-12, 0.0, 0.0]):
+        assert call(base.first_hit, rod, scale * np.array(position), np.array([0.0, 0.0, scale])) == (math.inf, True)
+
+
+def test_a_capsule_of_no_length_is_a_sphere():
+    rng = np.random.default_rng(10)
+    capsule, sphere = swarm.Capsule(0.5, 0.0, center=(0.1, 0, 0)), swarm.Sphere(0.5, (0.1, 0, 0))
+    points = rng.normal(size=(3, 50))
+    assert capsule.phi(points) == pytest.approx(sphere.phi(points), abs=1e-15)
+    for _ in range(50):
+        position, velocity = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
+        times = [call(base.first_hit, surface.numbers(), position, velocity)[0] for surface in (capsule, sphere)]
+        assert times[0] == pytest.approx(times[1], rel=1e-14)
+
+
+def test_the_axis_and_the_rotation_of_a_capsule():
+    """First the axis, then the rotation; its bounds touch it."""
+    capsule = swarm.Capsule(0.25, 1.0, axis=(0, 3, 0), center=(1, 2, 3), rotation=TURN)
+    along = np.array(rotations.turned(rotations.quaternion("rotation", TURN), (0.0, 1.0, 0.0)))
+    tips = np.array(capsule.center) + 0.75 * np.array([along, -along])
+    assert capsule.phi(tips.T) == pytest.approx([0.0, 0.0], abs=1e-15)
+    low, high = np.array(capsule.bounds())
+    points = np.random.default_rng(11).uniform(low, high, (200_000, 3))
+    inside = points[capsule.phi(points.T) <= 0.0]
+    assert inside.min(axis=0) == pytest.approx(low, abs=0.03)
+    assert inside.max(axis=0) == pytest.approx(high, abs=0.03)
+
+
+def test_the_discrete_gradient_is_exact_across_the_end_of_the_cylinder():
+    """q has a jump in its second derivative there; the identity D.(r1 - r0) = q1 - q0 does not mind."""
+    capsule = swarm.Capsule(0.5, 1.0).numbers()
+    for step in (1e-12, 1e-6, 1e-2):
+        first = np.array([0.3, 0.4, 0.5 - 0.5 * step])
+        second = first + step * np.array([0.1, -0.2, 1.0])
+        discrete = np.array(call(base.inner_gradient, capsule, first, second))
+        rise = call(smooth.difference, capsule, first, second)
+        assert discrete @ (second - first) == pytest.approx(rise, abs=4 * EPSILON * step)
+        assert discrete == pytest.approx([0.6, 0.8, 0.0], abs=2.0 * step + 1e-15)
+
+
+@pytest.mark.parametrize(
+    ("build", "parts"),
+    [
+        (lambda: swarm.Capsule(0.0, 1.0), ["radius", "above 0", "got 0"]),
+        (lambda: swarm.Capsule(1.0, -1.0), ["length", "0 or more", "got -1"]),
+        (lambda: swarm.Capsule(1.0, math.nan), ["length", "finite", "nan"]),
+        (lambda: swarm.Capsule(1.0, 1.0, axis=(0, 0, 0)), ["axis", "length 0"]),
+        (lambda: swarm.Capsule(1.0, 1.0, side="in"), ["side", "did you mean 'inside'?"]),
+    ],
+)
+def test_errors_name_the_argument(build, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
