@@ -185,7 +185,7 @@ def test_particles_outside_are_counted_and_the_first_is_named():
         swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
 
 
-@pytest.mark.parametrize("method", [swarm.Impact(shortest_flight=2e-3), swarm.Penalty(dt=0.125, penalty=1e3)], ids=repr)
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.125, penalty=1e3)], ids=["impact", "penalty"])
 def test_particles_on_the_wall_and_at_rest_are_valid(method):
     """On a wall, moving out, in or along it, or at rest anywhere: all are states of a billiard."""
     third = 0.5 / np.sqrt(3.0)
