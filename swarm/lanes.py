@@ -16,7 +16,7 @@ from .methods import base as methods
 from .particles import Multipliers
 from .status import Status
 from .surfaces import chain as walls
-from .surfaces.base import SAFE_STEPS
+from .surfaces.base import MORE_STEPS, SAFE_STEPS
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
 _LANES = 256
@@ -39,6 +39,7 @@ class Lanes(NamedTuple):
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
     course: Array  # (walls COURSE, stride) the safe steps of a fall
+    time: Array  # when the fall meets `surface`
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
 
@@ -58,6 +59,7 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
         np.zeros(_STRIDE, np.bool_),
         np.zeros((RECORDS, _STRIDE)),
         np.zeros((walls.length(chain) * walls.COURSE, _STRIDE)),
+        np.empty(_STRIDE),
         np.zeros((4, _STRIDE)),
         np.empty(_STRIDE, np.int64),
     )
@@ -153,13 +155,13 @@ def _move(lanes, source, target):
 @inlined
 def _fly(method, chain, gravity, lanes, live):
     """Every lane to its next contact, or to the end of the frame."""
-    rows, surface, course = lanes.rows, lanes.surface, lanes.course
+    rows, surface = lanes.rows, lanes.surface
     time, wall = 0.0, 0.0
     if methods.falls(method, gravity):
         _fall(gravity, chain, lanes, live)
     for i in range(live):
         if methods.falls(method, gravity):
-            time, wall = walls.end_fall(chain, course, 0, i)
+            time, wall = lanes.time[i], kept(surface[i])
         x, y, z, vx, vy, vz, left, surface[i] = methods.flight(
             method, chain, gravity,
             rows[_X, i], rows[_Y, i], rows[_Z, i], rows[_VX, i], rows[_VY, i], rows[_VZ, i],
@@ -180,7 +182,7 @@ def _fall(gravity, chain, lanes, live):
 
 @_fall.register(Gravity)
 def _(gravity, chain, lanes, live):
-    rows, course = lanes.rows, lanes.course
+    rows, course, time, wall = lanes.rows, lanes.course, lanes.time, lanes.surface
     for i in range(live):
         walls.begin_fall(
             chain, course, 0, i,
@@ -190,6 +192,14 @@ def _(gravity, chain, lanes, live):
     for _step in range(SAFE_STEPS):
         for i in range(live):
             walls.step_fall(chain, course, 0, i)
+    # The few that need more, one by one: a flight in two parts would look like a short one.
+    for i in range(live):
+        time[i], wall[i] = walls.end_fall(chain, course, 0, i)
+        for _step in range(MORE_STEPS):
+            if wall[i] >= 0.0 or time[i] >= rows[_LEFT, i]:
+                break
+            walls.step_fall(chain, course, 0, i)
+            time[i], wall[i] = walls.end_fall(chain, course, 0, i)
 
 
 @inlined

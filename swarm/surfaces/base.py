@@ -23,13 +23,13 @@ from . import rotation as rotations
 
 SIDES = {"inside": 1.0, "outside": -1.0}
 
-# Safe steps of a falling flight in one pass of the lanes: most flights need no second pass (measured, with these
-# windows: 4.8 steps on average, 6 in nine of ten).
-SAFE_STEPS = 6
+# Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
+SAFE_STEPS = 5
+MORE_STEPS = 16
 # Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
 _TANGENTS = 8
-# A safe step this short, as a part of the window, is the last.
-_CLOSE = 1e-6
+# A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
+_CLOSE = 1e-16
 
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
@@ -378,7 +378,7 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
 
     It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
     double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
-    and a step leaves the cube of its length.
+    and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on.
     """
     reach = select(2.0 * last < window, 2.0 * last, window)
     # The Taylor coefficients at t
@@ -392,21 +392,26 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
     # falls until then, where the parabola of the whole reach may rise at once.
     falls = (a2t < 0.0) & ((bt <= 0.0) | (bt * bt < 0.5 * a2t * ct))
     bent = select(falls, -0.5 * a2t / slope, 0.0)  # infinite where nothing bends it up
+    at_root = (time >= bent) & (time <= reach)
     time = select(time > bent, time, bent)
     step = select(time < reach, time, reach)
-    return t + step, step
+    # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
+    close = reach * step * step <= _CLOSE * window * window * window
+    return t + step, select(at_root & close, 0.0, step)
 
 
 @inlined
-def arrived(last, window):
-    """Whether a safe step was so short that it was the last."""
-    return last <= _CLOSE * window
+def arrived(last):
+    """Whether a safe step was the last."""
+    return last == 0.0
 
 
 @inlined
 def first_rise(c, b, a2, a3, a4, window):
-    """`first_hit` for that level, by a fixed number of safe steps."""
+    """`first_hit` for that level, by safe steps."""
     t, last = 0.0, math.inf
-    for _step in range(SAFE_STEPS):
+    for _step in range(SAFE_STEPS + MORE_STEPS):
         t, last = safe_step(c, b, a2, a3, a4, window, t, last)
-    return t, arrived(last, window)
+        if arrived(last):
+            break
+    return t, arrived(last)

@@ -103,7 +103,7 @@ def _(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
         course[row + 6, lane], course[row + 7, lane] = 0.0, math.inf
     else:
         time, found = base.falling_hit(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
-        course[row + 5, lane], course[row + 6, lane], course[row + 7, lane] = 1.0, time, select(found, 0.0, math.inf)
+        course[row + 6, lane], course[row + 7, lane] = time, select(found, 0.0, math.inf)
     begin_fall(chain.rest, course, row + COURSE, lane, x, y, z, vx, vy, vz, gx, gy, gz)
 
 
@@ -130,7 +130,7 @@ def end_fall(chain, course, row, lane):
 
 @end_fall.register(Chain)
 def _(chain, course, row, lane):
-    time, found = course[row + 6, lane], base.arrived(course[row + 7, lane], course[row + 5, lane])
+    time, found = course[row + 6, lane], base.arrived(course[row + 7, lane])
     later, index = end_fall(chain.rest, course, row + COURSE, lane)
     here = select(found, 0.0, -1.0)
     sooner = later < time
