@@ -67,7 +67,8 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
     assert abs(gap(numbers, after.position)) <= 200 * EPSILON
     assert after.position - wall == pytest.approx(0.5 * used * (velocity + after.velocity), abs=100 * EPSILON)
     if used > 1e-12:
-        assert used == pytest.approx(h, abs=8 * EPSILON)
+        # The start is on the wall to round-off, and the flight from there takes that over the lean.
+        assert used == pytest.approx(h, abs=(3.0 + 1.0 / lean) * EPSILON)
         normal = np.array(
             call(surfaces.chord_normal, numbers, wall, h * velocity, chord_of(numbers, wall, h * velocity))
         )
@@ -81,7 +82,7 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
 def test_a_short_contact_step_tends_to_the_reflection(name):
     """First order in h, to the exact reflection."""
     scene = scene_of(name)
-    start = approach(scene, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.2, 0.0]), 0.1, 0.9)[1:]
+    start = approach(scene, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.2, 0.0]), 0.05, 0.6)[1:]
     exact = one_pass(swarm.Impact(), scene, *start, 1.0).velocity
     errors = [
         np.linalg.norm(one_pass(swarm.Impact(contact_step=h), scene, *start, 1.0).velocity - exact)

@@ -57,7 +57,10 @@ def worst_energy(start, end):
 
 
 def ulps_outside(scene, result):
-    """The largest penetration of all frames in units of the last place of the scene's farthest coordinate."""
+    """The largest penetration of all frames in units of the last place of the scene's farthest coordinate.
+
+    Not of the smallest surface: a wall at 0.6 around a ball of 0.2 cannot be met to the last place of 0.2.
+    """
     return float(result.observables["max_penetration"].max() / np.spacing(scene.extent()))
 
 
