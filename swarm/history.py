@@ -15,6 +15,7 @@ from .particles import Particles
 from .scene import Scene
 from .status import Status
 from .surfaces import chain as walls
+from .surfaces import flights
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +133,7 @@ class _Rows:
 def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
     """Position and velocity at the next impact."""
     chain = scene.chain()
-    time, surface = walls.first_hit(chain, None, *start)
+    time, surface = flights.first_hit(chain, None, *start)
     if not np.isfinite(time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start[3:])}, which never does")
     place = [r + time * v for r, v in zip(start[:3], start[3:], strict=True)]
@@ -175,7 +176,7 @@ def _impact(scene: Scene, start: list[float], mass: float, method: Impact) -> Co
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
     chain, count = scene.chain(), len(scene.owners())
     rows, r0 = _Rows(scene, start, mass, method.contact_step), start[:3]
-    _time, index = walls.first_hit(chain, None, *start)
+    _time, index = flights.first_hit(chain, None, *start)
     kappa = reflection.chord(chain, index, *r0, *rows.free)
     r1 = walls.push(chain, index, *r0, *rows.free, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)

@@ -14,6 +14,7 @@ from .gravity import Nothing, potential
 from .particles import State
 from .surfaces import base as surfaces
 from .surfaces import chain as walls
+from .surfaces import flights
 
 # Particles a partial sum: a constant of the results, unlike the block size.
 CHUNK = 2048
@@ -129,7 +130,7 @@ def _escapes(gravity, chain, x, y, z, vx, vy, vz):
 
 @_escapes.register(Nothing)
 def _(gravity, chain, x, y, z, vx, vy, vz):
-    time, _wall = walls.first_hit(chain, gravity, x, y, z, vx, vy, vz)
+    time, _wall = flights.first_hit(chain, gravity, x, y, z, vx, vy, vz)
     return (time == np.inf) & (vx * vx + vy * vy + vz * vz > 0.0)
 
 

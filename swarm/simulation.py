@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks, interrupt, lanes, observables
+from . import blocks, checks, interrupt, observables
 from .errors import RunError, SceneError
 from .methods.base import Method
 from .particles import Multipliers, Particles, State
@@ -295,7 +295,7 @@ class Run:
             args = self._method, self._chain, self._gravity, self.state, span, start, stop, self._halt
             # Without the compiler too, a division by zero is an infinity that a select throws away.
             with np.errstate(divide="ignore", invalid="ignore"):
-                status, particle = lanes.advance_block(*args)
+                status, particle = blocks.advance_block(*args)
             return status, particle
 
         began = time.perf_counter()

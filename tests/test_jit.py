@@ -190,7 +190,7 @@ def copied(tmp_path, monkeypatch):
     return tmp_path / "swarm", folder
 
 
-@pytest.mark.parametrize("edited", ["surfaces/sphere.py", "lanes.py", "_jit.py", "methods/base.py"])
+@pytest.mark.parametrize("edited", ["surfaces/sphere.py", "blocks.py", "_jit.py", "methods/base.py"])
 def test_an_edit_anywhere_names_another_cache(copied, edited):
     """Numba looks at the file of the kernel only; an old answer must not come back."""
     package, folder = copied
@@ -233,7 +233,8 @@ LAYERS = [
     ["simulation"],
     ["output", "progress"],
     ["tables", "filling"],
-    ["observables", "lanes", "history"],
+    ["observables", "blocks", "history"],
+    ["lanes"],
     ["methods"],
     ["scene", "particles"],
     ["contact"],

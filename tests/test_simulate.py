@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import lanes
+from swarm import blocks
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -211,7 +211,7 @@ def test_numbers_spoiled_after_construction_are_refused(name):
 @pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="the limit is a constant of the kernel, 1e8 in compiled ones")
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
     """An error that names the particle and its walls, not a hang."""
-    monkeypatch.setattr(lanes, "_MOST_HITS", 50.0)
+    monkeypatch.setattr(blocks, "_MOST_HITS", 50.0)
     start = swarm.Particles([[0.0, 0.5], [0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
     with pytest.raises(swarm.RunError, match=r"particle 1: .*100 million times"):
         swarm.simulate(SPHERE, start, swarm.Impact(shortest_flight=1e-3), until=1.0)

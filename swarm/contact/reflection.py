@@ -10,6 +10,7 @@ import math
 from .._jit import by_type, by_type_outlined, inlined, outlined, select
 from ..gravity import Gravity, Nothing, accelerated, potential
 from ..surfaces import chain as walls
+from ..surfaces import flights
 
 # A Newton step of the chord this small, relative to kappa, is the last: its square is below round-off.
 _TOLERANCE = 1e-7
@@ -179,7 +180,7 @@ def chord_turn(chain, gravity, surface, x, y, z, vx, vy, vz, h, kappa):
 def chord_end(chain, gravity, surface, x, y, z, vx, vy, vz, wx, wy, wz, h, twice_energy, half_inverse):
     """The end of that step, r1 and v1, and whether no other wall cuts it: (v0 + v1)/2 = (r1 - r0)/h."""
     ux, uy, uz = 0.5 * (vx + wx), 0.5 * (vy + wy), 0.5 * (vz + wz)
-    cut, _other = walls.other_hit(chain, surface, x, y, z, ux, uy, uz)
+    cut, _other = flights.other_hit(chain, surface, x, y, z, ux, uy, uz)
     ox, oy, oz = walls.settle(chain, surface, x + h * ux, y + h * uy, z + h * uz)
     speed2, half_inverse = speed2_at(gravity, ox, oy, oz, twice_energy, half_inverse)
     wx, wy, wz = restore(gravity, wx, wy, wz, speed2, half_inverse)

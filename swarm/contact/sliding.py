@@ -13,6 +13,7 @@ from .._jit import by_type, by_type_outlined, inlined, outlined, select
 from ..gravity import accelerated
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
+from ..surfaces import flights
 from . import reflection
 
 _EPSILON = 2.220446049250313e-16
@@ -45,7 +46,7 @@ def impact(
             restitution, chain, gravity, wall, x, y, z, wx, wy, wz, energy, half_inverse
         )
         given[int(wall)] += blow
-        following, other = walls.first_hit(chain, gravity, x, y, z, wx, wy, wz)
+        following, other = flights.first_hit(chain, gravity, x, y, z, wx, wy, wz)
         if following >= shortest or other < 0.0:
             used = 0.0
             if wall == surface:
@@ -123,7 +124,7 @@ def _unhindered(chain, gravity, touched, normal, held, x, y, z, vx, vy, vz, h, t
         following, other = h, -1
         for i in range(touched.size):
             if not touched[i]:
-                time, _found = walls.hit_of(chain, None, float(i), x, y, z, ux, uy, uz)
+                time, _found = flights.hit_of(chain, None, float(i), x, y, z, ux, uy, uz)
                 if time < following:
                     following, other = time, i
         if other < 0:

@@ -21,6 +21,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
+from ..surfaces import flights
 from . import base, fixed_step
 
 RAISE, COUNT, IMPACT = 0, 1, 2
@@ -195,7 +196,7 @@ def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
 
 @_flight.register(Adaptive)
 def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
-    time, surface = walls.first_hit(chain, None, x, y, z, vx, vy, vz)
+    time, surface = flights.first_hit(chain, None, x, y, z, vx, vy, vz)
     hit = time <= left
     t = select(hit, time, left)
     x, y, z = x + t * vx, y + t * vy, z + t * vz
@@ -354,7 +355,7 @@ def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
 def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
     # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free flight
     # ends outside again) was hit all the same.
-    cut, _other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
+    cut, _other = flights.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
     return (cut > 1.0) & (kappa != 0.0)
 
 
@@ -404,7 +405,7 @@ def _is_blocked(adaptive, law, chain, surface, x, y, z, px, py, pz):
 def _(adaptive, law, chain, surface, x, y, z, px, py, pz):
     kappa = chord(chain, surface, x, y, z, px, py, pz)
     x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
-    cut, other = walls.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
+    cut, other = flights.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
     # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
     later = cut <= 1.0 and not uzawa.has_limit(chain, other, law, x, y, z)
     later = later or uzawa.meets_later(chain, surface, law, x, y, z, px, py, pz)
@@ -450,7 +451,7 @@ def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, 
     speed2 = _first_speed2(energy, vx, vy, vz)
     remaining, hits = h, 0.0
     for _i in range(_MOST_BOUNCES):
-        time, wall = walls.first_hit(chain, None, x, y, z, vx, vy, vz)
+        time, wall = flights.first_hit(chain, None, x, y, z, vx, vy, vz)
         t = min(time, remaining)
         x, y, z, remaining = x + t * vx, y + t * vy, z + t * vz, remaining - t
         if not time < math.inf or remaining <= 0.0:

@@ -10,7 +10,7 @@ from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import chain as walls
+from ..surfaces import flights
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
 _WHOLE = 1e-6
@@ -90,7 +90,7 @@ def _(longest, px, py, pz):
 def free_steps(chain, gravity, dt, x, y, z, vx, vy, vz, left):
     """Jump over the steps that surely stay free: (x, y, z, vx, vy, vz, steps left)."""
     # One too many by round-off starts a contact 1e-16 deep: harmless.
-    steps = np.floor(walls.free_time(gravity, chain, x, y, z, vx, vy, vz) / dt)
+    steps = np.floor(flights.free_time(gravity, chain, x, y, z, vx, vy, vz) / dt)
     steps = select(steps < left, steps, left)
     t = steps * dt
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)

@@ -14,6 +14,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
+from ..surfaces import flights
 from . import base
 
 # Walls within this part of the scene's size hold a sliding particle together.
@@ -120,7 +121,7 @@ def _(gravity):
 @base.flight.register(ImpactNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     if not _falls(gravity):
-        time, surface = walls.first_hit(chain, gravity, x, y, z, vx, vy, vz)
+        time, surface = flights.first_hit(chain, gravity, x, y, z, vx, vy, vz)
     hit = (time <= left) & (surface >= 0.0)
     t = select(time < left, time, left)
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)

@@ -16,20 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._jit import by_type, inlined, select
+from .._jit import by_type
 from ..checks import Vector, array, number, one_of, vector
 from ..errors import SceneError
 from . import rotation as rotations
+from .course import first_rise, safe_rise_time
 
 SIDES = {"inside": 1.0, "outside": -1.0}
 
-# Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
-SAFE_STEPS = 5
-MORE_STEPS = 16
 # Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
 _TANGENTS = 8
-# A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
-_CLOSE = 1e-16
 
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
@@ -329,89 +325,3 @@ def farthest_push(surface):
 def settle(surface, x, y, z):
     """A point within round-off of the surface, moved onto it: one Newton step along the gradient."""
     raise NotImplementedError
-
-
-# --- Shared by quadrics ----------------------------------------------------------------------------------
-
-
-@inlined
-def rise_time(c, b, a):
-    """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
-
-    A cavity has a > 0, a solid a < 0, a plane a = 0. Branch-free.
-    """
-    discriminant = b * b - a * c
-    # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
-    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-    approaching = b > 0.0
-    # The form of the root that does not cancel: -c/(b + root) when b > 0, (root - b)/a when b <= 0.
-    top = select(approaching, -c, root - b)
-    bottom = select(approaching, b + root, a)
-    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
-    time = top / bottom
-    return select(misses, math.inf, select(time > 0.0, time, 0.0))
-
-
-@inlined
-def safe_rise_time(c, b, a2, a3, a4, window):
-    """A time up to `window` during which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 surely stays <= 0."""
-    time = rise_time(c, b, a2 + _rise_by(_steepest(a3, a4, window), window))
-    return select(c > 0.0, 0.0, select(time < window, time, window))
-
-
-@inlined
-def _steepest(a3, a4, window):
-    """s >= 0 with a3 t^3 + a4 t^4 <= s t^3 up to the window: c + 2 b t + (a2 + s window) t^2 rises first."""
-    slope = a3 + select(a4 > 0.0, a4 * window, 0.0)
-    return select(slope > 0.0, slope, 0.0)
-
-
-@inlined
-def _rise_by(slope, window):
-    """slope * window, 0 where the window is infinite because the level is a parabola."""
-    return select(slope > 0.0, slope * window, 0.0)
-
-
-@inlined
-def safe_step(c, b, a2, a3, a4, window, t, last):
-    """One step towards the first rise of the level c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 through 0: (t, its length).
-
-    It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
-    double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
-    and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on.
-    """
-    reach = select(2.0 * last < window, 2.0 * last, window)
-    # The Taylor coefficients at t
-    ct = c + t * (2.0 * b + t * (a2 + t * (a3 + t * a4)))
-    bt = b + t * (a2 + t * (1.5 * a3 + t * 2.0 * a4))
-    a2t = a2 + t * (3.0 * a3 + t * 6.0 * a4)
-    a3t = a3 + t * 4.0 * a4
-    slope = _steepest(a3t, a4, reach)
-    time = rise_time(ct, bt, a2t + _rise_by(slope, reach))
-    # Up to -a2/(2 slope), M = a2/2 < 0 holds as well: a particle at rest under a ceiling, or one that grazes, surely
-    # falls until then, where the parabola of the whole reach may rise at once.
-    falls = (a2t < 0.0) & ((bt <= 0.0) | (bt * bt < 0.5 * a2t * ct))
-    bent = select(falls, -0.5 * a2t / slope, 0.0)  # infinite where nothing bends it up
-    at_root = (time >= bent) & (time <= reach)
-    time = select(time > bent, time, bent)
-    step = select(time < reach, time, reach)
-    # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
-    close = reach * step * step <= _CLOSE * window * window * window
-    return t + step, select(at_root & close, 0.0, step)
-
-
-@inlined
-def arrived(last):
-    """Whether a safe step was the last."""
-    return last == 0.0
-
-
-@inlined
-def first_rise(c, b, a2, a3, a4, window):
-    """`first_hit` for that level, by safe steps."""
-    t, last = 0.0, math.inf
-    for _step in range(SAFE_STEPS + MORE_STEPS):
-        t, last = safe_step(c, b, a2, a3, a4, window, t, last)
-        if arrived(last):
-            break
-    return t, arrived(last)

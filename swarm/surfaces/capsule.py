@@ -9,6 +9,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector, at_least, length
 from . import base, smooth
+from .course import rise_time
 from .revolved import Revolved
 
 
@@ -142,13 +143,13 @@ def _(surface, x, y, z, vx, vy, vz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     side, half, radius2 = surface.side, surface.half, surface.radius * surface.radius
     c, b, a = dx * dx + dy * dy - radius2, dx * vx + dy * vy, vx * vx + vy * vy
-    tube = base.rise_time(side * c, side * b, side * a)
+    tube = rise_time(side * c, side * b, side * a)
     # Where the flight meets the tube without ends decides: there, or at the sphere of that end. A flight towards a
     # solid that is inside that tube already is before its end.
     height = dz + select((side < 0.0) & (c < 0.0), 0.0, vz * tube)
     wz = dz - select(height > 0.0, half, -half)
     c, b, a = dx * dx + dy * dy + wz * wz - radius2, b + wz * vz, a + vz * vz
-    cap = base.rise_time(side * c, side * b, side * a)
+    cap = rise_time(side * c, side * b, side * a)
     return select(abs(height) > half, cap, tube), True
 
 

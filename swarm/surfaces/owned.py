@@ -8,6 +8,7 @@ import numpy as np
 from .._jit import inlined, outlined, select
 from ..checks import Vector
 from . import base, smooth
+from .course import rise_time
 
 _EPSILON = 2.220446049250313e-16
 # Safe steps of one march; what is not found by then goes on in the next pass.
@@ -201,7 +202,7 @@ def _straight(surface, x, y, z, vx, vy, vz):
         if level > 0.0 and half > 0.0 and i > 0:
             # Past the wall by round-off, or because the surface bends more than was said.
             return smooth._bisected(surface, x, y, z, vx, vy, vz, 0.0, 0.0, 0.0, before, t), True
-        step = base.rise_time(level, half, most)
+        step = rise_time(level, half, most)
         if not t + step <= end or not step < math.inf:
             return math.inf, True
         before, t = t, t + step

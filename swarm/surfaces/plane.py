@@ -7,6 +7,7 @@ from typing import NamedTuple
 from .._jit import select
 from ..checks import Vector, number
 from . import base
+from .course import rise_time
 from .rotation import turned, unit
 
 
@@ -89,7 +90,7 @@ def _(surface, x, y, z, vx, vy, vz):
 @base.falling_hit.register(PlaneNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     c = base.inner(surface, x, y, z) - surface.offset
-    return base.rise_time(c, 0.5 * base.inner(surface, vx, vy, vz), 0.5 * base.inner(surface, gx, gy, gz)), True
+    return rise_time(c, 0.5 * base.inner(surface, vx, vy, vz), 0.5 * base.inner(surface, gx, gy, gz)), True
 
 
 @base.safe_time.register(PlaneNumbers)

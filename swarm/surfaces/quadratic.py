@@ -11,6 +11,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector
 from . import base
+from .course import rise_time
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -100,7 +101,7 @@ def _(surface, x, y, z, vx, vy, vz):
     c = _dot(surface, dx, dy, dz, dx, dy, dz) + _linear(surface, dx, dy, dz) - surface.level
     b = _dot(surface, dx, dy, dz, vx, vy, vz) + 0.5 * _linear(surface, vx, vy, vz)
     a = _dot(surface, vx, vy, vz, vx, vy, vz)
-    return base.rise_time(surface.side * c, surface.side * b, surface.side * a), True
+    return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
 @base.course.register(QuadricNumbers)

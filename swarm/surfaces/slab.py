@@ -9,6 +9,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector, length
 from . import base
+from .course import rise_time
 from .rotation import turned, unit
 
 # A normal as near as this to an axis is that axis, but for the round-off of a rotation.
@@ -130,8 +131,8 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     d, sign = _off(surface, x, y, z), math.copysign(0.5, _off(surface, x, y, z))
     b, a = sign * _along(surface, vx, vy, vz), sign * _along(surface, gx, gy, gz)
     # The near wall and, between them, the far one: each is a plane.
-    near = base.rise_time(surface.side * (abs(d) - surface.half), surface.side * b, surface.side * a)
-    far = base.rise_time(-abs(d) - surface.half, -b, -a)
+    near = rise_time(surface.side * (abs(d) - surface.half), surface.side * b, surface.side * a)
+    far = rise_time(-abs(d) - surface.half, -b, -a)
     return select((surface.side > 0.0) & (far < near), far, near), True
 
 

@@ -9,6 +9,7 @@ import math
 
 from .._jit import by_type, inlined, outlined, select
 from . import base
+from .course import rise_time
 
 _EPSILON = 2.220446049250313e-16
 # Steps of one march to the first hit; near the wall each one doubles the digits. What is not found by then goes on in
@@ -144,7 +145,7 @@ def _safe_step(surface, x, y, z, vx, vy, vz, gx, gy, gz):
 def _step_within(level, half, m0, m1, speed, pull, reach):
     """The root of the parabola above the level, within the reach that bounds its bend."""
     bound = m0 + select(m1 > 0.0, m1 * reach, 0.0)
-    return min(base.rise_time(level, half, bound), _time_to_travel(speed, pull, reach))
+    return min(rise_time(level, half, bound), _time_to_travel(speed, pull, reach))
 
 
 @inlined

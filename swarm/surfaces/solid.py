@@ -12,7 +12,8 @@ import numpy as np
 from .._jit import by_type, inlined, outlined
 from ..gravity import Gravity, Nothing, accelerated, displacement
 from . import base, smooth
-from .chain import Chain, hit
+from .chain import Chain
+from .flights import hit
 from .plane import PlaneNumbers
 from .rotation import Rotated
 

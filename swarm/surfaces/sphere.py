@@ -9,6 +9,7 @@ import numpy as np
 from .._jit import select
 from ..checks import Vector, length
 from . import base
+from .course import rise_time
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,7 +89,7 @@ def _(surface, x, y, z, vx, vy, vz):
     c = dx * dx + dy * dy + dz * dz - surface.radius2
     b = dx * vx + dy * vy + dz * vz
     a = vx * vx + vy * vy + vz * vz
-    return base.rise_time(surface.side * c, surface.side * b, surface.side * a), True
+    return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
 @base.course.register(SphereNumbers)

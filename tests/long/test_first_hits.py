@@ -28,7 +28,8 @@ from swarm._jit import kernel
 from swarm.gravity import Gravity
 from swarm.surfaces import base
 from swarm.surfaces.capsule import CapsuleNumbers
-from swarm.surfaces.chain import chain_of, first_hit
+from swarm.surfaces.chain import chain_of
+from swarm.surfaces.flights import first_hit
 from swarm.surfaces.owned import OwnNumbers
 from swarm.surfaces.rotated import _own
 from swarm.surfaces.rotation import Rotated

@@ -12,7 +12,7 @@ from swarm.contact.energy import contact_energy
 from swarm.gravity import potential
 from swarm.methods import base
 from swarm.status import Status
-from swarm.surfaces import chain as walls
+from swarm.surfaces import flights
 
 
 class Pass(NamedTuple):
@@ -43,7 +43,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
     constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
     # What the safe steps of lanes.py find.
-    time, wall = call(walls.first_hit, chain, gravity, position, velocity)
+    time, wall = call(flights.first_hit, chain, gravity, position, velocity)
     *state, left, surface = call(
         base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall)
     )

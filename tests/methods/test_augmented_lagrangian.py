@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import lanes, observables
+from swarm import blocks, observables
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 SCENES = {
@@ -27,7 +27,7 @@ STATE_TWO = swarm.Particles((0.25, 0.10, 0.0), (0.5 * math.sqrt(0.5), 0.5 * math
 def simulate(scene, particles, method, until, every=None):
     """`swarm.simulate` without the compiler."""
     with (
-        mock.patch.multiple(lanes, advance_block=_plain(lanes.advance_block)),
+        mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
         mock.patch.multiple(
             observables,
             start_energies=_plain(observables.start_energies),
@@ -279,7 +279,7 @@ def test_along_a_wall(name, position, velocity):
     ball = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
     scene = {**SCENES, "ball": ball}[name]
     method = method_of(0.01, 1e6, tolerance=1e-28, max_sweeps=99, adaptive=True)
-    with mock.patch.object(lanes, "_MOST_HITS", 1000.0):
+    with mock.patch.object(blocks, "_MOST_HITS", 1000.0):
         result = simulate(scene, swarm.Particles(position, velocity), method, 2.0)
     assert result.observables["energy_error"].max() <= 1e-12
     assert result.observables["max_penetration"].max() <= 1e-14

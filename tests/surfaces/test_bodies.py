@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.surfaces import rotation
-from swarm.surfaces.chain import chain_of, first_hit
+from swarm.surfaces.chain import chain_of
+from swarm.surfaces.flights import first_hit
 from swarm.surfaces.plane import PlaneNumbers
 from swarm.surfaces.slab import SlabNumbers
 

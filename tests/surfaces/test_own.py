@@ -438,8 +438,8 @@ def test_processes_that_share_a_cache_do_not_break_one_another(run):
 SIMULATE = """
 particles = swarm.Particles([[0.1], [0.2], [0.05]], [[0.3], [-0.2], [0.1]])
 result = swarm.simulate(swarm.Scene([surface]), particles, swarm.Impact(), until=20.0)
-from swarm import lanes
-stats = lanes.advance_block.stats
+from swarm import blocks
+stats = blocks.advance_block.stats
 print(result.particles.position[0, 0], sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 sys.exit()
 """
