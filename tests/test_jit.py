@@ -16,7 +16,7 @@ import swarm
 from swarm import _jit
 from swarm.contact import regularisation
 from swarm.gravity import Gravity, Nothing, accelerated, displacement, potential
-from swarm.surfaces import base, chain
+from swarm.surfaces import base, chain, flights
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(
@@ -50,15 +50,15 @@ def every_function_of_a_surface(surface, x, y, z, vx, vy, vz, gx, gy, gz, kappa)
 def every_function_of_a_chain(whole, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
     return (
         chain.length(whole),
-        chain.first_hit(whole, None, x, y, z, vx, vy, vz),
-        chain.first_hit(whole, Gravity(gx, gy, gz), x, y, z, vx, vy, vz),
-        chain.hit_of(whole, None, 1.0, x, y, z, vx, vy, vz),
-        chain.other_hit(whole, 0.0, x, y, z, vx, vy, vz),
+        flights.first_hit(whole, None, x, y, z, vx, vy, vz),
+        flights.first_hit(whole, Gravity(gx, gy, gz), x, y, z, vx, vy, vz),
+        flights.hit_of(whole, None, 1.0, x, y, z, vx, vy, vz),
+        flights.other_hit(whole, 0.0, x, y, z, vx, vy, vz),
         chain.unit_normal(whole, 2.0, x, y, z),
         chain.outside(whole, 1.0, x, y, z),
         chain.push(whole, 1.0, x, y, z, vx, vy, vz, kappa),
-        chain.free_time(None, whole, x, y, z, vx, vy, vz),
-        chain.free_time(Gravity(gx, gy, gz), whole, x, y, z, vx, vy, vz),
+        flights.free_time(None, whole, x, y, z, vx, vy, vz),
+        flights.free_time(Gravity(gx, gy, gz), whole, x, y, z, vx, vy, vz),
         chain.touched(whole, x, y, z, vx, vy, vz),
     )
 

@@ -91,7 +91,7 @@ def falls(method, gravity):
 def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
 
-    The arguments time and surface are `chain.first_hit` of a fall.
+    The arguments time and surface are `flights.first_hit` of a fall.
 
     `left` is what is left of the frame, in the method's unit; `surface` is the wall of the contact that follows, or -1
     for none; `HARD - wall` leaves the contact to `hard_pass`.

@@ -10,6 +10,7 @@ from .._jit import inlined, select
 from ..checks import Vector, length
 from . import base
 from .course import rise_time
+from .normal import Normal, along, normal_of, times
 from .rotation import turned, unit
 
 # A normal as near as this to an axis is that axis, but for the round-off of a rotation.
@@ -73,9 +74,7 @@ class Slab(base.Surface):
 class SlabNumbers(NamedTuple):
     """What kernels know of a slab."""
 
-    nx: float
-    ny: float
-    nz: float
+    normal: Normal
     offset: float  # n.c
     half: float
     half2: float
@@ -84,20 +83,14 @@ class SlabNumbers(NamedTuple):
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
     """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
-    offset = sum(n * c for n, c in zip(normal, center, strict=True))
-    return SlabNumbers(*normal, offset, half, half * half, side)
-
-
-@inlined
-def _along(surface, x, y, z):
-    """n.(x, y, z)"""
-    return surface.nx * x + surface.ny * y + surface.nz * z
+    across = normal_of(normal)
+    return SlabNumbers(across, float(along(across, *center)), half, half * half, side)
 
 
 @inlined
 def _off(surface, x, y, z):
     """The signed distance from the middle."""
-    return surface.nx * x + surface.ny * y + surface.nz * z - surface.offset
+    return along(surface.normal, x, y, z) - surface.offset
 
 
 # --- The level set ---------------------------------------------------------------------------------------
@@ -111,7 +104,7 @@ def _(surface, x, y, z):
 @base.gradient.register(SlabNumbers)
 def _(surface, x, y, z):
     sign = np.copysign(1.0, _off(surface, x, y, z))
-    return sign * surface.nx, sign * surface.ny, sign * surface.nz
+    return times(surface.normal, sign)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -119,7 +112,7 @@ def _(surface, x, y, z):
 
 @base.first_hit.register(SlabNumbers)
 def _(surface, x, y, z, vx, vy, vz):
-    d, v = _off(surface, x, y, z), _along(surface, vx, vy, vz)
+    d, v = _off(surface, x, y, z), along(surface.normal, vx, vy, vz)
     # Between the walls the one ahead, outside of them the one on the side where the flight comes from
     time = (surface.side * math.copysign(surface.half, v) - d) / v
     meets = select(surface.side > 0.0, abs(v), -d * v) > 0.0
@@ -129,7 +122,7 @@ def _(surface, x, y, z, vx, vy, vz):
 @base.falling_hit.register(SlabNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     d, sign = _off(surface, x, y, z), math.copysign(0.5, _off(surface, x, y, z))
-    b, a = sign * _along(surface, vx, vy, vz), sign * _along(surface, gx, gy, gz)
+    b, a = sign * along(surface.normal, vx, vy, vz), sign * along(surface.normal, gx, gy, gz)
     # The near wall and, between them, the far one: each is a plane.
     near = rise_time(surface.side * (abs(d) - surface.half), surface.side * b, surface.side * a)
     far = rise_time(-abs(d) - surface.half, -b, -a)
@@ -154,13 +147,13 @@ def _(surface):
 @base.unit_normal.register(SlabNumbers)
 def _(surface, x, y, z):
     k = math.copysign(1.0, surface.side * _off(surface, x, y, z))
-    return k * surface.nx, k * surface.ny, k * surface.nz
+    return times(surface.normal, k)
 
 
 @base.chord_guess.register(SlabNumbers)
 def _(surface, x, y, z, px, py, pz):
     # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-    return 0.5 * _along(surface, px, py, pz) / _off(surface, x, y, z)
+    return 0.5 * along(surface.normal, px, py, pz) / _off(surface, x, y, z)
 
 
 @base.chord_improve.register(SlabNumbers)
@@ -175,9 +168,9 @@ def _(surface):
 
 @base.chord_normal.register(SlabNumbers)
 def _(surface, x, y, z, px, py, pz, kappa):
-    d = 2.0 * _off(surface, x, y, z) + _along(surface, px, py, pz)
+    d = 2.0 * _off(surface, x, y, z) + along(surface.normal, px, py, pz)
     k = math.copysign(1.0, surface.side * d)
-    return k * surface.nx, k * surface.ny, k * surface.nz
+    return times(surface.normal, k)
 
 
 @base.inner.register(SlabNumbers)
@@ -213,26 +206,28 @@ def _(surface, q0, q1):
 def _(surface, x0, y0, z0, x1, y1, z1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
     k = _off(surface, x0, y0, z0) + _off(surface, x1, y1, z1)
-    return k * surface.nx, k * surface.ny, k * surface.nz
+    return times(surface.normal, k)
 
 
 @base.push.register(SlabNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     # r1 = r0 + p - kappa (s0 + s1) n
-    k = kappa * (2.0 * _off(surface, x0, y0, z0) + _along(surface, px, py, pz)) / (1.0 + kappa)
-    return x0 + (px - k * surface.nx), y0 + (py - k * surface.ny), z0 + (pz - k * surface.nz)
+    k = kappa * (2.0 * _off(surface, x0, y0, z0) + along(surface.normal, px, py, pz)) / (1.0 + kappa)
+    kx, ky, kz = times(surface.normal, k)
+    return x0 + (px - kx), y0 + (py - ky), z0 + (pz - kz)
 
 
 @base.resolve.register(SlabNumbers)
 def _(surface, x, y, z, strength):
     k = 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, x, y, z)
-    return x - k * surface.nx, y - k * surface.ny, z - k * surface.nz
+    kx, ky, kz = times(surface.normal, k)
+    return x - kx, y - ky, z - kz
 
 
 @base.rise.register(SlabNumbers)
 def _(surface, x0, y0, z0, px, py, pz, kappa):
     # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
-    d, p = _off(surface, x0, y0, z0), _along(surface, px, py, pz)
+    d, p = _off(surface, x0, y0, z0), along(surface.normal, px, py, pz)
     w = 1.0 / (1.0 + kappa)
     both, change = (2.0 * d + p) * w, (p - 2.0 * kappa * d) * w
     risen = both * change
@@ -248,5 +243,5 @@ def _(surface):
 @base.settle.register(SlabNumbers)
 def _(surface, x, y, z):
     d = _off(surface, x, y, z)
-    f = d - math.copysign(surface.half, d)
-    return x - f * surface.nx, y - f * surface.ny, z - f * surface.nz
+    fx, fy, fz = times(surface.normal, d - math.copysign(surface.half, d))
+    return x - fx, y - fy, z - fz

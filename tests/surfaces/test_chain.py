@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.gravity import Gravity
-from swarm.surfaces import base, chain
+from swarm.surfaces import base, chain, flights
 
 every_chain = pytest.mark.parametrize(
     "names",
@@ -54,9 +54,9 @@ def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
     one, more = (base.falling_hit, (pull,)) if falling else (base.first_hit, ())
     hits = [call(one, numbers, point, velocity, *more) for numbers in single]
     assert chain.length(whole) == len(names)
-    assert call(chain.first_hit, whole, gravity, point, velocity) == first_least(hits)
+    assert call(flights.first_hit, whole, gravity, point, velocity) == first_least(hits)
     for index, hit in enumerate(hits):
-        assert call(chain.hit_of, whole, gravity, index, point, velocity) == hit
+        assert call(flights.hit_of, whole, gravity, index, point, velocity) == hit
 
 
 @every_chain
@@ -66,7 +66,7 @@ def test_other_hit_is_the_least_of_the_others(names, point, velocity):
     hits = [call(base.first_hit, numbers, point, velocity) for numbers in single]
     for index in range(len(hits)):
         others = [(math.inf, True) if i == index else hit for i, hit in enumerate(hits)]
-        least, other = call(chain.other_hit, whole, index, point, velocity)
+        least, other = call(flights.other_hit, whole, index, point, velocity)
         assert least == min(time for time, _found in others)
         if least < math.inf:
             assert other == np.argmin([time for time, _found in others])
@@ -77,13 +77,13 @@ def test_other_hit_is_the_least_of_the_others(names, point, velocity):
 def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
     whole, single = both(names)
     safe = [call(base.safe_time, numbers, point, velocity, pull) for numbers in single]
-    assert call(chain.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
-    assert call(chain.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
-    free = call(chain.free_time, None, whole, point, velocity)
+    assert call(flights.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
+    assert call(flights.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
+    free = call(flights.free_time, None, whole, point, velocity)
     if any(is_out(numbers, point) for numbers in single):
         assert free == 0.0
     else:
-        assert free == call(chain.first_hit, whole, None, point, velocity)[0]
+        assert free == call(flights.first_hit, whole, None, point, velocity)[0]
 
 
 @every_chain
