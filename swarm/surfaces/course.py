@@ -9,7 +9,7 @@ import math
 from .._jit import inlined, select
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
-SAFE_STEPS = 5
+SAFE_STEPS = 4
 MORE_STEPS = 16
 # A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
 _CLOSE = 1e-16
@@ -54,6 +54,19 @@ def _rise_by(slope, window):
 
 
 @inlined
+def leave(c, b, a2, a3, a4, window):
+    """The first safe step of a flight that does not rise at once: (t, what `safe_step` takes as the last length).
+
+    Where c <= 0 and b <= 0 the level is below t (2 b + a2 t + s t^2), one power of t nearer to it than the parabola of
+    a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under a
+    ceiling needs: the parabola of the whole window rises at once there.
+    """
+    time = rise_time(2.0 * b, 0.5 * a2, _steepest(a3, a4, window))
+    time = select(b <= 0.0, select(time < window, time, window), 0.0)
+    return time, select(time < math.inf, math.inf, 0.0)
+
+
+@inlined
 def safe_step(c, b, a2, a3, a4, window, t, last):
     """One step towards the first rise of the level c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 through 0: (t, its length).
 
@@ -69,14 +82,9 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
     a3t = a3 + t * 4.0 * a4
     slope = _steepest(a3t, a4, reach)
     time = rise_time(ct, bt, a2t + _rise_by(slope, reach))
-    # Up to -a2/(2 slope), M = a2/2 < 0 holds as well: a particle at rest under a ceiling, or one that grazes, surely
-    # falls until then, where the parabola of the whole reach may rise at once.
-    falls = (a2t < 0.0) & ((bt <= 0.0) | (bt * bt < 0.5 * a2t * ct))
-    bent = select(falls, -0.5 * a2t / slope, 0.0)  # infinite where nothing bends it up
-    at_root = (time >= bent) & (time <= reach)
-    time = select(time > bent, time, bent)
     step = select(time < reach, time, reach)
     # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
+    at_root = time <= reach
     close = reach * step * step <= _CLOSE * window * window * window
     return t + step, select(at_root & close, 0.0, step)
 
@@ -90,7 +98,7 @@ def arrived(last):
 @inlined
 def first_rise(c, b, a2, a3, a4, window):
     """`first_hit` for that level, by safe steps."""
-    t, last = 0.0, math.inf
+    t, last = leave(c, b, a2, a3, a4, window)
     for _step in range(SAFE_STEPS + MORE_STEPS):
         t, last = safe_step(c, b, a2, a3, a4, window, t, last)
         if arrived(last):

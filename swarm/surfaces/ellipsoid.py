@@ -112,7 +112,9 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     # q(r + v t + G t^2/2) - 1, a quartic in t
     a2 = a + _dot(surface, dx, dy, dz, gx, gy, gz)
     a3 = _dot(surface, vx, vy, vz, gx, gy, gz)
-    window = 2.0 / math.sqrt(a + math.sqrt(gg))
+    # By the distance where that is more than the axes: a solid is looked for from afar.
+    size = 1.0 + select(c > 0.0, c, 0.0)
+    window = 2.0 * math.sqrt(size / (a + math.sqrt(size * gg)))
     side = surface.side
     return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
 

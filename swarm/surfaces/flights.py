@@ -6,7 +6,7 @@ from .._jit import by_type, select
 from ..gravity import Gravity, Nothing
 from . import base
 from .chain import Chain, outside
-from .course import arrived, safe_step
+from .course import arrived, leave, safe_step
 
 
 @by_type
@@ -63,7 +63,7 @@ def _(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
         c, b, a2, a3, a4, window = base.course(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
         course[row, lane], course[row + 1, lane], course[row + 2, lane] = c, b, a2
         course[row + 3, lane], course[row + 4, lane], course[row + 5, lane] = a3, a4, window
-        course[row + 6, lane], course[row + 7, lane] = 0.0, math.inf
+        course[row + 6, lane], course[row + 7, lane] = leave(c, b, a2, a3, a4, window)
     else:
         time, found = base.falling_hit(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
         course[row + 6, lane], course[row + 7, lane] = time, select(found, 0.0, math.inf)

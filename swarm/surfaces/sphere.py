@@ -102,7 +102,9 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
     a2 = a + dx * gx + dy * gy + dz * gz
     a3 = vx * gx + vy * gy + vz * gz
-    window = 2.0 * surface.radius / math.sqrt(a + surface.radius * math.sqrt(gg))
+    # By the distance where that is more than the radius: a ball is looked for from afar.
+    size = surface.radius2 + select(c > 0.0, c, 0.0)
+    window = 2.0 * math.sqrt(size / (a + math.sqrt(size * gg)))
     side = surface.side
     return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
 
