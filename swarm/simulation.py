@@ -88,7 +88,7 @@ def simulate(
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
             observe; stop if a number is not finite
-            write the frame and flush
+            copy the frame; a thread beside writes and flushes it
             tell the progress display
 
     Args:
@@ -231,9 +231,10 @@ def _output(
 
     if path is None:
         return contextlib.nullcontext(lambda *frame: None)
+    from .output.beside import Beside
     from .output.trajectory import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    return TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text)
+    return Beside(TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text), len(particles))
 
 
 def _no_sweeps(n: int) -> Multipliers:

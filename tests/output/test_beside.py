@@ -1,0 +1,98 @@
+"""Frames written by a thread of their own: all of them, in order, as they were; what went wrong is raised."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from swarm.output.beside import Beside
+from swarm.particles import State
+
+
+class Writer:
+    """Keeps what it is told to write; fails at frame `fails`."""
+
+    def __init__(self, fails=None, seconds=0.0):
+        self.fails, self.seconds = fails, seconds
+        self.frames, self.threads, self.left_with = [], set(), "never left"
+
+    def __enter__(self):
+        return self.write
+
+    def __exit__(self, kind, error, trace):
+        self.left_with = error
+
+    def write(self, number, moment, state, seen):
+        time.sleep(self.seconds)
+        if number == self.fails:
+            raise OSError(f"frame {number} does not fit")
+        self.threads.add(threading.get_ident())
+        self.frames.append((number, moment, state.position.copy(), state.velocity.copy(), seen))
+
+
+def state_of(n=5):
+    nothing = np.zeros(n)
+    return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, nothing, nothing, nothing, None)
+
+
+@pytest.mark.parametrize("n", [5, 1_000_001])
+def test_every_frame_is_written_as_it_was(n):
+    """The state goes on changing while a slow writer is behind."""
+    writer, state = Writer(seconds=0.01), state_of(n)
+    with Beside(writer, n) as write:
+        for number in range(6):
+            state.position[:], state.velocity[:] = number, -number
+            write(number, 0.1 * number, state, {"time": 0.1 * number})
+    assert [frame[0] for frame in writer.frames] == list(range(6))
+    for number, moment, position, velocity, seen in writer.frames:
+        assert moment == seen["time"] == 0.1 * number
+        assert (position == number).all()
+        assert (velocity == -number).all()
+    assert writer.threads.isdisjoint({threading.get_ident()})
+    assert writer.left_with is None
+
+
+def test_the_run_does_not_wait_for_a_frame():
+    """It goes on before the frame is written: here it must, for the frame to be."""
+    writer, went_on = Writer(), threading.Event()
+    write_now = writer.write
+    writer.write = lambda *frame: went_on.wait(60.0) and write_now(*frame)
+    with Beside(writer, 5) as write:
+        write(0, 0.0, state_of(), {})
+        went_on.set()
+    assert len(writer.frames) == 1
+
+
+def run(writer, frames, then=None):
+    """A run of so many frames; `then` is raised at its end."""
+    with Beside(writer, 5) as write:
+        for number in range(frames):
+            writer.given = number
+            write(number, 0.0, state_of(), {})
+        if then is not None:
+            raise then
+
+
+def test_a_frame_that_fails_ends_the_run_and_none_follows():
+    writer = Writer(fails=2)
+    with pytest.raises(OSError, match="frame 2 does not fit"):
+        run(writer, 1000)
+    assert [frame[0] for frame in writer.frames] == [0, 1]
+    assert writer.given <= 5
+    assert isinstance(writer.left_with, OSError)
+
+
+def test_the_last_frame_fails_too():
+    writer = Writer(fails=0, seconds=0.1)
+    with pytest.raises(OSError, match="frame 0 does not fit"):
+        run(writer, 1)
+    assert isinstance(writer.left_with, OSError)
+
+
+def test_an_error_of_the_run_is_the_one_that_is_raised():
+    writer = Writer(seconds=0.05)
+    with pytest.raises(ValueError, match="the run"):
+        run(writer, 1, then=ValueError("the run"))
+    assert len(writer.frames) == 1
+    assert isinstance(writer.left_with, ValueError)
