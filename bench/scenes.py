@@ -6,7 +6,7 @@ One thread, kernels only, minimum and median; `ratio` is to the sphere of the sa
 import swarm
 from swarm.surfaces import Surface
 
-from .throughput import Row, advance_seconds, repeated, show, write
+from .throughput import Row, advance_seconds, in_turn, per_impact, show, write
 
 GRAVITY = (0.0, 0.0, -1.0)
 
@@ -62,21 +62,18 @@ QUICK = ("sphere", "capped cylinder", "sphere, gravity", "formula of the ellipso
 
 def main(quick: bool) -> None:
     """Measure, print, and write the table of this machine."""
-    n, until, repeats = (500, 100.0, 1) if quick else (10_000, 40.0, 5)
-    rows = []
+    n, until, rounds = (500, 100.0, 1) if quick else (10_000, 40.0, 30)
+    measures = {}
     for name in QUICK if quick else SCENES:
-        surfaces, gravity, bar = SCENES[name]
-        scene = swarm.Scene(surfaces, gravity)
+        surfaces, gravity, _bar = SCENES[name]
         # Scenes without vectorised lanes are an order slower.
         slow = any(isinstance(surface, swarm.Torus | swarm.Capsule | swarm.Formula) for surface in surfaces)
-        measure = advance_seconds(scene, swarm.Impact(), n // 10 if slow else n, until)
-
-        def per_impact(measure=measure) -> float:  # type: ignore[no-untyped-def]
-            seconds, impacts = measure()
-            return 1e9 * seconds / impacts
-
-        best, median = repeated(per_impact, repeats)
-        rows.append(Row(name, best, median, "ns/impact", bar, best / rows[0].best if rows else 1.0))
+        measures[name] = advance_seconds(swarm.Scene(surfaces, gravity), swarm.Impact(), n // 10 if slow else n, until)
+    figures = in_turn({name: lambda one=one: 1e9 * per_impact(one) for name, one in measures.items()}, rounds)
+    first, _median = figures[next(iter(figures))]
+    rows = [
+        Row(name, best, median, "ns/impact", SCENES[name][2], best / first) for name, (best, median) in figures.items()
+    ]
     show(rows)
     if not quick:
         write(rows, "scenes")

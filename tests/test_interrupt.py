@@ -11,6 +11,14 @@ import swarm
 CAVITY = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 
 
+@pytest.fixture(autouse=True)
+def _sigint_is_pythons():
+    """A shell starts its background jobs with SIGINT ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 class Thing:
     """Something a weak reference can be made of."""
 
