@@ -1,8 +1,10 @@
 """`python -m bench NAME`."""
 
 import argparse
+import sys
+from pathlib import Path
 
-from . import scenes, throughput
+from . import compare, scenes, throughput
 
 
 def main() -> None:
@@ -15,7 +17,12 @@ def main() -> None:
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
         )
+    comparison = commands.add_parser("compare", help="what got slower from one report to another")
+    comparison.add_argument("old", type=Path, help="a CSV of bench/results")
+    comparison.add_argument("new", type=Path)
     arguments = parser.parse_args()
+    if arguments.command == "compare":
+        sys.exit(compare.main(arguments.old, arguments.new))
     {"throughput": throughput, "scenes": scenes}[arguments.command].main(quick=arguments.quick)
 
 

@@ -5,9 +5,11 @@ that reached the frame time retire, and the next particle, or the last live lane
 depend on which lane or block a particle is in.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ._jit import by_type, inlined, kept, kernel, select
+from ._jit import by_type, by_type_outlined, inlined, kept, kernel, select
 from .contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
 from .gravity import Gravity, Nothing
 from .lanes import (
@@ -28,37 +30,42 @@ from .lanes import (
     load,
     move,
     retire,
-    room,
 )
 from .methods import base as methods
+from .particles import Multipliers
 from .status import Status
 from .surfaces import chain as walls
 from .surfaces import flights
 from .surfaces.course import MORE_STEPS, SAFE_STEPS
 
-# Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
-_MOST_HITS = 1e8
+
+class Hard(NamedTuple):
+    """With it a kernel can do hard contacts: half of what there is to compile, and seldom met in a smooth cavity."""
+
+    most_hits: float = 1e8  # of one particle in one frame, after which it is given up: seconds, not hours, in a cusp
 
 
 @kernel
-def advance_block(method, chain, gravity, state, span, start, stop, halt):
+def advance_block(method, chain, gravity, hard, state, done, span, start, stop, halt, lanes):
     """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
 
-    `span` is in the method's unit. `halt[0]` set to 1 by another thread stops the block at its next pass.
+    `span` is in the method's unit; `lanes` is any `room` for the chain. `halt[0]` set to 1 by another thread stops the
+    block at its next pass. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
+    None the block ends with HARD_CONTACT at the first of these, to go on from there with what can do it.
     """
-    lanes = room(chain)
-    live = min(LANES, stop - start)
-    for lane in range(live):
-        load(method, lanes, lane, state, start + lane, span)
-    following = start + live
+    following, live = _undone(done, start, stop), 0
+    while live < LANES and following < stop:
+        load(method, lanes, live, state, following, span)
+        live += 1
+        following = _undone(done, following + 1, stop)
     while live > 0:
         if halt[0] != 0:
             return Status.INTERRUPTED.value, stop - 1
         _fly(method, chain, gravity, lanes, live)
-        _solve(method, chain, gravity, lanes, live)
-        retired, hard = _contact(method, chain, gravity, lanes, live)
-        if hard > 0:
-            finished, status, lane = _hard_passes(method, chain, gravity, lanes, live)
+        _solve(methods.unknown(method), method, chain, gravity, state.multipliers, lanes, live)
+        retired, hard_lanes = _contact(method, chain, gravity, lanes, live)
+        if hard_lanes > 0:
+            finished, status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane]
@@ -70,16 +77,25 @@ def advance_block(method, chain, gravity, state, span, start, stop, halt):
                 lane += 1
                 continue
             retire(method, lanes, lane, state)
+            done[lanes.particle[lane]] = True
             retired -= 1
             if following < stop:
                 load(method, lanes, lane, state, following, span)
-                following += 1
-                # It may be done already: a span of 0.
+                following = _undone(done, following + 1, stop)
+                # It may be there already: a span of 0.
                 lane += 1
             else:
                 live -= 1
                 move(lanes, live, lane)
     return Status.DONE.value, stop - 1
+
+
+@inlined
+def _undone(done, i, stop):
+    """The first particle from i on that is not done, or `stop`."""
+    while i < stop and done[i]:
+        i += 1
+    return i
 
 
 @inlined
@@ -132,11 +148,14 @@ def _(gravity, chain, lanes, live):
             time[i], wall[i] = flights.end_fall(chain, course, 0, i)
 
 
-@inlined
-def _solve(method, chain, gravity, lanes, live):
-    """The contact's unknown of every lane, and its multiplier where the method has one."""
+@by_type
+def _solve(unknown, method, chain, gravity, multipliers, lanes, live):
+    """The contact's unknown of every lane, and its multiplier where the method has one; nothing without an unknown."""
+
+
+@_solve.register(object)
+def _(unknown, method, chain, gravity, multipliers, lanes, live):
     rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
-    record, sweeping = lanes.record, lanes.sweeping
     if methods.most_sweeps(method, chain) > 0:
         for i in range(live):
             kappa[i], unsolved[i] = methods.guess(
@@ -144,24 +163,48 @@ def _solve(method, chain, gravity, lanes, live):
                 rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
                 rows[LEFT, i], rows[K0, i], surface[i],
             )  # fmt: skip
-    if methods.has_multiplier(method):
-        for i in range(live):
-            record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], surface[i], kappa[i],
-            )  # fmt: skip
-            sweeping[i] = unsolved[i]
-            record[BEFORE, i], record[MISS, i] = np.nan, np.nan
-            record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
-    _newton(method, chain, gravity, lanes, live)
-    if methods.has_multiplier(method):
-        for _sweep in range(methods.multiplier_sweeps(method)):
-            if _update_multipliers(method, lanes, live) == 0:
-                break
-            _newton(method, chain, gravity, lanes, live)
-        for i in range(live):
-            unsolved[i] = unsolved[i] | sweeping[i]
+    _begin_multipliers(multipliers, method, chain, gravity, lanes, live)
+    _newton(method, chain, gravity, multipliers, lanes, live)
+    _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
+
+
+@_solve.register(Nothing)
+def _(unknown, method, chain, gravity, multipliers, lanes, live):
+    pass
+
+
+@by_type
+def _begin_multipliers(multipliers, method, chain, gravity, lanes, live):
+    """The start of the loop (8) of every lane that has a contact."""
+
+
+@_begin_multipliers.register(Multipliers)
+def _(multipliers, method, chain, gravity, lanes, live):
+    rows, surface, kappa, record = lanes.rows, lanes.surface, lanes.kappa, lanes.record
+    for i in range(live):
+        record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
+            method, chain, gravity,
+            rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
+            rows[LEFT, i], rows[K0, i], surface[i], kappa[i],
+        )  # fmt: skip
+        lanes.sweeping[i] = lanes.unsolved[i]
+        record[BEFORE, i], record[MISS, i] = np.nan, np.nan
+        record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
+
+
+@by_type
+def _sweep_multipliers(multipliers, method, chain, gravity, lanes, live):
+    """Sweeps of the loop (8), until the last lane has converged."""
+
+
+@_sweep_multipliers.register(Multipliers)
+def _(multipliers, method, chain, gravity, lanes, live):
+    for _sweep in range(methods.multiplier_sweeps(method)):
+        if _update_multipliers(method, lanes, live) == 0:
+            break
+        _newton(method, chain, gravity, multipliers, lanes, live)
+    for i in range(live):
+        lanes.unsolved[i] = lanes.unsolved[i] | lanes.sweeping[i]
 
 
 @inlined
@@ -197,10 +240,9 @@ def _update_multipliers(method, lanes, live):
 
 
 @inlined
-def _newton(method, chain, gravity, lanes, live):
+def _newton(method, chain, gravity, multipliers, lanes, live):
     """Sweeps of the inner solve, until the last lane is solved."""
     rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
-    record = lanes.record
     for _sweep in range(methods.most_sweeps(method, chain)):
         remaining = 0
         for i in range(live):
@@ -208,25 +250,34 @@ def _newton(method, chain, gravity, lanes, live):
             kappa[i], unsolved[i], mean, stored, gain = methods.improve(
                 method, chain, gravity,
                 rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], surface[i], kept(kappa[i]), going, record[MULTIPLIER, i],
+                rows[LEFT, i], rows[K0, i], surface[i], kept(kappa[i]), going, lanes.record[MULTIPLIER, i],
             )  # fmt: skip
-            if methods.has_multiplier(method):
-                record[MEAN, i] = select(going, mean, kept(record[MEAN, i]))
-                record[STORED, i] = select(going, stored, kept(record[STORED, i]))
-                record[GAIN, i] = select(going, gain, kept(record[GAIN, i]))
+            _record(multipliers, lanes.record, i, going, mean, stored, gain)
             remaining += unsolved[i]
         if remaining == 0:
             break
 
 
-@inlined
-def _contact(method, chain, gravity, lanes, live):
-    """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
-    rows, surface = lanes.rows, lanes.surface
-    impulse, kappa, unsolved = lanes.impulse, lanes.kappa, lanes.unsolved
-    turned = lanes.turned
-    retired, hard_lanes = 0, 0
-    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
+@by_type
+def _record(multipliers, record, lane, going, mean, stored, gain):
+    """What the loop (8) wants to know of a sweep of the inner solve."""
+
+
+@_record.register(Multipliers)
+def _(multipliers, record, lane, going, mean, stored, gain):
+    record[MEAN, lane] = select(going, mean, kept(record[MEAN, lane]))
+    record[STORED, lane] = select(going, stored, kept(record[STORED, lane]))
+    record[GAIN, lane] = select(going, gain, kept(record[GAIN, lane]))
+
+
+@by_type
+def _turn(unknown, method, chain, gravity, lanes, live):
+    """The velocity of every lane after its contact, where one loop with the rest of the contact would be too long."""
+
+
+@_turn.register(object)
+def _(unknown, method, chain, gravity, lanes, live):
+    rows, surface, kappa, turned = lanes.rows, lanes.surface, lanes.kappa, lanes.turned
     if methods.turns(method):
         for i in range(live):
             turned[0, i], turned[1, i], turned[2, i], turned[3, i] = methods.turn(
@@ -234,6 +285,21 @@ def _contact(method, chain, gravity, lanes, live):
                 rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
                 rows[LEFT, i], rows[K0, i], rows[K1, i], surface[i], kappa[i],
             )  # fmt: skip
+
+
+@_turn.register(Nothing)
+def _(unknown, method, chain, gravity, lanes, live):
+    pass
+
+
+@inlined
+def _contact(method, chain, gravity, lanes, live):
+    """The contact of every lane that has one: (lanes that reached the end of the frame, hard lanes)."""
+    rows, surface = lanes.rows, lanes.surface
+    impulse, kappa, unsolved, turned = lanes.impulse, lanes.kappa, lanes.unsolved, lanes.turned
+    retired, hard_lanes = 0, 0
+    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
+    _turn(methods.unknown(method), method, chain, gravity, lanes, live)
     for i in range(live):
         if methods.turns(method):
             tx, ty, tz, given = turned[0, i], turned[1, i], turned[2, i], turned[3, i]
@@ -274,9 +340,19 @@ def _(chain, impulse, row, lane, surface, given):
     pass
 
 
-@inlined
-def _hard_passes(method, chain, gravity, lanes, live):
+@by_type_outlined
+def _hard_passes(hard, method, chain, gravity, lanes, live):
     """The hard lanes, one by one: (lanes that reached the end of the frame, worst status, its lane)."""
+    raise NotImplementedError
+
+
+@_hard_passes.register(Nothing)
+def _(hard, method, chain, gravity, lanes, live):
+    return 0, Status.HARD_CONTACT.value, 0
+
+
+@_hard_passes.register(Hard)
+def _(hard, method, chain, gravity, lanes, live):
     rows, surface = lanes.rows, lanes.surface
     retired, worst, where = 0, 0, 0
     for i in range(live):
@@ -294,7 +370,7 @@ def _hard_passes(method, chain, gravity, lanes, live):
             if methods.dissipates(method):
                 rows[K0, i] = energy
             retired += not (left > 0.0)
-            if rows[HITS, i] > _MOST_HITS:
+            if rows[HITS, i] > hard.most_hits:
                 status = Status.STALLED.value
             if status > worst:
                 worst, where = status, i

@@ -8,7 +8,6 @@ from ._jit import Array, by_type_outlined, inlined
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
-from .surfaces import chain as walls
 from .surfaces import flights
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
@@ -34,18 +33,17 @@ class Lanes(NamedTuple):
     particle: Array  # int64, the particle in the lane
 
 
-@inlined
-def room(chain):
-    """Lanes for one block, empty."""
+def room(walls: int) -> Lanes:
+    """Lanes for one block in a scene of so many walls. Made here: in a kernel it takes a second to compile."""
     return Lanes(
         np.empty((ROWS, _STRIDE)),
-        np.empty((walls.length(chain), _STRIDE)),
+        np.empty((walls, _STRIDE)),
         np.empty(_STRIDE),
         np.zeros(_STRIDE),
         np.zeros(_STRIDE, np.bool_),
         np.zeros(_STRIDE, np.bool_),
         np.zeros((RECORDS, _STRIDE)),
-        np.zeros((walls.length(chain) * flights.COURSE, _STRIDE)),
+        np.zeros((walls * flights.COURSE, _STRIDE)),
         np.empty(_STRIDE),
         np.zeros((4, _STRIDE)),
         np.empty(_STRIDE, np.int64),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import blocks, checks, interrupt, observables
+from . import blocks, checks, interrupt, lanes, observables
 from .errors import RunError, SceneError
 from .methods.base import Method
 from .particles import Multipliers, Particles, State
@@ -266,14 +266,16 @@ class Run:
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
-        blocks = math.ceil(n / (_BLOCKS * threads)) if threads > 1 else n
+        share = math.ceil(n / (_BLOCKS * threads)) if threads > 1 else n
         # Whole chunks of observables, so that a block observes what it has just advanced.
         chunk = observables.CHUNK
-        size_wanted = block_size or min(blocks, _LARGEST_BLOCK)
+        size_wanted = block_size or min(share, _LARGEST_BLOCK)
         self._block = chunk * max(1, math.ceil(size_wanted / chunk))
         self._starts = range(0, n, self._block)
         self._partial = np.zeros((math.ceil(n / chunk), observables.ROWS))
         self._halt = np.zeros(1, np.int8)
+        self._done = np.zeros(n, np.bool_)
+        self._hard = None if method.seldom_hard(scene) else blocks.Hard()
         self._threads = min(threads, len(self._starts))
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._frame_seconds = math.inf
@@ -293,13 +295,17 @@ class Run:
         """Advance every particle by `span` in the method's unit."""
 
         def block(start: int, stop: int) -> tuple[int, int]:
-            args = self._method, self._chain, self._gravity, self.state, span, start, stop, self._halt
+            job = self.state, self._done, span, start, stop, self._halt, lanes.room(len(self._owners))
             # Without the compiler too, a division by zero is an infinity that a select throws away.
             with np.errstate(divide="ignore", invalid="ignore"):
-                status, particle = blocks.advance_block(*args)
+                status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
+                if status == Status.HARD_CONTACT:
+                    self._hard = blocks.Hard()
+                    status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
             return status, particle
 
         began = time.perf_counter()
+        self._done.fill(False)
         status, particle = max(self._for_blocks(block))
         self._frame_seconds = time.perf_counter() - began
         if self._halt[0]:

@@ -13,6 +13,7 @@ class Status(IntEnum):
     STALLED = 4
     UNCONVERGED = 5
     TOO_FAST = 6
+    HARD_CONTACT = 7
 
     @property
     def sentence(self) -> str:
@@ -29,4 +30,5 @@ _SENTENCES = {
     Status.TOO_FAST: "a step is longer than the thinnest solid, so that the particle could jump over it",
     Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
+    Status.HARD_CONTACT: "a contact needs the kernel for hard ones",
 }

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bench import compare
+
 pytestmark = pytest.mark.physics
 
 
@@ -36,3 +38,37 @@ def test_scenes_quick():
     told = report("scenes")
     assert "capped cylinder" in told
     assert "formula of the ellipsoid" in told
+
+
+def table(path, **rows):
+    """A report with these (min, median, unit)."""
+    lines = [f'"{what}",{best},{median},{unit},,' for what, (best, median, unit) in rows.items()]
+    path.write_text("\n".join(["what,min,median,unit,bar,ratio", *lines]) + "\n")
+    return path
+
+
+def test_compare_tells_a_change_from_the_noise_and_from_the_clock(tmp_path, capsys):
+    yard = compare._YARDSTICK
+    old = table(
+        tmp_path / "old.csv",
+        **{yard: (2.0, 2.02, "ns/impact"), "worse": (5.0, 5.05, "ns/impact"), "noisy": (5.0, 6.0, "ns/impact")},
+        **{"better": (5.0, 5.05, "ns/impact"), "scaling": (1.8, 1.79, "x"), "energy": (1e-16, 1e-16, "relative")},
+        gone=(1.0, 1.0, "s"),
+    )
+    new = table(
+        tmp_path / "new.csv",
+        **{yard: (4.0, 4.04, "ns/impact"), "worse": (11.0, 11.1, "ns/impact"), "noisy": (11.0, 11.2, "ns/impact")},
+        **{"better": (9.0, 9.1, "ns/impact"), "scaling": (1.5, 1.49, "x"), "energy": (1e-15, 1e-15, "relative")},
+    )
+    verdicts = {row.what: row.verdict() for row in compare.changes(compare.read(old), compare.read(new))}
+    assert verdicts == {"worse": "slower", "noisy": "", "better": "faster", "scaling": "slower"}
+    assert compare.main(old, new) == 1
+    assert "2 of 4 got slower" in capsys.readouterr().out
+    assert compare.main(old, old) == 0
+
+
+def test_compare_wants_a_report(tmp_path):
+    path = tmp_path / "other.csv"
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(SystemExit, match="no report of bench"):
+        compare.read(path)

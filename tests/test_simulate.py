@@ -1,5 +1,7 @@
 """Frames, blocks, threads, and what is refused."""
 
+import functools
+
 import numba
 import numpy as np
 import pytest
@@ -208,13 +210,30 @@ def test_numbers_spoiled_after_construction_are_refused(name):
         swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
 
 
-@pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="the limit is a constant of the kernel, 1e8 in compiled ones")
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
     """An error that names the particle and its walls, not a hang."""
-    monkeypatch.setattr(blocks, "_MOST_HITS", 50.0)
+    monkeypatch.setattr(blocks, "Hard", functools.partial(blocks.Hard, 50.0))
     start = swarm.Particles([[0.0, 0.5], [0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
     with pytest.raises(swarm.RunError, match=r"particle 1: .*100 million times"):
         swarm.simulate(SPHERE, start, swarm.Impact(shortest_flight=1e-3), until=1.0)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_hard_contact_brings_its_kernel_and_changes_no_bit(monkeypatch, threads):
+    """A cavity starts without the kernel for grazing; a block that meets one begins again where it has not arrived."""
+    start = swarm.fill(SPHERE, 2000, speed=1.0, seed=6)
+    start.position[:, 1000], start.velocity[:, 1000] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
+    method, ends = swarm.Impact(shortest_flight=1e-2), []
+    for seldom in (True, False):
+        monkeypatch.setattr(swarm.Impact, "seldom_hard", lambda method, scene, seldom=seldom: seldom)
+        ends.append(swarm.simulate(SPHERE, start, method, until=3.0, every=1.0, threads=threads, block_size=512))
+    late, early = ends
+    assert np.array_equal(late.particles.position, early.particles.position)
+    assert np.array_equal(late.particles.velocity, early.particles.velocity)
+    for name, seen in late.observables.items():
+        assert np.array_equal(seen, early.observables[name]), name
+    # The grazing particle slid: a hundred steps a second.
+    assert late.observables["impacts"][-1] > 2000 * 3 + 200
 
 
 @pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["no gravity", "gravity"])

@@ -258,11 +258,6 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, uns
     return select(unsolved, kappa - step, kappa), unsolved & more, mean, stored, gain
 
 
-@base.has_multiplier.register(AugmentedLagrangianNumbers)
-def _(method):
-    return True
-
-
 @base.multiplier_sweeps.register(AugmentedLagrangianNumbers)
 def _(method):
     return method.max_sweeps

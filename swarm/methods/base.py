@@ -42,6 +42,10 @@ class Method:
         """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
         return False
 
+    def seldom_hard(self, scene: Scene) -> bool:
+        """Whether most runs meet no contact for `hard_pass`: then its kernel is compiled when the first one comes."""
+        return False
+
     def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
         """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
         raise NotImplementedError
@@ -100,6 +104,12 @@ def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, 
 
 
 @by_type
+def unknown(method):
+    """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
+    return method
+
+
+@by_type
 def most_sweeps(method, chain):
     """The most sweeps of `improve` a contact may take: a constant for the compiler, 0 where it has a closed form."""
     return 0
@@ -118,12 +128,6 @@ def improve(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kapp
     A lane that is solved stays as it is, bit by bit. The last three are for the loop of a multiplier.
     """
     return kappa, False, 0.0, 0.0, 0.0
-
-
-@by_type
-def has_multiplier(method):
-    """Whether contacts run the loop (8) of a multiplier: a constant for the compiler."""
-    return False
 
 
 @by_type
