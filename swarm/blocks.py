@@ -27,6 +27,7 @@ from .lanes import (
     Z,
     count_sweeps,
     keep_failure,
+    lanes_in,
     load,
     move,
     retire,
@@ -46,13 +47,14 @@ class Hard(NamedTuple):
 
 
 @kernel
-def advance_block(method, chain, gravity, hard, state, done, span, start, stop, halt, lanes):
+def advance_block(method, chain, gravity, hard, state, done, span, start, stop, halt, room):
     """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
 
-    `span` is in the method's unit; `lanes` is any `room` for the chain. `halt[0]` set to 1 by another thread stops the
+    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread stops the
     block at its next pass. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
     None the block ends with HARD_CONTACT at the first of these, to go on from there with what can do it.
     """
+    lanes = lanes_in(room, chain)
     following, live = _undone(done, start, stop), 0
     while live < LANES and following < stop:
         load(method, lanes, live, state, following, span)

@@ -8,6 +8,7 @@ from ._jit import Array, by_type_outlined, inlined
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
+from .surfaces import chain as walls
 from .surfaces import flights
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
@@ -33,21 +34,53 @@ class Lanes(NamedTuple):
     particle: Array  # int64, the particle in the lane
 
 
-def room(walls: int) -> Lanes:
-    """Lanes for one block in a scene of so many walls. Made here: in a kernel it takes a second to compile."""
-    return Lanes(
-        np.empty((ROWS, _STRIDE)),
-        np.empty((walls, _STRIDE)),
+class Room(NamedTuple):
+    """The arrays of `Lanes` that NumPy makes: in a kernel each kind of them takes a tenth of a second to compile."""
+
+    surface: Array
+    kappa: Array
+    unsolved: Array
+    sweeping: Array
+    record: Array
+    time: Array
+    particle: Array
+
+
+def room() -> Room:
+    """Room for one block."""
+    return Room(
         np.empty(_STRIDE),
         np.zeros(_STRIDE),
         np.zeros(_STRIDE, np.bool_),
         np.zeros(_STRIDE, np.bool_),
         np.zeros((RECORDS, _STRIDE)),
-        np.zeros((walls * flights.COURSE, _STRIDE)),
         np.empty(_STRIDE),
-        np.zeros((4, _STRIDE)),
         np.empty(_STRIDE, np.int64),
     )
+
+
+@inlined
+def lanes_in(room, chain):
+    """Lanes in that room. The tables of a pass are made here, where the compiler sees how far their rows are apart."""
+    count = walls.length(chain)
+    return Lanes(
+        _table(ROWS),
+        _table(count),
+        room.surface,
+        room.kappa,
+        room.unsolved,
+        room.sweeping,
+        room.record,
+        _table(count * flights.COURSE),
+        room.time,
+        _table(4),
+        room.particle,
+    )
+
+
+@inlined
+def _table(rows):
+    return np.empty((rows, _STRIDE))
 
 
 @inlined

@@ -295,7 +295,7 @@ class Run:
         """Advance every particle by `span` in the method's unit."""
 
         def block(start: int, stop: int) -> tuple[int, int]:
-            job = self.state, self._done, span, start, stop, self._halt, lanes.room(len(self._owners))
+            job = self.state, self._done, span, start, stop, self._halt, lanes.room()
             # Without the compiler too, a division by zero is an infinity that a select throws away.
             with np.errstate(divide="ignore", invalid="ignore"):
                 status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)

@@ -44,7 +44,7 @@ def _(chain):
 
 @by_type
 def unit_normal(chain, index, x, y, z):
-    """Unit normal of surface `index`, out of the admissible side."""
+    """Unit normal of surface `index`, out of the admissible side; of any where there is no such surface."""
     raise NotImplementedError
 
 
@@ -52,7 +52,8 @@ def unit_normal(chain, index, x, y, z):
 def _(chain, index, x, y, z):
     nx, ny, nz = base.unit_normal(chain.first, x, y, z)
     ox, oy, oz = unit_normal(chain.rest, index - 1.0, x, y, z)
-    here = index == 0.0
+    # Whoever has no wall does not ask: the last one need not be told from none.
+    here = (index == 0.0) | (length(chain) == 1)
     return select(here, nx, ox), select(here, ny, oy), select(here, nz, oz)
 
 
