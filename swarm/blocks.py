@@ -50,8 +50,8 @@ class Hard(NamedTuple):
 def advance_block(method, chain, gravity, hard, state, done, span, start, stop, halt, room):
     """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
 
-    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread stops the
-    block at its next pass. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
+    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread stops the block at its next
+    pass. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
     None the block ends with HARD_CONTACT at the first of these, to go on from there with what can do it.
     """
     lanes = lanes_in(room, chain)
@@ -105,10 +105,10 @@ def _fly(method, chain, gravity, lanes, live):
     """Every lane to its next contact, or to the end of the frame."""
     rows, surface = lanes.rows, lanes.surface
     time, wall = 0.0, 0.0
-    if methods.falls(method, gravity):
-        _fall(gravity, chain, lanes, live)
+    if methods.seeks(method):
+        _seek(gravity, chain, lanes, live)
     for i in range(live):
-        if methods.falls(method, gravity):
+        if methods.seeks(method):
             time, wall = lanes.time[i], kept(surface[i])
         x, y, z, vx, vy, vz, left, surface[i] = methods.flight(
             method, chain, gravity,
@@ -121,14 +121,25 @@ def _fly(method, chain, gravity, lanes, live):
 
 
 @by_type
-def _fall(gravity, chain, lanes, live):
-    """The safe steps of every lane, a loop for each.
+def _seek(gravity, chain, lanes, live):
+    """The first hit of every lane.
 
-    In one loop every step waits for the one before it (measured: 110 instead of 45 ns an impact in a sphere).
+    Root and division wait for one another, and the shorter a loop is the more lanes a processor has under way. Measured
+    in a sphere, nanoseconds an impact: flight and contact in one loop 7.2, a loop for each 5.4, the first hit before
+    them in its own 5.2; the safe steps of a fall in one loop 110, a loop for each 35.
     """
 
 
-@_fall.register(Gravity)
+@_seek.register(Nothing)
+def _(gravity, chain, lanes, live):
+    rows, time, wall = lanes.rows, lanes.time, lanes.surface
+    for i in range(live):
+        time[i], wall[i] = flights.first_hit(
+            chain, gravity, rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i]
+        )
+
+
+@_seek.register(Gravity)
 def _(gravity, chain, lanes, live):
     rows, course, time, wall = lanes.rows, lanes.course, lanes.time, lanes.surface
     for i in range(live):

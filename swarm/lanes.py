@@ -29,7 +29,7 @@ class Lanes(NamedTuple):
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
     course: Array  # (walls COURSE, stride) the safe steps of a fall
-    time: Array  # when the fall meets `surface`
+    time: Array  # when the flight meets `surface`
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
 

@@ -86,8 +86,8 @@ def lane_constants(method, mass, energy, vx, vy, vz):
 
 
 @by_type
-def falls(method, gravity):
-    """Whether the time of the first hit comes from the safe steps of a fall: a constant for the compiler."""
+def seeks(method):
+    """Whether `flight` takes the first hit of a flight, found before: a constant for the compiler."""
     return False
 
 
@@ -95,10 +95,9 @@ def falls(method, gravity):
 def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
     """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
 
-    The arguments time and surface are `flights.first_hit` of a fall.
-
-    `left` is what is left of the frame, in the method's unit; `surface` is the wall of the contact that follows, or -1
-    for none; `HARD - wall` leaves the contact to `hard_pass`.
+    The arguments time and surface are `flights.first_hit`, for a method that seeks it. `left` is what is left of the
+    frame, in the method's unit; the surface that is returned is the wall of the contact that follows, or -1 for none;
+    `HARD - wall` leaves the contact to `hard_pass`.
     """
     raise NotImplementedError
 

@@ -9,12 +9,11 @@ from .._jit import by_type, kept, select
 from ..contact.reflection import chord_end, chord_step, chord_turn, exact
 from ..contact.sliding import impact
 from ..errors import SceneError
-from ..gravity import Gravity, accelerated, displacement
+from ..gravity import accelerated, displacement
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
-from ..surfaces import flights
 from . import base
 
 # Walls within this part of the scene's size hold a sliding particle together.
@@ -107,25 +106,13 @@ def _(method, mass, energy, vx, vy, vz):
     return twice_energy, half_inverse, select(moving, shortest, 0.0)
 
 
-@base.falls.register(ImpactNumbers)
-def _(method, gravity):
-    return _falls(gravity)
-
-
-@by_type
-def _falls(gravity):
-    return False
-
-
-@_falls.register(Gravity)
-def _(gravity):
+@base.seeks.register(ImpactNumbers)
+def _(method):
     return True
 
 
 @base.flight.register(ImpactNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
-    if not _falls(gravity):
-        time, surface = flights.first_hit(chain, gravity, x, y, z, vx, vy, vz)
     hit = (time <= left) & (surface >= 0.0)
     t = select(time < left, time, left)
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)

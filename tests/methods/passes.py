@@ -42,7 +42,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
     constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
-    # What the safe steps of lanes.py find.
+    # What blocks.py seeks.
     time, wall = call(flights.first_hit, chain, gravity, position, velocity)
     *state, left, surface = call(
         base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall)
