@@ -6,6 +6,7 @@ comparable from machine to machine.
 """
 
 import csv
+import itertools
 import os
 import platform
 import resource
@@ -198,6 +199,47 @@ def overhead(frames: int, repeats: int) -> list[Row]:
     return [Row(f"simulate - 1.3 x kernels, 10 000 particles, {frames} frames", best, median, "us/frame", "50")]
 
 
+def output(frames: int, repeats: int) -> list[Row]:
+    """A run that writes 10 000 particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
+    import h5py
+
+    n, every = 10_000, 10.0 * 4.0 / 3.0 * 0.5 / SPEED
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+    def run(trajectory: Path | None) -> float:
+        start = time.perf_counter()
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, trajectory=trajectory)
+        return time.perf_counter() - start
+
+    def raw(path: Path) -> float:
+        rows = np.ascontiguousarray(particles.position.T)
+        start = time.perf_counter()
+        with h5py.File(path, "w") as file:
+            shape, chunks = (0, n, 3), (10, 1000, 3)
+            values = [
+                file.create_dataset(k, shape, np.float64, maxshape=(None, n, 3), chunks=chunks) for k in ("r", "v")
+            ]
+            for frame in range(frames + 1):
+                for value in values:
+                    value.resize(frame + 1, axis=0)
+                    value[frame] = rows
+                file.flush()
+        return time.perf_counter() - start
+
+    with tempfile.TemporaryDirectory() as folder:
+        files = (Path(folder) / f"{number}.h5" for number in itertools.count())
+        figures = in_turn(
+            {"none": lambda: run(None), "written": lambda: run(next(files)), "h5py": lambda: raw(next(files))}, repeats
+        )
+    (none, none2), (written, written2), (h5py_, h5py2) = figures.values()
+    return [
+        Row(
+            f"run of {frames} frames, 10 impacts each, written over not", written / none, written2 / none2, "x", "1.25"
+        ),
+        Row("  h5py alone over that run", h5py_ / written, h5py2 / written2, "x", "or > 0.7"),
+    ]
+
+
 _MEMORY = """
 import resource, sys, swarm
 n = int(sys.argv[1])
@@ -283,6 +325,7 @@ def main(quick: bool) -> None:
     rows += two_threads(n, repeats)
     rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
     rows += overhead(50 if quick else 1_000, repeats)
+    rows += output(20 if quick else 200, repeats)
     rows += memory(100_000 if quick else 10_000_000)
     rows += start_up(1 if quick else 3)
     rows += accuracy(1e2 if quick else 1e5)

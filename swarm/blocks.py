@@ -39,11 +39,14 @@ from .surfaces import chain as walls
 from .surfaces import flights
 from .surfaces.course import MORE_STEPS, SAFE_STEPS
 
+# Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
+MOST_HITS = 1e8
+
 
 class Hard(NamedTuple):
     """With it a kernel can do hard contacts: half of what there is to compile, and seldom met in a smooth cavity."""
 
-    most_hits: float = 1e8  # of one particle in one frame, after which it is given up: seconds, not hours, in a cusp
+    most_hits: float
 
 
 @kernel
@@ -113,7 +116,7 @@ def _fly(method, chain, gravity, lanes, live):
         x, y, z, vx, vy, vz, left, surface[i] = methods.flight(
             method, chain, gravity,
             rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-            rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], time, wall,
+            rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], time, wall, rows[HITS, i],
         )  # fmt: skip
         rows[X, i], rows[Y, i], rows[Z, i] = x, y, z
         rows[VX, i], rows[VY, i], rows[VZ, i] = vx, vy, vz

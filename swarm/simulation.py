@@ -275,7 +275,7 @@ class Run:
         self._partial = np.zeros((math.ceil(n / chunk), observables.ROWS))
         self._halt = np.zeros(1, np.int8)
         self._done = np.zeros(n, np.bool_)
-        self._hard = None if method.seldom_hard(scene) else blocks.Hard()
+        self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, len(self._starts))
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._frame_seconds = math.inf
@@ -300,7 +300,7 @@ class Run:
             with np.errstate(divide="ignore", invalid="ignore"):
                 status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
                 if status == Status.HARD_CONTACT:
-                    self._hard = blocks.Hard()
+                    self._hard = blocks.Hard(blocks.MOST_HITS)
                     status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
             return status, particle
 

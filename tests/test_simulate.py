@@ -1,13 +1,11 @@
 """Frames, blocks, threads, and what is refused."""
 
-import functools
-
 import numba
 import numpy as np
 import pytest
 
 import swarm
-from swarm import blocks
+from swarm import blocks, simulation
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -212,7 +210,7 @@ def test_numbers_spoiled_after_construction_are_refused(name):
 
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
     """An error that names the particle and its walls, not a hang."""
-    monkeypatch.setattr(blocks, "Hard", functools.partial(blocks.Hard, 50.0))
+    monkeypatch.setattr(blocks, "MOST_HITS", 50.0)
     start = swarm.Particles([[0.0, 0.5], [0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
     with pytest.raises(swarm.RunError, match=r"particle 1: .*100 million times"):
         swarm.simulate(SPHERE, start, swarm.Impact(shortest_flight=1e-3), until=1.0)
@@ -234,6 +232,15 @@ def test_a_hard_contact_brings_its_kernel_and_changes_no_bit(monkeypatch, thread
         assert np.array_equal(seen, early.observables[name]), name
     # The grazing particle slid: a hundred steps a second.
     assert late.observables["impacts"][-1] > 2000 * 3 + 200
+
+
+def test_a_frame_that_begins_at_the_wall_is_no_hard_contact():
+    """A flight that a frame cuts short does not graze: a cavity without grazing never needs that kernel."""
+    wall = swarm.Particles((0.5 - 1e-9, 0.0, 0.0), (1.0, 0.2, 0.0))
+    with simulation.Run(SPHERE, wall, swarm.Impact(), 1, None) as one:
+        one.advance(3.0, 3.0)
+        assert one.state.impacts[0] >= 3
+        assert one._hard is None
 
 
 @pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["no gravity", "gravity"])

@@ -230,7 +230,7 @@ def _(adaptive, method, left):
 
 
 @base.flight.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
     return _flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
 
 

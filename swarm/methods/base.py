@@ -92,12 +92,12 @@ def seeks(method):
 
 
 @by_type
-def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
+def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
     """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
 
-    The arguments time and surface are `flights.first_hit`, for a method that seeks it. `left` is what is left of the
-    frame, in the method's unit; the surface that is returned is the wall of the contact that follows, or -1 for none;
-    `HARD - wall` leaves the contact to `hard_pass`.
+    The arguments time and surface are `flights.first_hit`, for a method that seeks it; hits is how many impacts the
+    frame has had. `left` is what is left of the frame, in the method's unit; the surface that is returned is the wall
+    of the contact that follows, or -1 for none; `HARD - wall` leaves the contact to `hard_pass`.
     """
     raise NotImplementedError
 

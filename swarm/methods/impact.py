@@ -112,13 +112,14 @@ def _(method):
 
 
 @base.flight.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
     hit = (time <= left) & (surface >= 0.0)
     t = select(time < left, time, left)
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)
     vx, vy, vz = accelerated(gravity, vx, vy, vz, t)
-    # A flight shorter than the shortest ends in a contact that may graze.
-    surface = select(hit, select(time < k2, base.HARD - surface, surface), -1.0)
+    # A flight shorter than the shortest ends in a contact that may graze; not the first one, cut by the frame's begin.
+    short = (time < k2) & (hits > 0.0)
+    surface = select(hit, select(short, base.HARD - surface, surface), -1.0)
     return x + dx, y + dy, z + dz, vx, vy, vz, left - t, surface
 
 

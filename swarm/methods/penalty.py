@@ -91,7 +91,7 @@ def _(method, mass, energy, vx, vy, vz):
 
 
 @base.flight.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface):
+def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
     x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
     px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
     surface, count = walls.touched(chain, x, y, z, px, py, pz)

@@ -45,7 +45,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     # What blocks.py seeks.
     time, wall = call(flights.first_hit, chain, gravity, position, velocity)
     *state, left, surface = call(
-        base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall)
+        base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall), 1.0
     )
     kappa, unsolved = 0.0, False
     if base.most_sweeps(numbers, chain) > 0:

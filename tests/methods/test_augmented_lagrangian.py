@@ -3,7 +3,6 @@
 `simulate` runs in plain Python here, a few particles and contacts each; tests/physics/test_multipliers.py has the rest.
 """
 
-import functools
 import math
 from unittest import mock
 
@@ -280,7 +279,7 @@ def test_along_a_wall(name, position, velocity):
     ball = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
     scene = {**SCENES, "ball": ball}[name]
     method = method_of(0.01, 1e6, tolerance=1e-28, max_sweeps=99, adaptive=True)
-    with mock.patch.object(blocks, "Hard", functools.partial(blocks.Hard, 1000.0)):
+    with mock.patch.object(blocks, "MOST_HITS", 1000.0):
         result = simulate(scene, swarm.Particles(position, velocity), method, 2.0)
     assert result.observables["energy_error"].max() <= 1e-12
     assert result.observables["max_penetration"].max() <= 1e-14
