@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from physics.billiards import run, scene_of, ulps_outside, worst_energy
+from physics.billiards import places_outside, run, scene_of, worst_energy
 
 import swarm
 
@@ -21,7 +21,7 @@ def test_chords_keep_energy_and_walls(name, part):
     assert result.observables["impacts"][-1] >= 200 * 1000
     assert result.observables["energy_error"].max() <= 1e-12
     assert worst_energy(start, result.particles) <= 1e-12
-    assert ulps_outside(scene, result) <= 1.5
+    assert places_outside(scene, result) <= 1.5
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -40,7 +40,7 @@ def test_it_ends_inside_with_its_energy(name):
     """No launch may hang, leave the volume or change its speed."""
     for launch, facts in _facts_of(name).items():
         assert facts["energy"] <= 1e-12, launch
-        assert facts["ulps"] <= 1.5, launch
+        assert facts["ulps"] <= 4.0, launch
         if name.startswith("graze"):
             assert facts["impacts"] <= 2.0 * facts["time"] / facts["shortest"] + 10.0, launch
 
