@@ -2,6 +2,7 @@
 
 import queue
 import threading
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any
@@ -9,26 +10,28 @@ from typing import Any
 import numpy as np
 
 from ..particles import State
-from .trajectory import WriteFrame
+from .trajectory import WriteFrames, Written
 
-# Frames on their way: one is written while another waits; more would only hide a slow disk in memory. Of many
-# particles there is one, which is enough to write while the next is computed.
-_COPIES = 2
-_MANY = 1_000_000
+# Frames on their way: some are written, as many as wait at once, while others are computed. More would only hide a slow
+# disk in memory; of very many particles there is one, which is enough to write while the next is computed.
+_COPIES = 16
+_BYTES = 1 << 26
+
+WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
 class Beside:
-    """A context like the one it takes, whose function returns when the frame is copied, not when it is written.
+    """A context whose function returns when the frame is copied; the one it takes writes all that wait, at once.
 
     When the context ends, every frame is written. What writing raised is raised by the next frame, or at the end.
     """
 
-    def __init__(self, writer: AbstractContextManager[WriteFrame], n: int) -> None:
+    def __init__(self, writer: AbstractContextManager[WriteFrames], n: int) -> None:
         self._writer = writer
-        self._frames: queue.SimpleQueue[tuple[int, float, State, dict[str, Any]] | None] = queue.SimpleQueue()
+        self._frames: queue.SimpleQueue[Written | None] = queue.SimpleQueue()
         # What bounds the other queue: a frame needs one of these.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
-        for _ in range(_COPIES if n <= _MANY else 1):
+        for _ in range(max(1, min(_COPIES, _BYTES // (48 * n)))):
             self._copies.put(None)
         self._problem: BaseException | None = None
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
@@ -59,11 +62,18 @@ class Beside:
         self._frames.put((number, moment, copy, seen))
 
     def _work(self) -> None:
-        while (frame := self._frames.get()) is not None:
+        going = True
+        while going:
+            waiting = [self._frames.get()]
+            while not self._frames.empty():
+                waiting.append(self._frames.get())
+            frames = [frame for frame in waiting if frame is not None]
+            going = len(frames) == len(waiting)
             # After a frame that is not there, none follows.
-            if self._problem is None:
+            if frames and self._problem is None:
                 try:
-                    self._write(*frame)
+                    self._write(frames)
                 except BaseException as problem:  # whatever it is, the thread that computes raises it
                     self._problem = problem
-            self._copies.put(frame[2])
+            for frame in frames:
+                self._copies.put(frame[2])

@@ -28,11 +28,16 @@ _CHUNK = (10, 1000)
 # The chunk cache holds the chunks that one frame touches, up to this many bytes.
 _LARGEST_CACHE = 1 << 28
 
-WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
+# Number, time [s], positions and velocities, observables.
+Written = tuple[int, float, State, dict[str, Any]]
+WriteFrames = Callable[[list[Written]], None]
 
 
 class TrajectoryWriter:
-    """A context that creates the file and gives the function that appends a frame."""
+    """A context that creates the file and gives the function that appends frames.
+
+    Several at once cost little more than one: what takes time is the fifteen datasets and the flush.
+    """
 
     def __init__(
         self,
@@ -46,9 +51,8 @@ class TrajectoryWriter:
         check_target(path, overwrite)
         self._path, self._scene, self._method = path, scene, method
         self._mass, self._text = particles.mass, scene_text
-        self._rows = np.empty((len(particles), 3))
 
-    def __enter__(self) -> WriteFrame:
+    def __enter__(self) -> WriteFrames:
         chunks = -(-len(self._mass) // _CHUNK[1])
         cache = min(_LARGEST_CACHE, 2 * chunks * _CHUNK[0] * _CHUNK[1] * 24)
         try:
@@ -96,38 +100,35 @@ class TrajectoryWriter:
         group["step"], group["time"] = self._step, self._time
         return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *shape), chunks=chunks)
 
-    def _write(self, number: int, moment: float, state: State, seen: dict[str, Any]) -> None:
+    def _write(self, frames: list[Written]) -> None:
         try:
-            _append(self._step, number)
-            _append(self._time, moment)
+            _append(self._step, [number for number, _moment, _state, _seen in frames])
+            _append(self._time, [moment for _number, moment, _state, _seen in frames])
             for name, dataset in self._values.items():
-                np.copyto(self._rows, getattr(state, name).T)
-                _append(dataset, self._rows)
-            for name, value in seen.items():
-                if name == "time":
-                    continue
-                entry = np.asarray(value)
+                _append(dataset, np.stack([getattr(state, name).T for _number, _moment, state, _seen in frames]))
+            for name in (name for name in frames[0][3] if name != "time"):
+                entries = np.array([seen[name] for _number, _moment, _state, seen in frames])
                 if name not in self._observables:
-                    chunks = (1024, *entry.shape)
-                    self._observables[name] = self._element(f"observables/{name}", entry.shape, entry.dtype, chunks)
-                _append(self._observables[name], entry)
+                    shape = entries.shape[1:]
+                    self._observables[name] = self._element(f"observables/{name}", shape, entries.dtype, (1024, *shape))
+                _append(self._observables[name], entries)
             self._file.flush()
         except (OSError, RuntimeError) as error:
-            raise FileError(f"cannot write frame {number} to {self._path}: {error}") from error
+            raise FileError(f"cannot write frame {frames[0][0]} to {self._path}: {error}") from error
 
 
 _PARTS = ("position", "velocity")
 
 
-def _append(dataset: Any, value: Any) -> None:
-    """One more entry. h5py's indexing takes four times as long, and a frame appends to some fifteen datasets."""
+def _append(dataset: Any, values: Any) -> None:
+    """More entries. h5py's indexing takes four times as long, and a frame appends to some fifteen datasets."""
     handle = dataset.id
     count, *shape = handle.shape
-    handle.set_extent((count + 1, *shape))
+    entries = np.ascontiguousarray(values, dtype=dataset.dtype)
+    handle.set_extent((count + len(entries), *shape))
     space = handle.get_space()
-    space.select_hyperslab((count, *(0 for _ in shape)), (1, *shape))
-    entry = np.ascontiguousarray(value, dtype=dataset.dtype).reshape(1, *shape)
-    handle.write(h5py.h5s.create_simple((1, *shape)), space, entry)
+    space.select_hyperslab((count, *(0 for _ in shape)), entries.shape)
+    handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
 
 
 def check_target(path: Path, overwrite: bool) -> None:

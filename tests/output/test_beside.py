@@ -23,12 +23,13 @@ class Writer:
     def __exit__(self, kind, error, trace):
         self.left_with = error
 
-    def write(self, number, moment, state, seen):
+    def write(self, frames):
         time.sleep(self.seconds)
-        if number == self.fails:
-            raise OSError(f"frame {number} does not fit")
-        self.threads.add(threading.get_ident())
-        self.frames.append((number, moment, state.position.copy(), state.velocity.copy(), seen))
+        for number, moment, state, seen in frames:
+            if number == self.fails:
+                raise OSError(f"frame {number} does not fit")
+            self.threads.add(threading.get_ident())
+            self.frames.append((number, moment, state.position.copy(), state.velocity.copy(), seen))
 
 
 def state_of(n=5):
@@ -36,7 +37,7 @@ def state_of(n=5):
     return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, nothing, nothing, nothing, None)
 
 
-@pytest.mark.parametrize("n", [5, 1_000_001])
+@pytest.mark.parametrize("n", [5, 2_000_000])
 def test_every_frame_is_written_as_it_was(n):
     """The state goes on changing while a slow writer is behind."""
     writer, state = Writer(seconds=0.01), state_of(n)
@@ -57,7 +58,7 @@ def test_the_run_does_not_wait_for_a_frame():
     """It goes on before the frame is written: here it must, for the frame to be."""
     writer, went_on = Writer(), threading.Event()
     write_now = writer.write
-    writer.write = lambda *frame: went_on.wait(60.0) and write_now(*frame)
+    writer.write = lambda frames: went_on.wait(60.0) and write_now(frames)
     with Beside(writer, 5) as write:
         write(0, 0.0, state_of(), {})
         went_on.set()
@@ -79,7 +80,7 @@ def test_a_frame_that_fails_ends_the_run_and_none_follows():
     with pytest.raises(OSError, match="frame 2 does not fit"):
         run(writer, 1000)
     assert [frame[0] for frame in writer.frames] == [0, 1]
-    assert writer.given <= 5
+    assert writer.given <= 40
     assert isinstance(writer.left_with, OSError)
 
 
