@@ -76,23 +76,33 @@ def advance_block(method, chain, gravity, hard, state, done, span, start, stop, 
                 return status, lanes.particle[lane]
             retired += finished
         count_sweeps(state.multipliers, lanes, live)
-        lane = 0
-        while retired > 0:
-            if lanes.rows[LEFT, lane] > 0.0:
-                lane += 1
-                continue
+        if retired == 0:
+            continue
+        # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
+        for k in range(_arrivals(lanes, live) - 1, -1, -1):
+            lane = lanes.arrived[k]
             retire(method, lanes, lane, state)
             done[lanes.particle[lane]] = True
-            retired -= 1
             if following < stop:
                 load(method, lanes, lane, state, following, span)
                 following = _undone(done, following + 1, stop)
-                # It may be there already: a span of 0.
-                lane += 1
             else:
                 live -= 1
                 move(lanes, live, lane)
     return Status.DONE.value, stop - 1
+
+
+@inlined
+def _arrivals(lanes, live):
+    """How many lanes reached the end of the frame; which, is in `arrived`.
+
+    Without a branch: in what order lanes arrive no processor foresees, and each wrong guess costs some 6 ns.
+    """
+    left, arrived, count = lanes.rows[LEFT], lanes.arrived, 0
+    for lane in range(live):
+        arrived[count] = lane
+        count += not (left[lane] > 0.0)
+    return count
 
 
 @inlined

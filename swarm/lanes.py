@@ -32,6 +32,7 @@ class Lanes(NamedTuple):
     time: Array  # when the flight meets `surface`
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
+    arrived: Array  # int64, the lanes that reached the end of the frame in this pass, `_arrivals` of them
 
 
 class Room(NamedTuple):
@@ -44,6 +45,7 @@ class Room(NamedTuple):
     record: Array
     time: Array
     particle: Array
+    arrived: Array
 
 
 def room() -> Room:
@@ -55,6 +57,7 @@ def room() -> Room:
         np.zeros(_STRIDE, np.bool_),
         np.zeros((RECORDS, _STRIDE)),
         np.empty(_STRIDE),
+        np.empty(_STRIDE, np.int64),
         np.empty(_STRIDE, np.int64),
     )
 
@@ -75,6 +78,7 @@ def lanes_in(room, chain):
         room.time,
         _table(4),
         room.particle,
+        room.arrived,
     )
 
 
