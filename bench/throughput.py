@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import swarm
-from swarm import simulation
+from swarm.run import Run
 
 from . import yardstick
 
@@ -81,7 +81,7 @@ def advance_of(
     span = method.span("until", until)
 
     def measure() -> tuple[float, int]:
-        with simulation.Run(scene, particles, method, threads, None) as run:
+        with Run(scene, particles, method, threads, None) as run:
             run.advance(0.0, 0.0)  # compiles, and touches the arrays
             start = time.perf_counter()
             run.advance(span, until)
@@ -128,7 +128,7 @@ def multipliers(n: int, repeats: int) -> list[Row]:
         )
         times, sweeps = [], 0.0
         for _ in range(repeats):
-            with simulation.Run(SPHERE, particles, method, 1, None) as run:
+            with Run(SPHERE, particles, method, 1, None) as run:
                 run.advance(0.0, 0.0)
                 start = time.perf_counter()
                 run.advance(until, until)
@@ -184,7 +184,7 @@ def overhead(frames: int, repeats: int) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def seconds() -> tuple[float, float]:
-        with simulation.Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+        with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
             start = time.perf_counter()
             for _ in range(frames):
                 run.advance(every, every)

@@ -1,4 +1,4 @@
-"""One block of particles to one time, in lanes.
+"""Particles to one time, a block of them at once, in lanes.
 
 One pass does one flight and one contact for every live lane, in loops without branches, which LLVM vectorises. Lanes
 that reached the frame time retire, and the next particle, or the last live lane, takes their slot. The result does not
@@ -26,6 +26,7 @@ from .lanes import (
     Y,
     Z,
     count_sweeps,
+    following_particle,
     keep_failure,
     lanes_in,
     load,
@@ -50,22 +51,25 @@ class Hard(NamedTuple):
 
 
 @kernel
-def advance_block(method, chain, gravity, hard, state, done, span, start, stop, halt, room):
-    """Advance particles start to stop by `span` and return (status, particle): the first that failed, or the last.
+def advance_block(method, chain, gravity, hard, state, done, span, draws, halt, room):
+    """Advance what `draws` gives by `span` and return (status, particle, draws): DONE, or the first that failed.
 
-    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread stops the block at its next
-    pass. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
-    None the block ends with HARD_CONTACT at the first of these, to go on from there with what can do it.
+    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread ends it at its next pass.
+    Particles that are `done` are left alone, and those that arrive become it: where `hard` is None, the first hard
+    contact ends it with HARD_CONTACT, to go on from there with what can do it.
     """
     lanes = lanes_in(room, chain)
-    following, live = _undone(done, start, stop), 0
-    while live < LANES and following < stop:
+    following, stop, drawn, live = 0, 0, 0, 0
+    while live < LANES:
+        following, stop, drawn = following_particle(draws, done, following, stop, drawn)
+        if following == stop:
+            break
         load(method, lanes, live, state, following, span)
+        following += 1
         live += 1
-        following = _undone(done, following + 1, stop)
     while live > 0:
         if halt[0] != 0:
-            return Status.INTERRUPTED.value, stop - 1
+            return Status.INTERRUPTED.value, 0, drawn
         _fly(method, chain, gravity, lanes, live)
         _solve(methods.unknown(method), method, chain, gravity, state.multipliers, lanes, live)
         retired, hard_lanes = _contact(method, chain, gravity, lanes, live)
@@ -73,7 +77,7 @@ def advance_block(method, chain, gravity, hard, state, done, span, start, stop, 
             finished, status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
-                return status, lanes.particle[lane]
+                return status, lanes.particle[lane], drawn
             retired += finished
         count_sweeps(state.multipliers, lanes, live)
         if retired == 0:
@@ -83,13 +87,14 @@ def advance_block(method, chain, gravity, hard, state, done, span, start, stop, 
             lane = lanes.arrived[k]
             retire(method, lanes, lane, state)
             done[lanes.particle[lane]] = True
+            following, stop, drawn = following_particle(draws, done, following, stop, drawn)
             if following < stop:
                 load(method, lanes, lane, state, following, span)
-                following = _undone(done, following + 1, stop)
+                following += 1
             else:
                 live -= 1
                 move(lanes, live, lane)
-    return Status.DONE.value, stop - 1
+    return Status.DONE.value, 0, drawn
 
 
 @inlined
@@ -103,14 +108,6 @@ def _arrivals(lanes, live):
         arrived[count] = lane
         count += not (left[lane] > 0.0)
     return count
-
-
-@inlined
-def _undone(done, i, stop):
-    """The first particle from i on that is not done, or `stop`."""
-    while i < stop and done[i]:
-        i += 1
-    return i
 
 
 @inlined

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import Array, by_type_outlined, inlined
+from ._jit import Array, by_type_outlined, inlined, next_of
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
@@ -48,6 +48,19 @@ class Room(NamedTuple):
     arrived: Array
 
 
+class Draws(NamedTuple):
+    """Where the particles of a block come from: draw k is of those from k size to (k + 1) size, for one thread alone.
+
+    A thread draws when a lane is free, so its lanes are full until there are no more: shares of fixed size, each with
+    its own end, cost 14 % with 512 particles a share and 3 % with 4096, and leave a thread idle while the other has
+    the last one.
+    """
+
+    ticket: Array  # (1,) the next draw, of all threads
+    size: int
+    mine: Array  # the draws of this thread, in order
+
+
 def room() -> Room:
     """Room for one block."""
     return Room(
@@ -85,6 +98,23 @@ def lanes_in(room, chain):
 @inlined
 def _table(rows):
     return np.empty((rows, _STRIDE))
+
+
+@inlined
+def following_particle(draws, done, i, stop, drawn):
+    """(particle, stop, draws so far): the first from i on that is not done, of another draw if need be; or stop."""
+    while True:
+        while i < stop and done[i]:
+            i += 1
+        if i < stop:
+            return i, stop, drawn
+        k = next_of(draws.ticket)
+        i = min(k * draws.size, done.size)
+        stop = min(i + draws.size, done.size)
+        if i == stop:
+            return i, stop, drawn
+        draws.mine[drawn] = k
+        drawn += 1
 
 
 @inlined

@@ -17,9 +17,9 @@ from .surfaces import chain as walls
 from .surfaces import flights
 
 # Particles a partial sum: a constant of the results, unlike the block size.
-CHUNK = 2048
+CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
-_COLUMNS = 128
+_COLUMNS = 64
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
@@ -68,46 +68,48 @@ def start_energies(law, chain, gravity, size, state):
 
 
 @kernel
-def observe_block(law, chain, gravity, state, start, stop, partial):
-    """Partial sums and maxima of particles start to stop into partial[chunk, ROWS]; start is a chunk's start."""
+def observe(law, chain, gravity, state, drawn, size, partial):
+    """Partial sums and maxima of each chunk into partial[chunk, ROWS].
+
+    Of the particles k size to (k + 1) size for every k `drawn`; `size` is a number of whole chunks.
+    """
     position, velocity, mass = state.position, state.velocity, state.mass
     energy, inverse_scale = state.energy, state.inverse_scale
     sums = np.empty((ROWS, _COLUMNS))
-    for begin in range(start, stop, CHUNK):
-        end = min(begin + CHUNK, stop)
-        sums[:] = 0.0
-        for left in range(begin, end, _COLUMNS):
-            for j in range(min(_COLUMNS, end - left)):
-                i = left + j
-                m, x, y, z = mass[i], position[0, i], position[1, i], position[2, i]
-                vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
-                kinetic, fall, stored = _energy(law, chain, gravity, m, x, y, z, vx, vy, vz)
-                px, py, pz = m * vx, m * vy, m * vz
-                error = abs(kinetic + fall + stored - energy[i]) * inverse_scale[i]
-                depth = penetration(chain, x, y, z)
-                sums[_KINETIC, j] += m * kinetic
-                sums[_POTENTIAL, j] += m * fall
-                sums[_CONTACT, j] += m * stored
-                sums[_PX, j] += px
-                sums[_PY, j] += py
-                sums[_PZ, j] += pz
-                sums[_LX, j] += y * pz - z * py
-                sums[_LY, j] += z * px - x * pz
-                sums[_LZ, j] += x * py - y * px
-                sums[_ENERGY_ERROR, j] = select(error > sums[_ENERGY_ERROR, j], error, sums[_ENERGY_ERROR, j])
-                sums[_PENETRATION, j] = select(depth > sums[_PENETRATION, j], depth, sums[_PENETRATION, j])
-        # Pairwise over the columns.
-        half = _COLUMNS // 2
-        while half > 0:
-            for row in range(_ENERGY_ERROR):
-                for j in range(half):
-                    sums[row, j] += sums[row, j + half]
-            for row in range(_ENERGY_ERROR, ROWS):
-                for j in range(half):
-                    sums[row, j] = max(sums[row, j], sums[row, j + half])
-            half //= 2
-        for row in range(ROWS):
-            partial[begin // CHUNK, row] = sums[row, 0]
+    for k in drawn:
+        for begin in range(k * size, min((k + 1) * size, mass.size), CHUNK):
+            end = min(begin + CHUNK, mass.size)
+            sums[:] = 0.0
+            for left in range(begin, end, _COLUMNS):
+                for j in range(min(_COLUMNS, end - left)):
+                    i = left + j
+                    m, x, y, z = mass[i], position[0, i], position[1, i], position[2, i]
+                    vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
+                    kinetic, fall, stored = _energy(law, chain, gravity, m, x, y, z, vx, vy, vz)
+                    px, py, pz = m * vx, m * vy, m * vz
+                    error = abs(kinetic + fall + stored - energy[i]) * inverse_scale[i]
+                    depth = penetration(chain, x, y, z)
+                    sums[_KINETIC, j] += m * kinetic
+                    sums[_POTENTIAL, j] += m * fall
+                    sums[_CONTACT, j] += m * stored
+                    sums[_PX, j] += px
+                    sums[_PY, j] += py
+                    sums[_PZ, j] += pz
+                    sums[_LX, j] += y * pz - z * py
+                    sums[_LY, j] += z * px - x * pz
+                    sums[_LZ, j] += x * py - y * px
+                    sums[_ENERGY_ERROR, j] = select(error > sums[_ENERGY_ERROR, j], error, sums[_ENERGY_ERROR, j])
+                    sums[_PENETRATION, j] = select(depth > sums[_PENETRATION, j], depth, sums[_PENETRATION, j])
+            # Pairwise over the columns.
+            half = _COLUMNS // 2
+            while half > 0:
+                for row in range(ROWS):
+                    for j in range(half):
+                        one, other = sums[row, j], sums[row, j + half]
+                        sums[row, j] = select(row < _ENERGY_ERROR, one + other, select(one > other, one, other))
+                half //= 2
+            for row in range(ROWS):
+                partial[begin // CHUNK, row] = sums[row, 0]
 
 
 @kernel

@@ -1,40 +1,32 @@
-"""The run: frames, blocks, threads. The one border between Python objects and kernels."""
+"""From a scene to frames: checks, the loop over frames, and what hears of them."""
 
-import functools
+import contextlib
 import logging
-import math
 import os
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import blocks, checks, interrupt, lanes, observables
-from .errors import RunError, SceneError
+from . import checks, interrupt
+from .errors import SceneError
 from .methods.base import Method
-from .particles import Multipliers, Particles, State
+from .particles import Multipliers, Particles
+from .run import Run
 from .scene import Scene
-from .status import Status
+
+if TYPE_CHECKING:
+    from .output.beside import Beside
 
 _LOG = logging.getLogger("swarm")
-# Blocks a thread and frame: enough that uneven ones even out, few enough that lanes stay full.
-_BLOCKS = 4
-_LARGEST_BLOCK = 1 << 16
 # Frames nearer to `until` than this part of `every` are `until`.
 _SAME_TIME = 1e-9
-# A particle this many times the scene's extent away from the origin has escaped from an open scene.
-_FAR = 100.0
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
-# One thread computes in the caller's while frames are shorter than this [s]; in longer ones, and in the first, the
-# caller's is free to take an interrupt.
-_SHORT_FRAME = 0.05
 
 
 @dataclass(frozen=True)
@@ -104,7 +96,7 @@ def simulate(
         progress: True for a progress bar, or a function that is called with every `Frame`.
         overwrite: replace an existing trajectory.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
-        block_size: particles a block; None: by number of particles and threads. Results do not depend on it.
+        block_size: particles that a thread takes on at once. Results do not depend on it.
 
     Returns:
         A `Result`.
@@ -138,14 +130,17 @@ def simulate(
     run = Run(scene, particles, method, threads, block_size)
     history: list[dict[str, Any]] = []
     writer = _output(trajectory, overwrite, scene, method, particles, scene_text)
-    with run, interrupt.taken_by(run.halt), writer as write, display(progress) as show:
+    writing = writer or contextlib.nullcontext(lambda *frame: None)
+    with run, interrupt.taken_by(run.halt), writing as write, display(progress) as show:
         now = method.span("time", 0.0)
         for number, moment in enumerate(times):
             clock = method.span("time", moment)
             if number > 0:
-                run.advance(clock - now, moment)
+                run.advance(clock - now, moment, writer.seconds if writer else 0.0)
+            else:
+                run.observe()
             now = clock
-            seen = {"time": moment, **run.observe()}
+            seen = {"time": moment, **run.seen()}
             run.require_finite(seen, moment)
             history.append(seen)
             write(number, moment, run.state, seen)
@@ -225,141 +220,11 @@ def _output(
     method: Method,
     particles: Particles,
     scene_text: str | None,
-) -> Any:
+) -> "Beside | None":
     """A context that gives the function which writes a frame."""
-    import contextlib
-
     if path is None:
-        return contextlib.nullcontext(lambda *frame: None)
+        return None
     from .output.beside import Beside
     from .output.trajectory import TrajectoryWriter  # h5py takes 0.2 s to import
 
     return Beside(TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text), len(particles))
-
-
-def _no_sweeps(n: int) -> Multipliers:
-    counts = np.zeros((3, n), np.int64)
-    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))
-
-
-class Run:
-    """The state of a run and the threads that advance it."""
-
-    def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None
-    ) -> None:
-        n = len(particles)
-        self.state = State(
-            particles.position.copy(),
-            particles.velocity.copy(),
-            particles.mass.copy(),
-            np.empty(n),
-            np.empty(n),
-            np.zeros(n, np.int64),
-            np.zeros((len(scene.owners()), n)),
-            np.zeros(0 if scene.restitution() is None else n),
-            _no_sweeps(n) if method.has_multipliers() else None,
-        )
-        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
-        self._too_fast = functools.partial(method.too_fast, scene)
-        self._failure, self._owners = method.failure, scene.owners()
-        self._method, self._law = method.numbers(scene), method.law()
-        self._chain, self._gravity = scene.chain(), scene.pull()
-        observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
-        share = math.ceil(n / (_BLOCKS * threads)) if threads > 1 else n
-        # Whole chunks of observables, so that a block observes what it has just advanced.
-        chunk = observables.CHUNK
-        size_wanted = block_size or min(share, _LARGEST_BLOCK)
-        self._block = chunk * max(1, math.ceil(size_wanted / chunk))
-        self._starts = range(0, n, self._block)
-        self._partial = np.zeros((math.ceil(n / chunk), observables.ROWS))
-        self._halt = np.zeros(1, np.int8)
-        self._done = np.zeros(n, np.bool_)
-        self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
-        self._threads = min(threads, len(self._starts))
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
-        self._frame_seconds = math.inf
-
-    def __enter__(self) -> "Run":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.halt()
-        self._pool.shutdown(wait=True)
-
-    def halt(self) -> None:
-        """Let the kernels return before their frame is done, and `advance` raise KeyboardInterrupt."""
-        self._halt[0] = 1
-
-    def advance(self, span: float, moment: float) -> None:
-        """Advance every particle by `span` in the method's unit."""
-
-        def block(start: int, stop: int) -> tuple[int, int]:
-            job = self.state, self._done, span, start, stop, self._halt, lanes.room()
-            # Without the compiler too, a division by zero is an infinity that a select throws away.
-            with np.errstate(divide="ignore", invalid="ignore"):
-                status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
-                if status == Status.HARD_CONTACT:
-                    self._hard = blocks.Hard(blocks.MOST_HITS)
-                    status, particle = blocks.advance_block(self._method, self._chain, self._gravity, self._hard, *job)
-            return status, particle
-
-        began = time.perf_counter()
-        self._done.fill(False)
-        status, particle = max(self._for_blocks(block))
-        self._frame_seconds = time.perf_counter() - began
-        if self._halt[0]:
-            raise KeyboardInterrupt
-        if status != Status.DONE:
-            told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
-            if status == Status.TOO_FAST:
-                told += f", {self._too_fast()}"
-            multipliers = self.state.multipliers
-            if status == Status.UNCONVERGED and multipliers is not None:
-                left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-                told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
-            raise RunError(told)
-
-    def observe(self) -> dict[str, Any]:
-        """The observables now."""
-
-        def block(start: int, stop: int) -> None:
-            observables.observe_block(self._law, self._chain, self._gravity, self.state, start, stop, self._partial)
-
-        self._for_blocks(block)
-        seen = observables.summary(self._partial, self.state, self._owners)
-        escaped = 0
-        if self._far < math.inf:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self.state))
-        return {**seen, "escaped": escaped}
-
-    def require_finite(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError that names the first particle whose state is not finite."""
-        # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
-        if math.isfinite(seen["total_energy"] + seen["angular_momentum"].sum()):
-            return
-        good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
-        raise RunError(
-            f"the frame at {moment:g} s failed at particle {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}"
-        )
-
-    def _for_blocks(self, work: Callable[[int, int], Any]) -> list[Any]:
-        """Results of `work(start, stop)` for all blocks; threads take the next block when they are free."""
-        n = len(self.state.mass)
-        if self._threads == 1 and self._frame_seconds < _SHORT_FRAME:
-            return [work(start, min(start + self._block, n)) for start in self._starts]
-        lock, following, results = threading.Lock(), iter(self._starts), []
-
-        def worker() -> None:
-            while True:
-                with lock:
-                    start = next(following, None)
-                if start is None:
-                    return
-                results.append(work(start, min(start + self._block, n)))
-
-        jobs = [self._pool.submit(worker) for _ in range(self._threads)]
-        for job in jobs:
-            job.result()
-        return results

@@ -231,7 +231,7 @@ LAYERS = [
     ["cli"],
     ["scene_file"],
     ["simulation"],
-    ["output", "progress"],
+    ["output", "progress", "run"],
     ["tables", "filling"],
     ["observables", "blocks", "history"],
     ["lanes"],

@@ -33,10 +33,9 @@ def observe(law, scene, state, blocks=1):
     """The observables, from this many blocks."""
     n = len(state.mass)
     partial = np.zeros((-(-n // observables.CHUNK), observables.ROWS))
-    edges = range(0, n, n if blocks == 1 else observables.CHUNK)
-    for start in edges:
-        stop = n if blocks == 1 else min(start + observables.CHUNK, n)
-        observables.observe_block(law, scene.chain(), scene.pull(), state, start, stop, partial)
+    size = len(partial) * observables.CHUNK if blocks == 1 else observables.CHUNK
+    for k in reversed(range(1 if blocks == 1 else len(partial))):
+        observables.observe(law, scene.chain(), scene.pull(), state, np.array([k]), size, partial)
     return observables.summary(partial, state, list(range(len(state.impulse))))
 
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import blocks, simulation
+from swarm import blocks
+from swarm.run import Run
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -237,7 +238,7 @@ def test_a_hard_contact_brings_its_kernel_and_changes_no_bit(monkeypatch, thread
 def test_a_frame_that_begins_at_the_wall_is_no_hard_contact():
     """A flight that a frame cuts short does not graze: a cavity without grazing never needs that kernel."""
     wall = swarm.Particles((0.5 - 1e-9, 0.0, 0.0), (1.0, 0.2, 0.0))
-    with simulation.Run(SPHERE, wall, swarm.Impact(), 1, None) as one:
+    with Run(SPHERE, wall, swarm.Impact(), 1, None) as one:
         one.advance(3.0, 3.0)
         assert one.state.impacts[0] >= 3
         assert one._hard is None

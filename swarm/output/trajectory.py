@@ -105,7 +105,9 @@ class TrajectoryWriter:
             _append(self._step, [number for number, _moment, _state, _seen in frames])
             _append(self._time, [moment for _number, moment, _state, _seen in frames])
             for name, dataset in self._values.items():
-                _append(dataset, np.stack([getattr(state, name).T for _number, _moment, state, _seen in frames]))
+                rows = np.empty((len(frames), *dataset.shape[1:]))
+                np.stack([getattr(state, name).T for _number, _moment, state, _seen in frames], out=rows)
+                _append(dataset, rows)
             for name in (name for name in frames[0][3] if name != "time"):
                 entries = np.array([seen[name] for _number, _moment, _state, seen in frames])
                 if name not in self._observables:

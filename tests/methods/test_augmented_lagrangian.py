@@ -29,9 +29,7 @@ def simulate(scene, particles, method, until, every=None):
     with (
         mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
         mock.patch.multiple(
-            observables,
-            start_energies=_plain(observables.start_energies),
-            observe_block=_plain(observables.observe_block),
+            observables, start_energies=_plain(observables.start_energies), observe=_plain(observables.observe)
         ),
         np.errstate(all="ignore"),
     ):
