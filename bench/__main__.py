@@ -4,14 +4,17 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import compare, scenes, throughput
+from . import bars, compare, scenes, throughput
+from .peers import race
 
 
 def main() -> None:
     """Run one benchmark."""
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("throughput", help="speed, memory, start-up and accuracy against their bars")
+    commands.add_parser("throughput", help="every method, scene, number of particles, threads and output; the limits")
+    commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
+    commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
     for command in commands.choices.values():
         command.add_argument(
@@ -23,7 +26,8 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.command == "compare":
         sys.exit(compare.main(arguments.old, arguments.new))
-    {"throughput": throughput, "scenes": scenes}[arguments.command].main(quick=arguments.quick)
+    reports = {"throughput": throughput, "bars": bars, "peers": race, "scenes": scenes}
+    reports[arguments.command].main(quick=arguments.quick)
 
 
 if __name__ == "__main__":

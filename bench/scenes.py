@@ -6,7 +6,8 @@ One thread, kernels only, minimum and median; `ratio` is to the sphere of the sa
 import swarm
 from swarm.surfaces import Surface
 
-from .throughput import Row, advance_seconds, in_turn, per_impact, show, write
+from .bars import advance_seconds, per_impact
+from .report import Row, in_turn, show, write
 
 GRAVITY = (0.0, 0.0, -1.0)
 

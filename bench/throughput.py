@@ -1,371 +1,228 @@
-"""Speed, memory, start-up and accuracy, each figure beside its bar.
+"""Impacts and steps a second for every method, scene, number of particles, number of threads and kind of output.
 
-Times are of the kernels (`Run.advance`) unless the row says otherwise: minimum and median of the repeats. The bars are
-for a 2-core x86-64 with AVX-512; `ratio` is the figure over the bare loop in C of the same run, which is
-comparable from machine to machine.
+Time counts from the first frame to the end of `simulate`, the file closed. Beside them, of the same run: the bare
+loops in C, plain Verlet in Numba, and the machine's limits; `ratio` is a time over that of the bare loop in C that
+does the same in a sphere.
 """
 
-import csv
 import itertools
-import os
-import platform
-import resource
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 import swarm
-from swarm.run import Run
+from swarm.methods.base import Method
 
-from . import yardstick
+from . import figure, yardstick
+from .report import Row, show, write
 
-_RESULTS = Path(__file__).with_name("results")
-_ROOT = Path(__file__).parents[1]
-
-SPHERE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
-SLICE = swarm.Scene(
-    surfaces=[swarm.Sphere(radius=0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Plane((0.0, 0.0, 1.0), 0.3)]
-)
 SPEED = 0.5
+SCENES = {
+    "sphere": swarm.Scene([swarm.Sphere(0.5)]),
+    "ellipsoid": swarm.Scene([swarm.Ellipsoid((0.3, 0.3, 0.6))]),
+    "box": swarm.Scene([swarm.Box((0.5, 0.4, 0.3))]),
+    "sphere, ball": swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.15, (0.1, 0.0, 0.0), "outside")]),
+    "sphere, gravity": swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -1.0)),
+}
+# Flights of a frame: what a particle does between two frames, for methods that go from impact to impact.
+_FLIGHTS = 10.0
+# Steps of a frame, for methods of fixed step.
+_STEPS = 100
+_PARTICLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
+# Files of more than a million particles measure the disk, and ten million in every scene the patience.
+_MOST_WRITTEN = 1_000_000
+_LARGEST_IN = "sphere"
+# What a measurement takes [s], and its repeats.
+_SECONDS, _REPEATS = 0.15, 3
+_MOST_FRAMES = 200
 
 
-@dataclass
-class Row:
-    """One line of the report."""
+@dataclass(frozen=True)
+class Way:
+    """A method, and what its speed is counted in."""
 
-    what: str
-    best: float
-    median: float
-    unit: str
-    bar: str = ""
-    ratio: float | None = None
+    method: Method
+    step: float = 0.0  # [s]; 0: from impact to impact
 
+    def unit(self) -> str:
+        """Of its time."""
+        return "ns/particle-step" if self.step else "ns/impact"
 
-def repeated(measure: Callable[[], float], repeats: int) -> tuple[float, float]:
-    """Minimum and median."""
-    values = [measure() for _ in range(repeats)]
-    return min(values), statistics.median(values)
+    def every(self, scene: swarm.Scene) -> float:
+        """Between two frames [s]."""
+        return _STEPS * self.step if self.step else _FLIGHTS * scene.size() / SPEED
 
 
-def in_turn(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, float]]:
-    """Minimum and median of each, measured in turn: a shared machine is slower for seconds at a time."""
-    for measure in measures.values():
-        measure()
-    values = [{name: measure() for name, measure in measures.items()} for _ in range(rounds)]
-    return {name: (min(v), statistics.median(v)) for name in measures for v in [[one[name] for one in values]]}
+METHODS = {
+    "Impact": Way(swarm.Impact()),
+    "Impact, contact_step=1e-3": Way(swarm.Impact(contact_step=1e-3)),
+    "Penalty, dt=1e-3": Way(swarm.Penalty(dt=1e-3, penalty=1e4), 1e-3),
+    "Penalty, dt=0.025": Way(swarm.Penalty(dt=0.025, penalty=1e4), 0.025),
+    "AugmentedLagrangian, dt=0.025": Way(
+        swarm.AugmentedLagrangian(dt=0.025, penalty=1e4, tolerance=1e-10, acceleration="reflection"), 0.025
+    ),
+}
 
 
-def advance_seconds(
-    scene: swarm.Scene, method: swarm.Impact | swarm.Penalty, n: int, until: float, threads: int = 1
-) -> Callable[[], tuple[float, int]]:
-    """A measurement: seconds of the kernels for one frame of `until`, and impacts."""
-    return advance_of(scene, swarm.fill(scene, n, speed=SPEED, seed=1), method, until, threads)
+@dataclass(frozen=True)
+class Case:
+    """One cell of the table."""
+
+    method: str
+    scene: str
+    n: int
+    threads: int
+    output: str  # "none" or "HDF5"
+
+    def __str__(self) -> str:
+        return f"{self.method}, {self.scene}, {self.n:.0e}, {self.threads} thr, {self.output}".replace("e+0", "e")
 
 
-def advance_of(
-    scene: swarm.Scene,
-    particles: swarm.Particles,
-    method: swarm.Impact | swarm.Penalty,
-    until: float,
-    threads: int = 1,
-) -> Callable[[], tuple[float, int]]:
-    """The same for these particles."""
-    span = method.span("until", until)
-
-    def measure() -> tuple[float, int]:
-        with Run(scene, particles, method, threads, None) as run:
-            run.advance(0.0, 0.0)  # compiles, and touches the arrays
-            start = time.perf_counter()
-            run.advance(span, until)
-            return time.perf_counter() - start, int(run.state.impacts.sum())
-
-    return measure
+def cases(quick: bool) -> Iterator[Case]:
+    """All of them; a quick run has one of each kind."""
+    if quick:
+        yield from (Case("Impact", "sphere", 1_000, threads, kind) for threads in (1, 2) for kind in ("none", "HDF5"))
+        yield Case("Penalty, dt=0.025", "sphere", 1_000, 1, "none")
+        return
+    for method, scene, n, threads, kind in itertools.product(METHODS, SCENES, _PARTICLES, (1, 2), ("none", "HDF5")):
+        if n <= _MOST_WRITTEN or (kind == "none" and scene == _LARGEST_IN):
+            yield Case(method, scene, n, threads, kind)
 
 
-def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
-    """Seconds an impact."""
-    seconds, count = measure()
-    return seconds / count
-
-
-def impacts(n: int, repeats: int, bare: float) -> list[Row]:
-    """Nanoseconds per impact."""
-    cases = [
-        ("Impact, sphere", SPHERE, swarm.Impact(), "6"),
-        ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "7.5"),
-        ("Impact, sphere and two planes", SLICE, swarm.Impact(), "8"),
-        ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), "10"),
-        ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), "14"),
-    ]
-    measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
-    figures = in_turn({what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()}, 3 * repeats)
-    return [
-        Row(what, *figures[what], "ns/impact", bar, figures[what][0] / bare if bare else None)
-        for what, _scene, _method, bar in cases
-    ]
-
-
-def multipliers(n: int, repeats: int) -> list[Row]:
-    """The augmented Lagrangian in State I: particles through the centre of a sphere, whose contacts are all alike."""
-    random = np.random.default_rng(1)
-    directions = random.standard_normal((3, n))
-    directions /= np.sqrt((directions**2).sum(axis=0))
-    particles = swarm.Particles(0.2 * directions, SPEED * directions)
-    rows = []
-    cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "150"), ("none", 1e-28, "")]
-    until, dt = 40.0, 0.025
-    for acceleration, tolerance, bar in cases:
-        method = swarm.AugmentedLagrangian(
-            dt=dt, penalty=1e4, tolerance=tolerance, adaptive=True, acceleration=acceleration
-        )
-        times, sweeps = [], 0.0
-        for _ in range(repeats):
-            with Run(SPHERE, particles, method, 1, None) as run:
-                run.advance(0.0, 0.0)
-                start = time.perf_counter()
-                run.advance(until, until)
-                seconds = time.perf_counter() - start
-                counts = run.state.multipliers
-                assert counts is not None
-                times.append(seconds / counts.contacts.sum() * 1e9)
-                sweeps = float(counts.sweeps.sum() / counts.contacts.sum())
-        what = f'Uzawa, State I, sphere, V <= {tolerance:g}, "{acceleration}": {sweeps:.1f} sweeps'
-        rows.append(Row(what, min(times), statistics.median(times), "ns/contact", bar))
-    chord = advance_of(SPHERE, particles, swarm.Impact(contact_step=dt), until)
-    best, median = repeated(lambda: per_impact(chord) * 1e9, repeats)
-    rows.append(Row("  the same contacts by Impact(contact_step=dt)", best, median, "ns/contact"))
-    return rows
-
-
-def two_threads(n: int, repeats: int) -> list[Row]:
-    """Speed of two threads over one, alternating in one run."""
-    one, two = (advance_seconds(SPHERE, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
-    pairs = [(one()[0], two()[0]) for _ in range(repeats)]
-    ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
-    return [Row("two threads over one", ratio, statistics.median(a / b for a, b in pairs), "x", ">= 1.7")]
-
-
-def penalty(n: int, steps: int, repeats: int) -> list[Row]:
-    """Nanoseconds per particle-step, and the worst energy error; beside plain Verlet."""
-    rows = []
-    for dt, bar in ((1e-3, "0.9"), (0.025, "1.8")):
-        method = swarm.Penalty(dt=dt, penalty=1e4)
-        measure = advance_seconds(SPHERE, method, n, until=steps * dt)
-        best, median = repeated(lambda measure=measure: measure()[0] / (n * steps) * 1e9, repeats)
-        rows.append(Row(f"Penalty, sphere, dt={dt:g}", best, median, "ns/particle-step", bar))
-        particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
-
-        def verlet(dt: float = dt, particles: swarm.Particles = particles) -> float:
-            position, velocity = particles.position.copy(), particles.velocity.copy()
-            start = time.perf_counter()
-            yardstick.plain_verlet(position, velocity, 0.5, 1e4, dt, steps)
-            return (time.perf_counter() - start) / (n * steps) * 1e9
-
-        verlet()
-        best, median = repeated(verlet, repeats)
-        rows.append(Row(f"  plain Verlet in Numba, dt={dt:g}", best, median, "ns/particle-step"))
-        result = swarm.simulate(SPHERE, particles, method, until=steps * dt, every=steps * dt / 10)
-        worst = float(result.observables["energy_error"].max())
-        rows.append(Row(f"  energy, worst particle, {steps} steps", worst, worst, "relative", "5e-12"))
-    return rows
-
-
-def overhead(frames: int, repeats: int) -> list[Row]:
-    """`simulate` without a file over 1.3 x the kernels' own time, per frame."""
-    n, every = 10_000, 0.1
-    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
-
-    def seconds() -> tuple[float, float]:
-        with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
-            start = time.perf_counter()
-            for _ in range(frames):
-                run.advance(every, every)
-            kernel = time.perf_counter() - start
-        start = time.perf_counter()
-        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, threads=1)
-        return time.perf_counter() - start, kernel
-
-    seconds()
-    runs, kernels = zip(*(seconds() for _ in range(repeats)), strict=True)
-    best, median = ((pick(runs) - 1.3 * pick(kernels)) / frames * 1e6 for pick in (min, statistics.median))
-    return [Row(f"simulate - 1.3 x kernels, 10 000 particles, {frames} frames", best, median, "us/frame", "50")]
-
-
-def output(frames: int, repeats: int) -> list[Row]:
-    """A run that writes 10 000 particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
-    import h5py
-
-    n, every = 10_000, 10.0 * 4.0 / 3.0 * 0.5 / SPEED
-    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
-
-    def run(trajectory: Path | None) -> float:
-        start = time.perf_counter()
-        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, trajectory=trajectory)
-        return time.perf_counter() - start
-
-    def raw(path: Path) -> float:
-        rows = np.ascontiguousarray(particles.position.T)
-        start = time.perf_counter()
-        with h5py.File(path, "w") as file:
-            shape, chunks = (0, n, 3), (10, 1000, 3)
-            values = [
-                file.create_dataset(k, shape, np.float64, maxshape=(None, n, 3), chunks=chunks) for k in ("r", "v")
-            ]
-            for frame in range(frames + 1):
-                for value in values:
-                    value.resize(frame + 1, axis=0)
-                    value[frame] = rows
-                file.flush()
-        return time.perf_counter() - start
-
-    with tempfile.TemporaryDirectory() as folder:
-        files = (Path(folder) / f"{number}.h5" for number in itertools.count())
-        figures = in_turn(
-            {"none": lambda: run(None), "written": lambda: run(next(files)), "h5py": lambda: raw(next(files))}, repeats
-        )
-    (none, none2), (written, written2), (h5py_, h5py2) = figures.values()
-    return [
-        Row(
-            f"run of {frames} frames, 10 impacts each, written over not", written / none, written2 / none2, "x", "1.25"
-        ),
-        Row("  h5py alone over that run", h5py_ / written, h5py2 / written2, "x", "or > 0.7"),
-    ]
-
-
-_MEMORY = """
-import resource, sys, swarm
-n = int(sys.argv[1])
-scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-particles = swarm.fill(scene, n, speed=0.5, seed=1)
-swarm.simulate(scene, particles, swarm.Impact(), until=0.1, every=0.05, threads=2)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
-"""
-
-
-def _child(code: str, *args: str, **environment: str) -> str:
-    paths = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
-    done = subprocess.run(
-        [sys.executable, "-c", code, *args],
-        check=True,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": paths, **environment},
+def run(case: Case, particles: swarm.Particles, frames: int, folder: Path) -> tuple[float, float]:
+    """Seconds from the first frame to the end, and nanoseconds an impact or step."""
+    scene, way = SCENES[case.scene], METHODS[case.method]
+    every = way.every(scene)
+    clock: list[float] = []
+    result = swarm.simulate(
+        scene,
+        particles,
+        way.method,
+        until=frames * every,
+        every=frames * every if case.output == "none" else every,
+        trajectory=None if case.output == "none" else folder / "trajectory.h5",
+        overwrite=True,
+        threads=case.threads,
+        progress=lambda frame: clock.append(time.perf_counter()),
     )
-    return done.stdout
+    seconds = time.perf_counter() - clock[0]
+    count = case.n * _STEPS * frames if way.step else int(result.observables["impacts"][-1])
+    return seconds, 1e9 * seconds / count
 
 
-def memory(n: int) -> list[Row]:
-    """Peak bytes a particle of a whole run: caller's particles and engine's state."""
-    small, large = (float(_child(_MEMORY, str(k))) for k in (1000, n))
-    each = (large - small) / n
-    return [Row(f"memory, {n:,} particles".replace(",", " "), each, each, "bytes/particle", "200")]
+def measure(some: list[Case], particles: swarm.Particles, folder: Path, quick: bool) -> dict[Case, list[float]]:
+    """Cases of one method, scene and number of particles, in turn."""
+    plain, pilot = some[0], 2
+    while True:
+        seconds, _each = run(plain, particles, pilot, folder)
+        if quick or seconds > 0.2 * _SECONDS or pilot >= _MOST_FRAMES:
+            break
+        pilot *= 4
+    frames = pilot if quick else max(2, min(_MOST_FRAMES, round(pilot * _SECONDS / seconds)))
+    return {
+        case: values
+        for rounds in [[{case: run(case, particles, frames, folder)[1] for case in some} for _ in range(_REPEATS)]]
+        for case in some
+        for values in [[one[case] for one in rounds]]
+    }
 
 
-_FIRST_FRAME = """
-import time; start = time.perf_counter()
-from swarm import scene_file
-from swarm.simulation import simulate
-job = scene_file.read(r"{scene}")
-class Seen(Exception): pass
-def stop(frame):
-    if frame.number == 1: raise Seen
-try:
-    simulate(job.scene, job.particles(), job.method, until=job.run.until, every=job.run.every,
-             trajectory=r"{target}", overwrite=True, progress=stop, scene_text=job.text)
-except Seen:
-    print(time.perf_counter() - start)
-"""
+def yardsticks(quick: bool) -> dict[str, list[float]]:
+    """Name -> nanoseconds an item; what needs a C compiler only where there is one."""
+    found = {}
+    for what, name in (
+        ("impact", "bare loop in C, sphere"),
+        ("verlet", "bare Verlet in C, sphere"),
+        ("divide", "limit: a division"),
+        ("root", "limit: a square root"),
+        ("copy", "limit: a copied double"),
+    ):
+        values = yardstick.bare(what)
+        if values:
+            found[name] = values
+    steps, n = 1_000, 100 if quick else 2_000
+    particles = swarm.fill(SCENES["sphere"], n, speed=SPEED, seed=1)
 
+    def verlet() -> float:
+        position, velocity = particles.position.copy(), particles.velocity.copy()
+        start = time.perf_counter()
+        yardstick.plain_verlet(position, velocity, 0.5, 1e4, 1e-3, steps)
+        return (time.perf_counter() - start) / (n * steps) * 1e9
 
-def start_up(repeats: int) -> list[Row]:
-    """Seconds from the start of Python's imports to the first computed frame of the main job, cold and warm."""
-    with tempfile.TemporaryDirectory() as folder:
-        scene = _ROOT / "examples" / "scenes" / "cavity.toml"
-        code = _FIRST_FRAME.format(scene=scene, target=Path(folder) / "cavity.h5")
-        cold = float(_child(code, NUMBA_CACHE_DIR=folder))
-        best, median = repeated(lambda: float(_child(code, NUMBA_CACHE_DIR=folder)), repeats)
-    return [
-        Row("first frame of the main job, first run", cold, cold, "s", "15"),
-        Row("first frame of the main job, later runs", best, median, "s", "1.5"),
-    ]
-
-
-def accuracy(many: float) -> list[Row]:
-    """Energy and penetration of Impact after many impacts each."""
-    rows = []
-    for name, scene in (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE)):
-        particles = swarm.fill(scene, 100, speed=SPEED, seed=2)
-        one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / 100 / 100.0
-        until = many / one
-        seen = swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / 1000).observables
-        mean = seen["impacts"][-1] / 100
-        worst = float(seen["energy_error"].max())
-        ulps = float(seen["max_penetration"].max()) / np.spacing(scene.size())
-        rows.append(Row(f"energy, Impact, {name}, {mean:.3g} impacts each", worst, worst, "relative", "1e-12"))
-        rows.append(Row(f"  largest penetration at 1001 frames, {name}", ulps, ulps, "ulp of the size", "4"))
-    return rows
+    verlet()
+    found["plain Verlet in Numba, sphere"] = [verlet() for _ in range(3 if quick else 7)]
+    both = yardstick.bare("impact", processes=2)
+    if both:
+        found["bare loop in C, two at once"] = both
+    return found
 
 
 def main(quick: bool) -> None:
-    """Measure, print and, unless quick, write bench/results/throughput-MACHINE.csv."""
-    repeats = 2 if quick else 7
-    n = 5_000 if quick else 100_000
-    bare = yardstick.bare_impact(quick)
-    rows = [Row("bare loop in C, sphere", min(bare), statistics.median(bare), "ns/impact", "", 1.0)] if bare else []
-    rows += impacts(n, repeats, min(bare, default=0.0))
-    rows += multipliers(n // 5, repeats)
-    rows += two_threads(n, repeats)
-    rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
-    rows += overhead(50 if quick else 1_000, repeats)
-    rows += output(20 if quick else 200, repeats)
-    rows += memory(100_000 if quick else 10_000_000)
-    rows += start_up(1 if quick else 3)
-    rows += accuracy(1e2 if quick else 1e5)
+    """Measure and print; unless quick, write the CSV and the PNG of this machine."""
+    limits = yardsticks(quick)
+    rows = [
+        Row(name, min(values), statistics.median(values), f"ns/{_ITEMS.get(name.split(':')[0], 'item')}")
+        for name, values in limits.items()
+    ]
     show(rows)
+    found: dict[Case, list[float]] = {}
+    groups = itertools.groupby(cases(quick), key=lambda case: (case.scene, case.n))
+    with tempfile.TemporaryDirectory() as folder:
+        for (scene, n), group in groups:
+            particles = swarm.fill(SCENES[scene], n, speed=SPEED, seed=1)
+            for _method, some in itertools.groupby(group, key=lambda case: case.method):
+                found.update(measure(list(some), particles, Path(folder), quick))
+            print(f"\r{len(found)} cases measured", end="", flush=True)
+    print()
+    table(found)
+    rows += [row_of(case, values, limits) for case, values in found.items()]
     if not quick:
-        write(rows)
+        write(rows, "throughput")
+        figure.throughput(found, limits, [name for name, way in METHODS.items() if way.step])
 
 
-def machine() -> str:
-    """The processor and its widest vectors."""
-    try:
-        text = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return platform.processor() or platform.machine()
-    model = next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), "")
-    vectors = "AVX-512" if "avx512f" in text else "AVX2" if "avx2" in text else "SSE"
-    return f"{model}, {vectors}, {len(os.sched_getaffinity(0))} cores"
+_ITEMS = {
+    "bare loop in C, sphere": "impact",
+    "bare loop in C, two at once": "impact",
+    "bare Verlet in C, sphere": "particle-step",
+    "plain Verlet in Numba, sphere": "particle-step",
+}
 
 
-def show(rows: list[Row]) -> None:
-    """The report on the screen."""
-    print(
-        f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
-    )
-    print(f"{'':<66}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
-    for row in rows:
-        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
-        best, median = (f"{one:.0f}" if one >= 1000.0 else f"{one:.3g}" for one in (row.best, row.median))
-        print(f"{row.what:<66}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
+def row_of(case: Case, values: list[float], limits: dict[str, list[float]]) -> Row:
+    """A line of the CSV."""
+    unit = METHODS[case.method].unit()
+    bare = limits.get("bare Verlet in C, sphere" if METHODS[case.method].step else "bare loop in C, sphere")
+    best = min(values)
+    return Row(str(case), best, statistics.median(values), unit, "", best / min(bare) if bare else None)
 
 
-def write(rows: list[Row], report: str = "throughput") -> None:
-    """The report as CSV, one file a kind of machine."""
-    name = "".join(c if c.isalnum() else "-" for c in machine().lower()).strip("-")
-    path = _RESULTS / f"{report}-{name}.csv"
-    path.parent.mkdir(exist_ok=True)
-    with open(path, "w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["what", "min", "median", "unit", "bar", "ratio"])
-        for row in rows:
-            ratio = "" if row.ratio is None else f"{row.ratio:.3g}"
-            table.writerow([row.what, f"{row.best:.4g}", f"{row.median:.4g}", row.unit, row.bar, ratio])
-    print(f"written to {path.relative_to(_ROOT)}")
+def table(found: dict[Case, list[float]]) -> None:
+    """Minimum (median), one line a method and scene, one column a number of particles."""
+    numbers = sorted({case.n for case in found})
+    print("nanoseconds an impact, or a step of a particle: minimum (median)")
+    head = "".join(f"{f'N = {n:.0e}'.replace('e+0', 'e'):>18}" for n in numbers)
+    for threads, kind in sorted({(case.threads, case.output) for case in found}):
+        print(f"\n{f'{threads} thread{(threads > 1) * chr(115)}, output: {kind}':<50}{head}")
+        for method, scene in dict.fromkeys((case.method, case.scene) for case in found):
+            cells = [found.get(Case(method, scene, n, threads, kind)) for n in numbers]
+            told = "".join(f"{f'{min(v):.3g} ({statistics.median(v):.3g})' if v else '':>18}" for v in cells)
+            if told.strip():
+                print(f"{f'{method}, {scene}':<50}{told}")
+    if len({case.threads for case in found}) > 1:
+        ratios = [
+            (min(values) / min(found[two]), case)
+            for case, values in found.items()
+            for two in [Case(case.method, case.scene, case.n, 2, case.output)]
+            if case.threads == 1 and case.output == "none" and case.n >= 20_000 and two in found
+        ]
+        if ratios:
+            told = [ratio for ratio, _case in ratios]
+            print(
+                f"\ntwo threads over one, N >= 20 000, {len(told)} cases: "
+                f"least {min(told):.2f} ({min(ratios, key=lambda one: one[0])[1]}), "
+                f"median {statistics.median(told):.2f}, most {max(told):.2f}"
+            )

@@ -1,5 +1,7 @@
 """The machine's own pace, measured in the same run as the results it is compared with."""
 
+import atexit
+import functools
 import shutil
 import subprocess
 import tempfile
@@ -11,17 +13,34 @@ import numpy as np
 _FLAGS = ("-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 
 
-def bare_impact(quick: bool = False) -> list[float]:
-    """Nanoseconds per impact of the bare loop in C (yardstick.c), one entry a repeat; empty without a compiler."""
+# What yardstick.c measures -> passes of one repeat, some 15 ms.
+PASSES = {"impact": 20_000, "verlet": 40_000, "divide": 60_000, "root": 40_000, "copy": 1}
+
+
+@functools.cache
+def _program() -> Path | None:
+    """The compiled yardstick.c; None without a compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
+        return None
+    folder = Path(tempfile.mkdtemp(prefix="swarm-bench-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    program = folder / "yardstick"
+    source = Path(__file__).with_name("yardstick.c")
+    subprocess.run([compiler, *_FLAGS, str(source), "-o", str(program), "-lm"], check=True)
+    return program
+
+
+def bare(what: str, processes: int = 1) -> list[float]:
+    """Nanoseconds an item of yardstick.c, one entry a repeat and process; empty without a compiler."""
+    program = _program()
+    if program is None:
         return []
-    with tempfile.TemporaryDirectory() as folder:
-        program = Path(folder) / "yardstick"
-        source = Path(__file__).with_name("yardstick.c")
-        subprocess.run([compiler, *_FLAGS, str(source), "-o", str(program), "-lm"], check=True)
-        printed = subprocess.run([program, "1000" if quick else "20000"], check=True, capture_output=True, text=True)
-    return [float(line) for line in printed.stdout.split()]
+    running = [
+        subprocess.Popen([program, what, str(PASSES[what])], stdout=subprocess.PIPE, text=True)
+        for _ in range(processes)
+    ]
+    return [float(line) for one in running for line in one.communicate()[0].split()]
 
 
 @numba.njit(error_model="numpy")

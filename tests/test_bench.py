@@ -24,6 +24,28 @@ def report(name):
 def test_throughput_quick():
     told = report("throughput")
     for row in (
+        "bare loop in C, sphere",
+        "limit: a square root",
+        "1 thread, output: HDF5",
+        "2 threads, output: none",
+        "Impact, sphere",
+        "Penalty, dt=0.025, sphere",
+    ):
+        assert row in told
+
+
+def test_peers_quick():
+    """None of them is installed where the tests run: a sentence says so, and how to get it."""
+    told = report("peers")
+    for peer in ("lammps", "openmm", "warp"):
+        assert f"{peer} is left out: " in told or peer in told.lower()
+    assert "swarm, Penalty: alpha=1e4, dt=1e-3" in told
+    assert "plain Verlet in Numba" in told
+
+
+def test_bars_quick():
+    told = report("bars")
+    for row in (
         "Impact, sphere ",
         "two threads over one",
         "Penalty, sphere, dt=0.025",
@@ -52,13 +74,23 @@ def test_compare_tells_a_change_from_the_noise_and_from_the_clock(tmp_path, caps
     old = table(
         tmp_path / "old.csv",
         **{yard: (2.0, 2.02, "ns/impact"), "worse": (5.0, 5.05, "ns/impact"), "noisy": (5.0, 6.0, "ns/impact")},
-        **{"better": (5.0, 5.05, "ns/impact"), "scaling": (1.8, 1.79, "x"), "energy": (1e-16, 1e-16, "relative")},
+        **{
+            "limit: a root": (1.0, 1.0, "ns/item"),
+            "better": (5.0, 5.05, "ns/impact"),
+            "scaling": (1.8, 1.79, "x"),
+            "energy": (1e-16, 1e-16, "relative"),
+        },
         gone=(1.0, 1.0, "s"),
     )
     new = table(
         tmp_path / "new.csv",
         **{yard: (4.0, 4.04, "ns/impact"), "worse": (11.0, 11.1, "ns/impact"), "noisy": (11.0, 11.2, "ns/impact")},
-        **{"better": (9.0, 9.1, "ns/impact"), "scaling": (1.5, 1.49, "x"), "energy": (1e-15, 1e-15, "relative")},
+        **{
+            "limit: a root": (9.0, 9.0, "ns/item"),
+            "better": (9.0, 9.1, "ns/impact"),
+            "scaling": (1.5, 1.49, "x"),
+            "energy": (1e-15, 1e-15, "relative"),
+        },
     )
     verdicts = {row.what: row.verdict() for row in compare.changes(compare.read(old), compare.read(new))}
     assert verdicts == {"worse": "slower", "noisy": "", "better": "faster", "scaling": "slower"}

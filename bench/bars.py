@@ -1,0 +1,302 @@
+"""Speed, memory, start-up and accuracy, each figure beside its bar.
+
+Times are of the kernels (`Run.advance`) unless the row says otherwise: minimum and median of the repeats. The bars are
+for a 2-core x86-64 with AVX-512; `ratio` is the figure over the bare loop in C of the same run, which is
+comparable from machine to machine.
+"""
+
+import itertools
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import swarm
+from swarm.run import Run
+
+from . import yardstick
+from .report import ROOT, Row, in_turn, repeated, show, write
+
+SPHERE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
+SLICE = swarm.Scene(
+    surfaces=[swarm.Sphere(radius=0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Plane((0.0, 0.0, 1.0), 0.3)]
+)
+SPEED = 0.5
+
+
+def advance_seconds(
+    scene: swarm.Scene, method: swarm.Impact | swarm.Penalty, n: int, until: float, threads: int = 1
+) -> Callable[[], tuple[float, int]]:
+    """A measurement: seconds of the kernels for one frame of `until`, and impacts."""
+    return advance_of(scene, swarm.fill(scene, n, speed=SPEED, seed=1), method, until, threads)
+
+
+def advance_of(
+    scene: swarm.Scene,
+    particles: swarm.Particles,
+    method: swarm.Impact | swarm.Penalty,
+    until: float,
+    threads: int = 1,
+) -> Callable[[], tuple[float, int]]:
+    """The same for these particles."""
+    span = method.span("until", until)
+
+    def measure() -> tuple[float, int]:
+        with Run(scene, particles, method, threads, None) as run:
+            run.advance(0.0, 0.0)  # compiles, and touches the arrays
+            start = time.perf_counter()
+            run.advance(span, until)
+            return time.perf_counter() - start, int(run.state.impacts.sum())
+
+    return measure
+
+
+def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
+    """Seconds an impact."""
+    seconds, count = measure()
+    return seconds / count
+
+
+def impacts(n: int, repeats: int, bare: float) -> list[Row]:
+    """Nanoseconds per impact."""
+    cases = [
+        ("Impact, sphere", SPHERE, swarm.Impact(), "6"),
+        ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "7.5"),
+        ("Impact, sphere and two planes", SLICE, swarm.Impact(), "8"),
+        ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), "10"),
+        ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), "14"),
+    ]
+    measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
+    figures = in_turn({what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()}, 3 * repeats)
+    return [
+        Row(what, *figures[what], "ns/impact", bar, figures[what][0] / bare if bare else None)
+        for what, _scene, _method, bar in cases
+    ]
+
+
+def multipliers(n: int, repeats: int) -> list[Row]:
+    """The augmented Lagrangian in State I: particles through the centre of a sphere, whose contacts are all alike."""
+    random = np.random.default_rng(1)
+    directions = random.standard_normal((3, n))
+    directions /= np.sqrt((directions**2).sum(axis=0))
+    particles = swarm.Particles(0.2 * directions, SPEED * directions)
+    rows = []
+    cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "150"), ("none", 1e-28, "")]
+    until, dt = 40.0, 0.025
+    for acceleration, tolerance, bar in cases:
+        method = swarm.AugmentedLagrangian(
+            dt=dt, penalty=1e4, tolerance=tolerance, adaptive=True, acceleration=acceleration
+        )
+        times, sweeps = [], 0.0
+        for _ in range(repeats):
+            with Run(SPHERE, particles, method, 1, None) as run:
+                run.advance(0.0, 0.0)
+                start = time.perf_counter()
+                run.advance(until, until)
+                seconds = time.perf_counter() - start
+                counts = run.state.multipliers
+                assert counts is not None
+                times.append(seconds / counts.contacts.sum() * 1e9)
+                sweeps = float(counts.sweeps.sum() / counts.contacts.sum())
+        what = f'Uzawa, State I, sphere, V <= {tolerance:g}, "{acceleration}": {sweeps:.1f} sweeps'
+        rows.append(Row(what, min(times), statistics.median(times), "ns/contact", bar))
+    chord = advance_of(SPHERE, particles, swarm.Impact(contact_step=dt), until)
+    best, median = repeated(lambda: per_impact(chord) * 1e9, repeats)
+    rows.append(Row("  the same contacts by Impact(contact_step=dt)", best, median, "ns/contact"))
+    return rows
+
+
+def two_threads(n: int, repeats: int) -> list[Row]:
+    """Speed of two threads over one, alternating in one run."""
+    one, two = (advance_seconds(SPHERE, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
+    pairs = [(one()[0], two()[0]) for _ in range(repeats)]
+    ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
+    return [Row("two threads over one", ratio, statistics.median(a / b for a, b in pairs), "x", ">= 1.7")]
+
+
+def penalty(n: int, steps: int, repeats: int) -> list[Row]:
+    """Nanoseconds per particle-step, and the worst energy error; beside plain Verlet."""
+    rows = []
+    for dt, bar in ((1e-3, "0.9"), (0.025, "1.8")):
+        method = swarm.Penalty(dt=dt, penalty=1e4)
+        measure = advance_seconds(SPHERE, method, n, until=steps * dt)
+        best, median = repeated(lambda measure=measure: measure()[0] / (n * steps) * 1e9, repeats)
+        rows.append(Row(f"Penalty, sphere, dt={dt:g}", best, median, "ns/particle-step", bar))
+        particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+        def verlet(dt: float = dt, particles: swarm.Particles = particles) -> float:
+            position, velocity = particles.position.copy(), particles.velocity.copy()
+            start = time.perf_counter()
+            yardstick.plain_verlet(position, velocity, 0.5, 1e4, dt, steps)
+            return (time.perf_counter() - start) / (n * steps) * 1e9
+
+        verlet()
+        best, median = repeated(verlet, repeats)
+        rows.append(Row(f"  plain Verlet in Numba, dt={dt:g}", best, median, "ns/particle-step"))
+        result = swarm.simulate(SPHERE, particles, method, until=steps * dt, every=steps * dt / 10)
+        worst = float(result.observables["energy_error"].max())
+        rows.append(Row(f"  energy, worst particle, {steps} steps", worst, worst, "relative", "5e-12"))
+    return rows
+
+
+def overhead(frames: int, repeats: int) -> list[Row]:
+    """`simulate` without a file over 1.3 x the kernels' own time, per frame."""
+    n, every = 10_000, 0.1
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+    def seconds() -> tuple[float, float]:
+        with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+            start = time.perf_counter()
+            for _ in range(frames):
+                run.advance(every, every)
+            kernel = time.perf_counter() - start
+        start = time.perf_counter()
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, threads=1)
+        return time.perf_counter() - start, kernel
+
+    seconds()
+    runs, kernels = zip(*(seconds() for _ in range(repeats)), strict=True)
+    best, median = ((pick(runs) - 1.3 * pick(kernels)) / frames * 1e6 for pick in (min, statistics.median))
+    return [Row(f"simulate - 1.3 x kernels, 10 000 particles, {frames} frames", best, median, "us/frame", "50")]
+
+
+def output(frames: int, repeats: int) -> list[Row]:
+    """A run that writes 10 000 particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
+    import h5py
+
+    n, every = 10_000, 10.0 * 4.0 / 3.0 * 0.5 / SPEED
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+    def run(trajectory: Path | None) -> float:
+        start = time.perf_counter()
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=frames * every, every=every, trajectory=trajectory)
+        return time.perf_counter() - start
+
+    def raw(path: Path) -> float:
+        rows = np.ascontiguousarray(particles.position.T)
+        start = time.perf_counter()
+        with h5py.File(path, "w") as file:
+            shape, chunks = (0, n, 3), (10, 1000, 3)
+            values = [
+                file.create_dataset(k, shape, np.float64, maxshape=(None, n, 3), chunks=chunks) for k in ("r", "v")
+            ]
+            for frame in range(frames + 1):
+                for value in values:
+                    value.resize(frame + 1, axis=0)
+                    value[frame] = rows
+                file.flush()
+        return time.perf_counter() - start
+
+    with tempfile.TemporaryDirectory() as folder:
+        files = (Path(folder) / f"{number}.h5" for number in itertools.count())
+        figures = in_turn(
+            {"none": lambda: run(None), "written": lambda: run(next(files)), "h5py": lambda: raw(next(files))}, repeats
+        )
+    (none, none2), (written, written2), (h5py_, h5py2) = figures.values()
+    return [
+        Row(
+            f"run of {frames} frames, 10 impacts each, written over not", written / none, written2 / none2, "x", "1.25"
+        ),
+        Row("  h5py alone over that run", h5py_ / written, h5py2 / written2, "x", "or > 0.7"),
+    ]
+
+
+_MEMORY = """
+import resource, sys, swarm
+n = int(sys.argv[1])
+scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+particles = swarm.fill(scene, n, speed=0.5, seed=1)
+swarm.simulate(scene, particles, swarm.Impact(), until=0.1, every=0.05, threads=2)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def _child(code: str, *args: str, **environment: str) -> str:
+    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    done = subprocess.run(
+        [sys.executable, "-c", code, *args],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": paths, **environment},
+    )
+    return done.stdout
+
+
+def memory(n: int) -> list[Row]:
+    """Peak bytes a particle of a whole run: caller's particles and engine's state."""
+    small, large = (float(_child(_MEMORY, str(k))) for k in (1000, n))
+    each = (large - small) / n
+    return [Row(f"memory, {n:,} particles".replace(",", " "), each, each, "bytes/particle", "200")]
+
+
+_FIRST_FRAME = """
+import time; start = time.perf_counter()
+from swarm import scene_file
+from swarm.simulation import simulate
+job = scene_file.read(r"{scene}")
+class Seen(Exception): pass
+def stop(frame):
+    if frame.number == 1: raise Seen
+try:
+    simulate(job.scene, job.particles(), job.method, until=job.run.until, every=job.run.every,
+             trajectory=r"{target}", overwrite=True, progress=stop, scene_text=job.text)
+except Seen:
+    print(time.perf_counter() - start)
+"""
+
+
+def start_up(repeats: int) -> list[Row]:
+    """Seconds from the start of Python's imports to the first computed frame of the main job, cold and warm."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = ROOT / "examples" / "scenes" / "cavity.toml"
+        code = _FIRST_FRAME.format(scene=scene, target=Path(folder) / "cavity.h5")
+        cold = float(_child(code, NUMBA_CACHE_DIR=folder))
+        best, median = repeated(lambda: float(_child(code, NUMBA_CACHE_DIR=folder)), repeats)
+    return [
+        Row("first frame of the main job, first run", cold, cold, "s", "15"),
+        Row("first frame of the main job, later runs", best, median, "s", "1.5"),
+    ]
+
+
+def accuracy(many: float) -> list[Row]:
+    """Energy and penetration of Impact after many impacts each."""
+    rows = []
+    for name, scene in (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE)):
+        particles = swarm.fill(scene, 100, speed=SPEED, seed=2)
+        one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / 100 / 100.0
+        until = many / one
+        seen = swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / 1000).observables
+        mean = seen["impacts"][-1] / 100
+        worst = float(seen["energy_error"].max())
+        ulps = float(seen["max_penetration"].max()) / np.spacing(scene.size())
+        rows.append(Row(f"energy, Impact, {name}, {mean:.3g} impacts each", worst, worst, "relative", "1e-12"))
+        rows.append(Row(f"  largest penetration at 1001 frames, {name}", ulps, ulps, "ulp of the size", "4"))
+    return rows
+
+
+def main(quick: bool) -> None:
+    """Measure, print and, unless quick, write bench/results/bars-MACHINE.csv."""
+    repeats = 2 if quick else 7
+    n = 5_000 if quick else 100_000
+    bare = yardstick.bare("impact")
+    rows = [Row("bare loop in C, sphere", min(bare), statistics.median(bare), "ns/impact", "", 1.0)] if bare else []
+    rows += impacts(n, repeats, min(bare, default=0.0))
+    rows += multipliers(n // 5, repeats)
+    rows += two_threads(n, repeats)
+    rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
+    rows += overhead(50 if quick else 1_000, repeats)
+    rows += output(20 if quick else 500, repeats)
+    rows += memory(100_000 if quick else 10_000_000)
+    rows += start_up(1 if quick else 3)
+    rows += accuracy(1e2 if quick else 1e5)
+    show(rows)
+    if not quick:
+        write(rows, "bars")

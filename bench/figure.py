@@ -1,0 +1,84 @@
+"""The pictures of bench/results: what was measured, over the number of particles."""
+
+import statistics
+from typing import Any
+
+from .report import RESULTS, ROOT, machine, name_of_machine
+
+# Okabe and Ito: told apart by every kind of eye.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+# (threads, output) -> line
+_STYLES = {(1, "none"): "-", (2, "none"): "--", (1, "HDF5"): ":"}
+
+Found = dict[Any, list[float]]  # case -> nanoseconds an impact or step
+Limits = dict[str, list[float]]  # yardstick -> nanoseconds
+
+
+def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
+    """Impacts a second by scene, steps a second by method, and what a second thread brings, as PNG."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    picture, (impacts, steps, scaling) = pyplot.subplots(1, 3, figsize=(16, 5.4), layout="constrained")
+    scenes = list(dict.fromkeys(case.scene for case in found))
+    _speeds(impacts, found, [("Impact", scene, scene) for scene in scenes])
+    _speeds(steps, found, [(method, "sphere", method) for method in fixed_step])
+    _bounds(impacts, limits, "bare loop in C, sphere")
+    _bounds(steps, limits, "bare Verlet in C, sphere", "plain Verlet in Numba, sphere")
+    _scaling(scaling, found, limits, scenes)
+    impacts.set(title="Impact", ylabel="million impacts per second", yscale="log")
+    steps.set(title="Methods of fixed step, sphere", ylabel="million particle-steps per second", yscale="log")
+    scaling.set(title="Impact, two threads over one", ylabel="ratio of the speeds", ylim=(0.0, 2.2))
+    for axes in (impacts, steps, scaling):
+        axes.set(xlabel="particles", xscale="log")
+        axes.grid(alpha=0.3, which="major")
+        axes.legend(fontsize=8, loc="lower right")
+    picture.suptitle(f"{machine()}: one thread (full), two (dashed), one and a trajectory (dotted)", fontsize=10)
+    path = RESULTS / f"throughput-{name_of_machine()}.png"
+    picture.savefig(path, dpi=100)
+    print(f"written to {path.relative_to(ROOT)}")
+
+
+def _speeds(axes: Any, found: Found, lines: list[tuple[str, str, str]]) -> None:
+    """One colour a (method, scene, label)."""
+    for colour, (method, scene, label) in zip(COLOURS, lines, strict=False):
+        for (threads, output), style in _STYLES.items():
+            wanted = (method, scene, threads, output)
+            chosen = sorted((c.n, c) for c in found if (c.method, c.scene, c.threads, c.output) == wanted)
+            axes.plot(
+                [n for n, _case in chosen], [1e3 / min(found[case]) for _n, case in chosen], style,
+                color=colour, marker="o", markersize=3.5, linewidth=1.4, label=label if style == "-" else None,
+            )  # fmt: skip
+
+
+def _bounds(axes: Any, limits: Limits, *names: str) -> None:
+    """What is not ours, as grey lines."""
+    for name in names:
+        if name in limits:
+            _grey_line(axes, 1e3 / min(limits[name]), f"{name}, one core")
+
+
+def _grey_line(axes: Any, height: float, text: str) -> None:
+    axes.axhline(height, color="0.4", linewidth=1.0)
+    place = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
+    axes.annotate(text, (0.99, height), color="0.4", fontsize=8, **place)
+
+
+def _scaling(axes: Any, found: Found, limits: Limits, scenes: list[str]) -> None:
+    """Speed of two threads over one."""
+    for colour, scene in zip(COLOURS, scenes, strict=False):
+        best = {
+            (c.n, c.threads): min(v)
+            for c, v in found.items()
+            if (c.method, c.scene) == ("Impact", scene) and c.output == "none"
+        }
+        numbers = sorted(n for n, threads in best if threads == 2)
+        axes.plot(
+            numbers, [best[n, 1] / best[n, 2] for n in numbers],
+            color=colour, marker="o", markersize=3.5, linewidth=1.4, label=scene,
+        )  # fmt: skip
+    one, two = (limits.get(name) for name in ("bare loop in C, sphere", "bare loop in C, two at once"))
+    if one and two:
+        _grey_line(axes, 2.0 * statistics.median(one) / statistics.median(two), "two bare loops in C at once")

@@ -1,0 +1,80 @@
+"""Measuring in turn, the machine's name, and the tables on the screen and in bench/results."""
+
+import csv
+import os
+import platform
+import resource
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+RESULTS = Path(__file__).with_name("results")
+
+
+@dataclass
+class Row:
+    """One line of the report."""
+
+    what: str
+    best: float
+    median: float
+    unit: str
+    bar: str = ""
+    ratio: float | None = None
+
+
+def repeated(measure: Callable[[], float], repeats: int) -> tuple[float, float]:
+    """Minimum and median."""
+    values = [measure() for _ in range(repeats)]
+    return min(values), statistics.median(values)
+
+
+def in_turn(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, float]]:
+    """Minimum and median of each, measured in turn: a shared machine is slower for seconds at a time."""
+    for measure in measures.values():
+        measure()
+    values = [{name: measure() for name, measure in measures.items()} for _ in range(rounds)]
+    return {name: (min(v), statistics.median(v)) for name in measures for v in [[one[name] for one in values]]}
+
+
+def machine() -> str:
+    """The processor and its widest vectors."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return platform.processor() or platform.machine()
+    model = next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), "")
+    vectors = "AVX-512" if "avx512f" in text else "AVX2" if "avx2" in text else "SSE"
+    return f"{model}, {vectors}, {len(os.sched_getaffinity(0))} cores"
+
+
+def name_of_machine() -> str:
+    """The same as part of a file's name."""
+    return "-".join("".join(c if c.isalnum() else " " for c in machine().lower()).split())
+
+
+def show(rows: list[Row]) -> None:
+    """The report on the screen."""
+    print(
+        f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
+    )
+    print(f"{'':<66}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
+    for row in rows:
+        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
+        best, median = (f"{one:.0f}" if one >= 1000.0 else f"{one:.3g}" for one in (row.best, row.median))
+        print(f"{row.what:<66}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
+
+
+def write(rows: list[Row], report: str) -> None:
+    """The report as CSV, one file a kind of machine."""
+    path = RESULTS / f"{report}-{name_of_machine()}.csv"
+    path.parent.mkdir(exist_ok=True)
+    with open(path, "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["what", "min", "median", "unit", "bar", "ratio"])
+        for row in rows:
+            ratio = "" if row.ratio is None else f"{row.ratio:.3g}"
+            table.writerow([row.what, f"{row.best:.4g}", f"{row.median:.4g}", row.unit, row.bar, ratio])
+    print(f"written to {path.relative_to(ROOT)}")
