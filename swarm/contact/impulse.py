@@ -97,7 +97,9 @@ def _(chain, index, law, x, y, z, px, py, pz, c):
     entered = 0.5 * (total + root) * inverse
     g1 = select(entering, entered, select(staying > 0.0, staying, 0.5 * (total - root)))
     other = guess(chain.rest, index - 1.0, law, x, y, z, px, py, pz, c)
-    return select(index == 0.0, (gf - g1) / e, other)
+    # Of a select between a quotient and a constant LLVM makes a branch, and the loop over lanes is not vectorised.
+    here = index == 0.0
+    return select(here, gf - g1, other) / select(here, e, 1.0)
 
 
 @guess.register(Nothing)
