@@ -28,6 +28,7 @@ ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
 SLICE = swarm.Scene(
     surfaces=[swarm.Sphere(radius=0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Plane((0.0, 0.0, 1.0), 0.3)]
 )
+FALL = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -1.0))
 SPEED = 0.5
 
 
@@ -67,8 +68,9 @@ def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
 def impacts(n: int, repeats: int, bare: float) -> list[Row]:
     """Nanoseconds per impact."""
     cases = [
-        ("Impact, sphere", SPHERE, swarm.Impact(), "6"),
-        ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "7.5"),
+        ("Impact, sphere", SPHERE, swarm.Impact(), "4"),
+        ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "5"),
+        ("Impact, sphere with gravity", FALL, swarm.Impact(), "25"),
         ("Impact, sphere and two planes", SLICE, swarm.Impact(), "8"),
         ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), "10"),
         ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), "14"),
@@ -88,7 +90,7 @@ def multipliers(n: int, repeats: int) -> list[Row]:
     directions /= np.sqrt((directions**2).sum(axis=0))
     particles = swarm.Particles(0.2 * directions, SPEED * directions)
     rows = []
-    cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "150"), ("none", 1e-28, "")]
+    cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "100"), ("none", 1e-28, "")]
     until, dt = 40.0, 0.025
     for acceleration, tolerance, bar in cases:
         method = swarm.AugmentedLagrangian(
@@ -114,17 +116,36 @@ def multipliers(n: int, repeats: int) -> list[Row]:
 
 
 def two_threads(n: int, repeats: int) -> list[Row]:
-    """Speed of two threads over one, alternating in one run."""
-    one, two = (advance_seconds(SPHERE, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
-    pairs = [(one()[0], two()[0]) for _ in range(repeats)]
-    ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
-    return [Row("two threads over one", ratio, statistics.median(a / b for a, b in pairs), "x", ">= 1.7")]
+    """Speed of two threads over one, alternating in one run; and of two bare loops in C at once over one."""
+    rows = []
+    for name, scene in (("sphere", SPHERE), ("sphere with gravity", FALL)):
+        one, two = (advance_seconds(scene, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
+        pairs = [(one()[0], two()[0]) for _ in range(repeats)]
+        ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
+        median = statistics.median(a / b for a, b in pairs)
+        rows.append(Row(f"two threads over one, {name}", ratio, median, "x", ">= 1.8"))
+    bare = [(yardstick.bare("impact"), yardstick.bare("impact", processes=2)) for _ in range(repeats)]
+    if bare[0][0]:
+        ratios = [2.0 * statistics.median(one) / statistics.median(both) for one, both in bare]
+        rows.append(Row("  two bare loops in C over one", max(ratios), statistics.median(ratios), "x"))
+    return rows
+
+
+def scale(small: int, large: int) -> list[Row]:
+    """What an impact costs among many particles, over what it costs among few: two threads, ten impacts each."""
+    measures = {
+        str(n): advance_seconds(SPHERE, swarm.Impact(), n, until=10.0 * 4.0 / 3.0 * 0.5 / SPEED, threads=2)
+        for n in (small, large)
+    }
+    figures = in_turn({name: lambda one=one: per_impact(one) for name, one in measures.items()}, 5)
+    (few, few2), (many, many2) = figures.values()
+    return [Row(f"an impact among {large:.0e} over one among {small:.0e}", many / few, many2 / few2, "times", "1.15")]
 
 
 def penalty(n: int, steps: int, repeats: int) -> list[Row]:
     """Nanoseconds per particle-step, and the worst energy error; beside plain Verlet."""
     rows = []
-    for dt, bar in ((1e-3, "0.9"), (0.025, "1.8")):
+    for dt, bar in ((1e-3, "0.6"), (0.025, "")):
         method = swarm.Penalty(dt=dt, penalty=1e4)
         measure = advance_seconds(SPHERE, method, n, until=steps * dt)
         best, median = repeated(lambda measure=measure: measure()[0] / (n * steps) * 1e9, repeats)
@@ -146,13 +167,14 @@ def penalty(n: int, steps: int, repeats: int) -> list[Row]:
     return rows
 
 
-def overhead(frames: int, repeats: int) -> list[Row]:
-    """`simulate` without a file over 1.3 x the kernels' own time, per frame."""
-    n, every = 10_000, 0.1
+def overhead(n: int, frames: int, repeats: int) -> list[Row]:
+    """What a frame of `simulate` without a file takes over the kernels' own time."""
+    every = 0.1
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def seconds() -> tuple[float, float]:
         with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+            run.advance(every, every)
             start = time.perf_counter()
             for _ in range(frames):
                 run.advance(every, every)
@@ -163,8 +185,8 @@ def overhead(frames: int, repeats: int) -> list[Row]:
 
     seconds()
     runs, kernels = zip(*(seconds() for _ in range(repeats)), strict=True)
-    best, median = ((pick(runs) - 1.3 * pick(kernels)) / frames * 1e6 for pick in (min, statistics.median))
-    return [Row(f"simulate - 1.3 x kernels, 10 000 particles, {frames} frames", best, median, "us/frame", "50")]
+    best, median = ((pick(runs) - pick(kernels)) / frames * 1e6 for pick in (min, statistics.median))
+    return [Row(f"a frame less its kernels, {n} particles, {frames} frames", best, median, "us/frame", "200")]
 
 
 def output(frames: int, repeats: int) -> list[Row]:
@@ -261,9 +283,16 @@ def start_up(repeats: int) -> list[Row]:
         cold = float(_child(code, NUMBA_CACHE_DIR=folder))
         best, median = repeated(lambda: float(_child(code, NUMBA_CACHE_DIR=folder)), repeats)
     return [
-        Row("first frame of the main job, first run", cold, cold, "s", "15"),
-        Row("first frame of the main job, later runs", best, median, "s", "1.5"),
+        Row("first frame of the main job, first run", cold, cold, "s", "8"),
+        Row("first frame of the main job, later runs", best, median, "s", "0.8"),
+        Row("swarm run --help", *repeated(_help, repeats), "s", "0.3"),
     ]
+
+
+def _help() -> float:
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "swarm", "run", "--help"], check=True, capture_output=True, cwd=ROOT)
+    return time.perf_counter() - start
 
 
 def accuracy(many: float) -> list[Row]:
@@ -292,7 +321,9 @@ def main(quick: bool) -> None:
     rows += multipliers(n // 5, repeats)
     rows += two_threads(n, repeats)
     rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
-    rows += overhead(50 if quick else 1_000, repeats)
+    rows += overhead(1_000, 50 if quick else 1_000, repeats)
+    rows += overhead(10_000, 50 if quick else 1_000, repeats)
+    rows += scale(1_000 if quick else 100_000, 10_000 if quick else 10_000_000)
     rows += output(20 if quick else 500, repeats)
     rows += memory(100_000 if quick else 10_000_000)
     rows += start_up(1 if quick else 3)

@@ -62,7 +62,10 @@ METHODS = {
     "Penalty, dt=1e-3": Way(swarm.Penalty(dt=1e-3, penalty=1e4), 1e-3),
     "Penalty, dt=0.025": Way(swarm.Penalty(dt=0.025, penalty=1e4), 0.025),
     "AugmentedLagrangian, dt=0.025": Way(
-        swarm.AugmentedLagrangian(dt=0.025, penalty=1e4, tolerance=1e-10, acceleration="reflection", adaptive=True, on_unconverged="count"), 0.025
+        swarm.AugmentedLagrangian(
+            dt=0.025, penalty=1e4, tolerance=1e-10, acceleration="reflection", adaptive=True, on_unconverged="count"
+        ),
+        0.025,
     ),
 }
 
