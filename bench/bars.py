@@ -230,13 +230,14 @@ def output(frames: int, repeats: int) -> list[Row]:
     ]
 
 
+# VmHWM and not ru_maxrss, which a process inherits from the one that started it.
 _MEMORY = """
-import resource, sys, swarm
+import re, sys, swarm
 n = int(sys.argv[1])
 scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 particles = swarm.fill(scene, n, speed=0.5, seed=1)
 swarm.simulate(scene, particles, swarm.Impact(), until=0.1, every=0.05, threads=2)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+print(1024 * int(re.search(r"VmHWM:\\s+([0-9]+) kB", open("/proc/self/status").read())[1]))
 """
 
 
