@@ -35,6 +35,8 @@ _PARTICLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 # Files of more than a million particles measure the disk, and ten million in every scene the patience.
 _MOST_WRITTEN = 1_000_000
 _LARGEST_IN = "sphere"
+# Steps that are cut at the impact know no gravity yet.
+_REFUSED = {("AugmentedLagrangian, dt=0.025", "sphere, gravity")}
 # What a measurement takes [s], and its repeats.
 _SECONDS, _REPEATS = 0.15, 3
 _MOST_FRAMES = 200
@@ -91,6 +93,8 @@ def cases(quick: bool) -> Iterator[Case]:
         yield Case("Penalty, dt=0.025", "sphere", 1_000, 1, "none")
         return
     for method, scene, n, threads, kind in itertools.product(METHODS, SCENES, _PARTICLES, (1, 2), ("none", "HDF5")):
+        if (method, scene) in _REFUSED:
+            continue
         if n <= _MOST_WRITTEN or (kind == "none" and scene == _LARGEST_IN):
             yield Case(method, scene, n, threads, kind)
 

@@ -49,6 +49,13 @@ class Particles:
             first = int(np.argmax(wrong))
             raise SceneError(f"mass must be a finite number above 0, got {self.mass[first]:g} for particle {first}")
 
+    @classmethod
+    def of(cls, state: "State") -> "Particles":
+        """The particles of a run that has ended: its own arrays, which kernels have kept in order, not copied."""
+        particles = cls.__new__(cls)
+        particles.position, particles.velocity, particles.mass = state.position, state.velocity, state.mass
+        return particles
+
     def __len__(self) -> int:
         return int(self.position.shape[1])
 

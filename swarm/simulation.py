@@ -147,7 +147,7 @@ def simulate(
             show(Frame(number, moment, until, seen))
     columns = {name: np.array([seen[name] for seen in history]) for name in history[0]}
     return Result(
-        Particles(run.state.position, run.state.velocity, run.state.mass),
+        Particles.of(run.state),
         columns,
         time.perf_counter() - started,
         None if trajectory is None else Path(trajectory),

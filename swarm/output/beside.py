@@ -13,13 +13,13 @@ import numpy as np
 from ..particles import State
 from .trajectory import WriteFrames, Written
 
-# Frames written at once: those of a chunk of the file, `_CHUNK` in trajectory.py. Of 10 000 particles one alone takes
-# 2.5 ms, ten take 0.9 ms each. None waits for others longer than this [s].
-_AT_ONCE = 10
+# Frames are written many at once, up to the end of a chunk of the file (`_CHUNK` in trajectory.py): of 10 000 particles
+# one alone takes 2.5 ms, ten take 0.9 ms each. None waits for others longer than this [s].
+_CHUNK_FRAMES = 10
 _PATIENCE = 0.05
-# Frames on their way: some are written while others are computed. More would only hide a slow disk in memory; of very
-# many particles there is one, which is enough to write while the next is computed.
-_COPIES = 2 * _AT_ONCE
+# Frames on their way: one half is written while the other is computed. More would only hide a slow disk in memory; of
+# very many particles there is one, which is enough to write while the next is computed.
+_COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
 
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
@@ -39,7 +39,8 @@ class Beside:
         copies = max(1, min(_COPIES, _BYTES // (48 * n)))
         for _ in range(copies):
             self._copies.put(None)
-        self._at_once = max(1, copies // 2)
+        half = max(1, copies // 2)
+        self._at_once = half if half < _CHUNK_FRAMES else half - half % _CHUNK_FRAMES
         self._problem: BaseException | None = None
         # What a frame takes to write [s], lately.
         self.seconds = 0.0
@@ -92,7 +93,7 @@ class Beside:
         latest = time.monotonic() + _PATIENCE
         while frame is not None:
             frames.append(frame)
-            # Up to the end of a chunk, not across it.
+            # Up to the end of a chunk, not across it: numbers count from 0.
             if (frame[0] + 1) % self._at_once == 0:
                 return frames, True
             try:
