@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .errors import FileError, RunError, SceneError, SwarmError
     from .filling import fill
     from .history import ContactHistory, contact_history
-    from .methods import AugmentedLagrangian, Impact, Penalty
+    from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .scene import Scene
@@ -39,7 +39,7 @@ _HOMES = {
     "errors": ("FileError", "RunError", "SceneError", "SwarmError"),
     "filling": ("fill",),
     "history": ("ContactHistory", "contact_history"),
-    "methods": ("AugmentedLagrangian", "Impact", "Penalty"),
+    "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -74,6 +74,7 @@ __all__ = [
     "Formula",
     "Frame",
     "Impact",
+    "Midpoint",
     "OwnSurface",
     "Paraboloid",
     "Particles",
@@ -89,6 +90,8 @@ __all__ = [
     "SwarmError",
     "Torus",
     "Trajectory",
+    "Trapezoidal",
+    "Verlet",
     "__version__",
     "contact_history",
     "fill",

@@ -106,11 +106,11 @@ def mean_value(law, surface, x0, y0, z0, x1, y1, z1):
     beta = low if f_low == 0.0 else high if f_high == 0.0 else math.nan
     if f_low * f_high < 0.0:
         for _i in range(_BETA_ITERATIONS):
-            beta = _illinois(low, f_low, high, f_high)
+            beta = illinois(low, f_low, high, f_high)
             f = _identity(law, surface, x0, y0, z0, x1, y1, z1, beta)
             if f == 0.0 or high - low <= 2.0 * _EPSILON:
                 break
-            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
+            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
     dx, dy, dz = constraint_gradient(law, surface, *_between(x0, y0, z0, x1, y1, z1, beta))
     return dx, dy, dz, beta
 
@@ -178,12 +178,12 @@ def _(form, law, multiplier, surface, x, y, z, px, py, pz, c):
         kappa, _f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, low)
     elif f_low * f_high < 0.0:
         for _i in range(_BETA_ITERATIONS):
-            beta = _illinois(low, f_low, high, f_high)
+            beta = illinois(low, f_low, high, f_high)
             kappa, f = _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta)
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
                 found = True
                 break
-            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, beta, f)
+            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
     # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
     # identity asks for along grad q(r_beta) meets it whatever beta is.
     rx, ry, rz, end, change = _balanced(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa)
@@ -236,9 +236,9 @@ def _pushed_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta):
             # Not past the push yet: the force grows along this line.
             low, f_low, high = high, f_high, 2.0 * high
         for _i in range(_FORCE_ITERATIONS):
-            kappa = _illinois(low, f_low, high, f_high)
+            kappa = illinois(low, f_low, high, f_high)
             rx, ry, rz, f = _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, sign * kappa)
-            low, f_low, high, f_high = _narrowed(low, f_low, high, f_high, kappa, sign * f)
+            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, sign * f)
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
                 break
     return sign * kappa, _identity(law, surface, x, y, z, x + px - rx, y + py - ry, z + pz - rz, beta)
@@ -264,14 +264,14 @@ def _push_at(law, multiplier, surface, x, y, z, px, py, pz, c, beta, kappa):
 
 
 @inlined
-def _illinois(low, f_low, high, f_high):
+def illinois(low, f_low, high, f_high):
     """The next trial of regula falsi, the middle where that does not lie inside."""
     trial = low - f_low * (high - low) / (f_high - f_low)
     return trial if low < trial < high else 0.5 * (low + high)
 
 
 @inlined
-def _narrowed(low, f_low, high, f_high, trial, f):
+def narrowed(low, f_low, high, f_high, trial, f):
     """The half of the bracket that holds the root; the weight of an end that stays is halved (Illinois)."""
     if f * f_high > 0.0:
         return low, 0.5 * f_low, trial, f

@@ -1,16 +1,19 @@
 """What methods with a fixed step share: whole steps, the jump over free ones, solids that a step could miss."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .. import checks
 from .._jit import by_type, inlined, select
+from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
+from . import base
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
 _WHOLE = 1e-6
@@ -19,11 +22,44 @@ _MOST_STEPS = 2.0**53
 GRADIENTS = ("composite", "mean-value")
 
 
-def check_arguments(method: Any) -> None:
-    """Check and convert dt, penalty, exponent and gradient of a description."""
+@dataclass(frozen=True)
+class SoftWalls(base.Method):
+    """A method of fixed step whose walls are springs, and nothing else. See the subclasses."""
+
+    dt: float
+    penalty: float
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+    def check(self, scene: Scene, particles: Particles) -> None:
+        base.check_elastic(type(self).__name__, scene)
+        check_solids(scene, particles, self.dt)
+
+    def seldom_hard(self, scene: Scene) -> bool:
+        return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid()
+
+    def too_fast(self, scene: Scene) -> str:
+        return too_fast_failure(scene, self.dt)
+
+    def span(self, name: str, duration: float) -> float:
+        return whole_steps(name, duration, self.dt)
+
+    def law(self) -> Any:
+        return regularisation(self.penalty, self.exponent)
+
+
+def check_numbers(method: Any) -> None:
+    """Check and convert dt, penalty and exponent of a description."""
     object.__setattr__(method, "dt", checks.positive("dt", method.dt))
     object.__setattr__(method, "penalty", checks.positive("penalty", method.penalty))
     object.__setattr__(method, "exponent", checks.at_least("exponent", method.exponent, 1.0))
+
+
+def check_arguments(method: Any) -> None:
+    """The same, and check its gradient."""
+    check_numbers(method)
     checks.one_of("gradient", method.gradient, GRADIENTS)
     if method.gradient == "mean-value" and method.exponent == 1.0:
         raise SceneError(

@@ -10,10 +10,8 @@ from .._jit import kept, select
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
-from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, nested
 from ..gravity import accelerated, displacement
-from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
@@ -21,7 +19,7 @@ from . import base, fixed_step
 
 
 @dataclass(frozen=True)
-class Penalty(base.Method):
+class Penalty(fixed_step.SoftWalls):
     """Energy-conserving penalty contact with a fixed step (the paper's eq. (5), composite discrete gradient).
 
     (v0 + v1)/2 = (r1 - r0)/h,   m (v1 - v0) = h m G - h D alpha (Phi0 + Phi1)/2.
@@ -47,29 +45,16 @@ class Penalty(base.Method):
     swarm.errors.SceneError: exponent must be 1 or more, got 0.5
     """
 
-    dt: float
-    penalty: float
-    exponent: float = 1.0
     gradient: str = "composite"
 
     def __post_init__(self) -> None:
         fixed_step.check_arguments(self)
 
-    def check(self, scene: Scene, particles: Particles) -> None:
-        base.check_elastic("Penalty", scene)
-        fixed_step.check_solids(scene, particles, self.dt)
+    def seldom_hard(self, scene: Scene) -> bool:
+        return self.gradient == "composite" and super().seldom_hard(scene)
 
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
         return PenaltyNumbers(self.dt, self.law(), form_of(self.gradient), fixed_step.longest_step(scene))
-
-    def too_fast(self, scene: Scene) -> str:
-        return fixed_step.too_fast_failure(scene, self.dt)
-
-    def span(self, name: str, duration: float) -> float:
-        return fixed_step.whole_steps(name, duration, self.dt)
-
-    def law(self) -> Any:
-        return law_of.regularisation(self.penalty, self.exponent)
 
 
 class PenaltyNumbers(NamedTuple):
