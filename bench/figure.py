@@ -82,3 +82,44 @@ def _scaling(axes: Any, found: Found, limits: Limits, scenes: list[str]) -> None
     one, two = (limits.get(name) for name in ("bare loop in C, sphere", "bare loop in C, two at once"))
     if one and two:
         _grey_line(axes, 2.0 * statistics.median(one) / statistics.median(two), "two bare loops in C at once")
+
+
+def accuracy(name: str, found: list[Any], fronts: list[list[Any]], advice: str) -> None:
+    """Errors over wall time, one curve a method, as PNG."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    picture, panels = pyplot.subplots(1, 3, figsize=(15, 6.0), layout="constrained", sharex=True)
+    methods = list(dict.fromkeys(p.method for p in found))
+    # Zero has no place on a logarithmic axis.
+    least = 1e-17
+    for colour, method in zip(COLOURS, methods, strict=False):
+        curve = [p for p in found if p.method == method]
+        seconds = [p.seconds for p in curve]
+        mark = {"marker": "*", "markersize": 13} if method == "Impact" else {"marker": "o", "markersize": 4}
+        label = f"{method} (default)" if method == "Impact" else method
+        panels[0].plot(seconds, [max(p.energy, least) for p in curve], color=colour, label=label, **mark)
+        for k, style in enumerate((":", "--", "-")):
+            panels[1].plot(seconds, [max(p.errors[k], least) for p in curve], style, color=colour, **mark)
+        panels[2].plot(seconds, [max(p.penetration, least) for p in curve], color=colour, **mark)
+    last = fronts[-1]
+    panels[1].plot(
+        [p.seconds for p in last], [max(p.errors[-1], least) for p in last], color="0.7", linewidth=7, alpha=0.5,
+        zorder=0, label="nothing is faster and nearer (64 impacts)",
+    )  # fmt: skip
+    panels[0].set(title="worst energy error of a particle", ylabel="relative error")
+    panels[1].set(title="median distance after 5 (dotted), 20 (dashed), 64 impacts (full)", ylabel="m")
+    panels[2].set(title="largest penetration", ylabel="part of the scene's size")
+    for axes in panels:
+        axes.set(xscale="log", yscale="log", xlabel="wall time per particle and simulated second [s], one thread")
+        axes.set_ylim(0.5 * least, 10.0)
+        axes.grid(alpha=0.3, which="major")
+    panels[0].legend(fontsize=8)
+    panels[1].legend(fontsize=8, loc="lower left")
+    picture.suptitle(f"{name}\n{advice}", fontsize=10)
+    path = RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png"
+    picture.savefig(path, dpi=100)
+    pyplot.close(picture)
+    print(f"written to {path.relative_to(ROOT)}")
