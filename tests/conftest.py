@@ -56,7 +56,12 @@ METHODS = {
     "impact": swarm.Impact(),
     "impact, chord": swarm.Impact(contact_step=1e-3),
     "penalty": swarm.Penalty(dt=1e-3, penalty=1e4),
-    "augmented Lagrangian": swarm.AugmentedLagrangian(dt=1e-3, penalty=1e6, tolerance=1e-28, adaptive=True),
+    "augmented Lagrangian": swarm.AugmentedLagrangian(
+        dt=1e-3, penalty=1e4, adaptive=True, acceleration="reflection", on_unconverged="impact"
+    ),
+    "verlet": swarm.Verlet(dt=1e-3, penalty=1e4),
+    "midpoint": swarm.Midpoint(dt=1e-3, penalty=1e4),
+    "trapezoidal": swarm.Trapezoidal(dt=1e-3, penalty=1e4),
 }
 LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 4.0, 12.0)}
 
