@@ -75,6 +75,8 @@ def impacts(n: int, repeats: int, bare: float) -> list[Row]:
         ("Impact(contact_step=1e-3), sphere", SPHERE, swarm.Impact(contact_step=1e-3), "10"),
         ("Impact(contact_step=1e-3), ellipsoid", ELLIPSOID, swarm.Impact(contact_step=1e-3), "14"),
     ]
+    if n < 10_000:  # a quick run: every scene compiles kernels of its own
+        cases = cases[:1]
     measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
     figures = in_turn({what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()}, 3 * repeats)
     return [
@@ -118,7 +120,7 @@ def multipliers(n: int, repeats: int) -> list[Row]:
 def two_threads(n: int, repeats: int) -> list[Row]:
     """Speed of two threads over one, alternating in one run; and of two bare loops in C at once over one."""
     rows = []
-    for name, scene in (("sphere", SPHERE), ("sphere with gravity", FALL)):
+    for name, scene in (("sphere", SPHERE), ("sphere with gravity", FALL))[: 1 if n < 10_000 else 2]:
         one, two = (advance_seconds(scene, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
         pairs = [(one()[0], two()[0]) for _ in range(repeats)]
         ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
@@ -299,7 +301,8 @@ def _help() -> float:
 def accuracy(many: float) -> list[Row]:
     """Energy and penetration of Impact after many impacts each."""
     rows = []
-    for name, scene in (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE)):
+    scenes = (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE))
+    for name, scene in scenes[: 1 if many < 1e3 else 3]:
         particles = swarm.fill(scene, 100, speed=SPEED, seed=2)
         one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / 100 / 100.0
         until = many / one

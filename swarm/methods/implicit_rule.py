@@ -97,7 +97,9 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     # Another wall at s, or an equation that is not solved yet: the careful way.
     solved = (not unsolved) & (not walls.outside(chain, surface, sx, sy, sz))
     step = (left > 0.0) & select(touching, solved, surface > base.HARD)
-    new = step & touching & (not walls.outside(chain, -1.0, x, y, z))
+    # The midpoint rule may end outside before it feels a force.
+    inside = not walls.outside(chain, -1.0, x, y, z)
+    new = step & inside & (touching | walls.outside(chain, -1.0, x1, y1, z1))
     return (
         select(step, x1, kept(x)),
         select(step, y1, kept(y)),

@@ -8,7 +8,6 @@ import swarm
 pytestmark = pytest.mark.physics
 
 RADIUS = 0.5
-SPHERE = swarm.Scene([swarm.Sphere(RADIUS)])
 
 
 def verlet(r, v, pull, dt, stiffness):
@@ -66,16 +65,3 @@ def test_every_step_is_the_rule(cls, gravity):
     assert np.median(off) <= 1e-10
     # What does not conserve shows it: the measured error is no round-off.
     assert result.observables["energy_error"][-1] > 1e-6
-
-
-@pytest.mark.parametrize("cls", RULES, ids=lambda cls: cls.__name__)
-def test_threads_and_corners_change_no_bit(cls):
-    scene = swarm.Scene([swarm.Box((0.5, 0.4, 0.3)), swarm.Sphere(0.1, side="outside")], (0.0, 0.0, -1.0))
-    particles = swarm.fill(scene, 2000, speed=1.0, seed=3)
-    one, two = (
-        swarm.simulate(scene, particles, cls(0.01, 1e3), until=2.0, every=0.5, threads=threads) for threads in (1, 2)
-    )
-    assert np.array_equal(one.particles.position, two.particles.position)
-    for name, seen in one.observables.items():
-        assert np.array_equal(seen, two.observables[name]), name
-    assert (one.observables["impulse"][-1] > 0.0).all()
