@@ -1,4 +1,4 @@
-"""The pictures of bench/results: what was measured, over the number of particles."""
+"""The pictures of bench/results."""
 
 import statistics
 from typing import Any
@@ -30,7 +30,8 @@ def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
     _scaling(scaling, found, limits, scenes)
     impacts.set(title="Impact", ylabel="million impacts per second", yscale="log")
     steps.set(title="Methods of fixed step, sphere", ylabel="million particle-steps per second", yscale="log")
-    scaling.set(title="Impact, two threads over one", ylabel="ratio of the speeds", ylim=(0.0, 2.2))
+    scaling.set(title="Impact, two threads over one", ylabel="ratio of the speeds")
+    scaling.set_ylim(bottom=0.0)
     for axes in (impacts, steps, scaling):
         axes.set(xlabel="particles", xscale="log")
         axes.grid(alpha=0.3, which="major")

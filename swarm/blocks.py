@@ -52,11 +52,11 @@ class Hard(NamedTuple):
 
 @kernel
 def advance_block(method, chain, gravity, hard, state, done, span, draws, halt, room):
-    """Advance what `draws` gives by `span` and return (status, particle, draws): DONE, or the first that failed.
+    """Advance what `draws` gives by `span` and return (status, particle, drawn): DONE, or the first that failed.
 
-    `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another thread ends it at its next pass.
-    Particles that are `done` are left alone, and those that arrive become it: where `hard` is None, the first hard
-    contact ends it with HARD_CONTACT, to go on from there with what can do it.
+    `drawn` is how many draws that were; `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another
+    thread ends it at its next pass. Particles that are `done` are left alone, and those that arrive become it: where
+    `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     """
     lanes = lanes_in(room, chain)
     following, stop, drawn, live = 0, 0, 0, 0

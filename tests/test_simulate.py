@@ -192,7 +192,7 @@ def test_particles_on_the_wall_and_at_rest_are_valid(method):
     third = 0.5 / np.sqrt(3.0)
     position = np.array([[0.5, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [third] * 3, [0.2, 0, 0], [0.3, 0, 0]]).T
     velocity = np.array([[1.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]).T
-    result = swarm.simulate(NESTED, swarm.Particles(position, velocity), method, until=0.5, every=0.125, threads=1)
+    result = swarm.simulate(NESTED, swarm.Particles(position, velocity), method, until=2.0, every=0.5, threads=1)
     assert np.array_equal(result.particles.position[:, 3:], position[:, 3:])
     assert (result.particles.velocity[:, 3:] == 0.0).all()
     assert result.observables["energy_error"].max() <= 1e-12

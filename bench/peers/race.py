@@ -65,8 +65,10 @@ def off(position: Floats, exact: Floats) -> float:
     return float(np.median(np.linalg.norm(position - exact, axis=1)))
 
 
-def solution(solver: Solver, start: swarm.Particles, exact: Floats, each: float, patience: float) -> tuple[str, float]:
-    """What reaches the error, and its seconds; `each` is what a step of a particle takes [s]."""
+def solution(
+    solver: Solver, start: swarm.Particles, exact: Floats, each: float, patience: float
+) -> tuple[str, float, bool]:
+    """What comes how near, its seconds, and whether that is near enough; `each` [s] is a step of one particle."""
     dt, best, spent = 1e-3, np.inf, 0.0
     while best == np.inf or each * len(start) * UNTIL / dt < patience:
         for stiffness in _STIFFNESSES:
@@ -74,10 +76,10 @@ def solution(solver: Solver, start: swarm.Particles, exact: Floats, each: float,
             position, spent = solver(job_of(start, dt, alpha))
             error = off(position, exact)
             if error <= _ERROR:
-                return f"  to {error:.2g} m: dt={dt:.3g}, alpha={alpha:.2g}", spent
+                return f"  to {error:.2g} m: dt={dt:.3g}, alpha={alpha:.2g}", spent, True
             best = min(best, error)
         dt *= 0.5
-    return f"  to {_ERROR:g} m: not in {patience:g} s, {best:.2g} m at dt={2.0 * dt:.3g}", spent
+    return f"  to {_ERROR:g} m: not in {patience:g} s, {best:.2g} m at dt={2.0 * dt:.3g}", spent, False
 
 
 def solvers() -> tuple[dict[str, Solver], list[str]]:
@@ -111,8 +113,8 @@ def main(quick: bool) -> None:
         error = off(position, exact)
         rows.append(Row(f"{name}: alpha=1e4, dt=1e-3", 1e9 * each, 1e9 * each, "ns/particle-step"))
         rows.append(Row("  its error", error, error, "m"))
-        told, seconds = solution(solver, start, exact, each, 0.1 if quick else _PATIENCE)
-        rows.append(Row(told, seconds, seconds, "s", "", seconds / rows[0].best))
+        told, seconds, reached = solution(solver, start, exact, each, 0.1 if quick else _PATIENCE)
+        rows.append(Row(told, seconds, seconds, "s", "", seconds / rows[0].best if reached else None))
     show(rows)
     for sentence in missing:
         print(sentence)
