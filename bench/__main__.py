@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, scenes, throughput
+from . import accuracy, bars, compare, scenes, stability, throughput
 from .peers import race
 
 
@@ -14,6 +14,7 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("throughput", help="every method, scene, number of particles, threads and output; the limits")
     commands.add_parser("accuracy", help="work-precision diagrams of every method, a picture a scene")
+    commands.add_parser("stability", help="maps of where methods fail: stiffness, Uzawa's loop, thin solids, grazing")
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
@@ -27,7 +28,14 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.command == "compare":
         sys.exit(compare.main(arguments.old, arguments.new))
-    reports = {"accuracy": accuracy, "throughput": throughput, "bars": bars, "peers": race, "scenes": scenes}
+    reports = {
+        "throughput": throughput,
+        "accuracy": accuracy,
+        "stability": stability,
+        "bars": bars,
+        "peers": race,
+        "scenes": scenes,
+    }
     reports[arguments.command].main(quick=arguments.quick)
 
 

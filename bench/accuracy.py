@@ -1,33 +1,41 @@
 """Speed against accuracy: every method at many settings, in the same scenes, one picture a scene.
 
-Wall time is that of the kernels on one thread, per particle and simulated second. Errors are against billiards between
-rigid walls in 50 digits (reference.py): the median distance after about 5, 20 and 64 impacts; beside it the worst
-particle's relative energy error and the largest penetration, both of 400 frames.
+Wall time is that of the kernels on one thread, per particle and simulated second. Distances are from billiards between
+rigid walls in 50 digits, in the soft sphere from its own closed form (reference.py): the median of the particles after
+about 5, 20 and 64 impacts. Beside them the worst particle's relative energy error and the largest penetration, both of
+400 frames at most.
 """
 
 import csv
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 import swarm
 from swarm.methods.base import Method
-from swarm.run import Run
 
 from . import figure, reference
+from .contenders import Contender, Ours, Plain
 from .report import RESULTS, ROOT, machine, name_of_machine
 
 # dt sqrt(alpha/m): explicit rules take some twenty steps a contact, the others may be stiffer.
 _SOFT, _STIFF = 0.3, 3.0
-_STEPS = tuple(2.0**-k for k in range(6, 17, 2))
+_STEPS = tuple(2.0**-k for k in range(6, 21, 2))
 _CHORDS = tuple(2.0**-k for k in range(4, 17, 3))
 # A setting that takes longer than this [s] for 256 particles is not run again for a better time, nor a finer one tried.
 _PATIENCE = 2.0
+# The plain loop is given more, so that it is seen where it gets to.
+_PLAIN_PATIENCE = 15.0
 _REPEATS = 3
 _FRAMES = 400
+PLAIN = "plain Verlet in Numba"
+# Every method compiles kernels of its own.
+_QUICK = ("Impact", "Penalty", PLAIN)
+
+Known = dict[str, NDArray]
 
 
 @dataclass(frozen=True)
@@ -43,74 +51,91 @@ class Point:
     penetration: float  # over the scene's size
 
 
-def ways(gravity: bool) -> dict[str, Iterator[tuple[str, Method]]]:
+def ways(name: str, scene: swarm.Scene) -> dict[str, Iterator[tuple[str, Contender]]]:
     """Name of a curve -> its settings, each finer than the one before."""
 
-    def soft(cls: type, stiffness: float, **keywords: object) -> Iterator[tuple[str, Method]]:
+    def soft(make: type[Method], stiffness: float, **keywords: object) -> Iterator[tuple[str, Contender]]:
         for dt in _STEPS:
-            yield f"dt=2^{math.log2(dt):.0f} s", cls(dt, (stiffness / dt) ** 2, **keywords)
+            penalty = reference.PENALTY if name == reference.SOFT else (stiffness / dt) ** 2
+            yield _step(dt), Ours(scene, make(dt, penalty, **keywords))
+
+    def plain() -> Iterator[tuple[str, Contender]]:
+        for dt in _STEPS:
+            yield _step(dt), Plain(dt, reference.PENALTY if name == reference.SOFT else (_SOFT / dt) ** 2)
 
     found = {
-        "Impact": iter([("default", swarm.Impact())]),
-        "Impact, contact_step": ((f"2^{math.log2(h):.0f} s", swarm.Impact(contact_step=h)) for h in _CHORDS),
         "Penalty": soft(swarm.Penalty, _STIFF),
         "Verlet": soft(swarm.Verlet, _SOFT),
         "Midpoint": soft(swarm.Midpoint, _SOFT),
         "Trapezoidal": soft(swarm.Trapezoidal, _SOFT),
     }
-    if not gravity:  # cutting a step at the impact knows no gravity yet
+    if name in ("sphere", reference.SOFT):
+        found[PLAIN] = plain()
+    if name == reference.SOFT:
+        return found
+    if scene.gravity is None:  # cutting a step at the impact knows no gravity yet
         found["AugmentedLagrangian"] = soft(
             swarm.AugmentedLagrangian, _STIFF, adaptive=True, acceleration="reflection", on_unconverged="count"
         )
-    return found
+    chords = ((_step(h, "contact_step"), Ours(scene, swarm.Impact(contact_step=h))) for h in _CHORDS)
+    return {"Impact": iter([("default", Ours(scene, swarm.Impact()))]), "Impact, contact_step": chords, **found}
 
 
-def seconds_of(scene: swarm.Scene, particles: swarm.Particles, method: Method, until: float) -> float:
-    """Of the kernels, one thread, per particle and simulated second."""
+def _step(size: float, name: str = "dt") -> str:
+    return f"{name}=2^{math.log2(size):.0f} s"
+
+
+def scenes() -> dict[str, swarm.Scene]:
+    """Those of the reference; the soft sphere is the sphere to methods with springs."""
+    return {**reference.SCENES, reference.SOFT: reference.SCENES["sphere"]}
+
+
+def best_seconds(contender: Contender, particles: swarm.Particles, until: float) -> float:
+    """Per particle and simulated second."""
     best = math.inf
     for _ in range(_REPEATS):
-        with Run(scene, particles, method, 1, None) as run:
-            run.advance(0.0, 0.0)
-            start = time.perf_counter()
-            run.advance(method.span("until", until), until)
-            spent = time.perf_counter() - start
+        spent = contender.seconds(particles, until)
         best = min(best, spent)
         if spent > _PATIENCE:
             break
     return best / len(particles) / until
 
 
-def point(name: str, curve: str, setting: str, method: Method, known: dict[str, np.ndarray]) -> Point:
+def point(name: str, curve: str, setting: str, contender: Contender, known: Known) -> Point:
     """Measure one setting; errors are infinite where the run fails."""
-    scene = reference.SCENES[name]
     particles = swarm.Particles(known[f"{name}/position"], known[f"{name}/velocity"])
     times, ends = known[f"{name}/times"], known[f"{name}/end"]
+    # As many frames as there are 64ths of a second, at most.
+    every = math.ceil(64.0 * times[-1] / _FRAMES) / 64.0
     try:
-        seconds = seconds_of(scene, particles, method, float(times[-1]))
-        errors = []
-        for k, until in enumerate(times):
-            end = swarm.simulate(scene, particles, method, until=float(until), threads=1).particles.position
-            errors.append(float(np.median(np.linalg.norm(end.T - ends[:, k], axis=1))))
-        # As many frames as there are 64ths of a second, at most.
-        every = math.ceil(64.0 * times[-1] / _FRAMES) / 64.0
-        until = every * math.floor(times[-1] / every)
-        seen = swarm.simulate(scene, particles, method, until=until, every=every, threads=1).observables
+        seconds = best_seconds(contender, particles, float(times[-1]))
+        found = contender.ends(particles, times)
+        off = [np.linalg.norm(end.T - ends[:, k], axis=1) for k, end in enumerate(found)]
+        energy, depth = contender.worst(particles, every, math.floor(times[-1] / every))
     except swarm.RunError:
         return Point(name, curve, setting, math.nan, (math.inf,) * len(times), math.inf, math.inf)
-    energy, depth = float(seen["energy_error"].max()), float(seen["max_penetration"].max())
-    return Point(name, curve, setting, seconds, tuple(errors), energy, depth / scene.size())
+    # The reference is no number where a particle touches a spring at that time.
+    errors = tuple(float(np.nanmedian(one)) for one in off)
+    return Point(name, curve, setting, seconds, errors, energy, depth / scenes()[name].size())
 
 
-def points(name: str, known: dict[str, np.ndarray], quick: bool) -> list[Point]:
+def points(name: str, known: Known, quick: bool) -> list[Point]:
     """Every method in one scene."""
     found = []
-    for curve, settings in ways(reference.SCENES[name].gravity is not None).items():
-        for count, (setting, method) in enumerate(settings):
-            found.append(point(name, curve, setting, method, known))
+    for curve, settings in ways(name, scenes()[name]).items():
+        if quick and curve not in _QUICK:
+            continue
+        patience = _PLAIN_PATIENCE if curve == PLAIN else _PATIENCE
+        for count, (setting, contender) in enumerate(settings):
+            found.append(point(name, curve, setting, contender, known))
             one = found[-1]
-            print(f"{name:<20} {curve:<22} {setting:<12} {one.seconds * 1e9:10.3g} ns/s  {one.errors[-1]:9.2g} m")
+            print(
+                f"{name:<20} {curve:<22} {setting:<19} {one.seconds * 1e9:10.3g} ns/s {one.errors[-1]:9.2g} m"
+                f" {one.energy:9.2g}"
+            )
             total = one.seconds * float(known[f"{name}/times"][-1]) * known[f"{name}/position"].shape[1]
-            if total > _PATIENCE or (quick and count == 1):
+            # Four times the steps at the next.
+            if 4.0 * total > patience or (quick and count == 1):
                 break
     return found
 
@@ -125,20 +150,58 @@ def front(found: list[Point], error: int) -> list[Point]:
     return kept
 
 
-def advice(found: list[Point]) -> str:
+def advice(name: str, found: list[Point]) -> str:
     """In one sentence, what to choose in this scene."""
+    if name == reference.SOFT:
+        return _advice_for_springs(found)
     impact = next(p for p in found if p.method == "Impact")
     others = [p for p in found if not p.method.startswith("Impact") and math.isfinite(p.seconds)]
     nearest = min(others, key=lambda p: p.errors[0])
-    faster = [p for p in others if p.seconds < impact.seconds]
-    sentence = (
-        f"Impact: {impact.errors[0]:.1g} m after {reference.IMPACTS[0]} impacts; the nearest of the others, "
-        f"{nearest.method} at {nearest.setting}, reaches {nearest.errors[0]:.1g} m in "
-        f"{nearest.seconds / impact.seconds:.0f} times its time"
+    return (
+        f"Choose Impact: {impact.errors[0]:.1g} m after {reference.IMPACTS[0]} impacts; the nearest of the others, "
+        f"{nearest.method} at {nearest.setting}, is {nearest.errors[0]:.1g} m off in "
+        f"{nearest.seconds / impact.seconds:.1f} times its time"
     )
-    if faster:
-        sentence += f"; faster than it, and farther off, are {', '.join(sorted({p.method for p in faster}))}"
-    return sentence + "."
+
+
+def _advice_for_springs(found: list[Point]) -> str:
+    best = front(found, -1)
+    names = " and ".join(sorted({p.method for p in best}))
+    return (
+        f"Where the wall is a spring, choose Penalty: its energy is exact at every dt (worst "
+        f"{max(p.energy for p in found if p.method == 'Penalty'):.0e}); nearest in a given time: {names}"
+    )
+
+
+def reaching(found: list[Point], method: str, error: str, target: float) -> Point | None:
+    """The fastest setting of a method with an error of at most so much: "energy", or "distance" after 64 impacts."""
+    enough = [p for p in found if p.method == method and (p.energy if error == "energy" else p.errors[-1]) <= target]
+    return min(enough, key=lambda p: p.seconds, default=None)
+
+
+def races(name: str, found: list[Point]) -> list[str]:
+    """Wall times at equal error, as sentences."""
+    if name == "sphere":
+        asked = [("Impact", "distance", 1e-3, 1000), ("Impact", "distance", 1e-6, 1000)]
+    elif name == reference.SOFT:
+        asked = [("Penalty", "energy", 1e-3, 5)]
+    else:
+        return []
+    told = []
+    for ours, error, target, bar in asked:
+        what = f"{name}, {error} <= {target:g} (bar: {ours} takes 1/{bar} of {PLAIN})"
+        mine, other = (reaching(found, method, error, target) for method in (ours, PLAIN))
+        if mine is None:
+            told.append(f"{what}: {ours} does not reach it")
+        elif other is None:
+            last = [p for p in found if p.method == PLAIN][-1]
+            told.append(
+                f"{what}: {PLAIN} reaches it at no dt tried; {last.setting} takes {last.seconds / mine.seconds:.0f} "
+                f"times the wall time"
+            )
+        else:
+            told.append(f"{what}: 1/{other.seconds / mine.seconds:.0f}, {mine.setting} against {other.setting}")
+    return told
 
 
 def write(name: str, found: list[Point]) -> None:
@@ -159,9 +222,11 @@ def main(quick: bool) -> None:
     with np.load(reference.PATH) as file:
         known = dict(file)
     print(machine())
-    for name in ("sphere",) if quick else reference.SCENES:
+    told = []
+    for name in ("sphere",) if quick else scenes():
         found = points(name, known, quick)
-        print(f"{name}: {advice(found)}")
+        told += [f"{name}: {advice(name, found)}.", *races(name, found)]
         if not quick:
             write(name, found)
-            figure.accuracy(name, found, [front(found, k) for k in range(len(reference.IMPACTS))], advice(found))
+            figure.accuracy(name, found, front(found, -1), advice(name, found))
+    print("\n".join(told))

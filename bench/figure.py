@@ -1,12 +1,13 @@
 """The pictures of bench/results."""
 
 import statistics
+import textwrap
 from typing import Any
 
 from .report import RESULTS, ROOT, machine, name_of_machine
 
 # Okabe and Ito: told apart by every kind of eye.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 # (threads, output) -> line
 _STYLES = {(1, "none"): "-", (2, "none"): "--", (1, "HDF5"): ":"}
 
@@ -85,41 +86,49 @@ def _scaling(axes: Any, found: Found, limits: Limits, scenes: list[str]) -> None
         _grey_line(axes, 2.0 * statistics.median(one) / statistics.median(two), "two bare loops in C at once")
 
 
-def accuracy(name: str, found: list[Any], fronts: list[list[Any]], advice: str) -> None:
+# One colour a method, whatever the scene.
+_CURVES = (
+    "Impact", "Penalty", "Impact, contact_step", "AugmentedLagrangian", "Midpoint", "Trapezoidal", "Verlet",
+    "plain Verlet in Numba",
+)  # fmt: skip
+# Zero has no place on a logarithmic axis.
+_LEAST = 1e-17
+
+
+def accuracy(name: str, found: list[Any], front: list[Any], advice: str) -> None:
     """Errors over wall time, one curve a method, as PNG."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    picture, panels = pyplot.subplots(1, 3, figsize=(15, 6.0), layout="constrained", sharex=True)
-    methods = list(dict.fromkeys(p.method for p in found))
-    # Zero has no place on a logarithmic axis.
-    least = 1e-17
-    for colour, method in zip(COLOURS, methods, strict=False):
+    picture, panels = pyplot.subplots(1, 3, figsize=(12, 5.6), layout="constrained", sharex=True)
+    for method in dict.fromkeys(p.method for p in found):
         curve = [p for p in found if p.method == method]
         seconds = [p.seconds for p in curve]
         mark = {"marker": "*", "markersize": 13} if method == "Impact" else {"marker": "o", "markersize": 4}
-        label = f"{method} (default)" if method == "Impact" else method
-        panels[0].plot(seconds, [max(p.energy, least) for p in curve], color=colour, label=label, **mark)
+        line = {"color": COLOURS[_CURVES.index(method)], "linewidth": 1.4, **mark}
+        panels[0].plot(seconds, [max(p.energy, _LEAST) for p in curve], **line)
         for k, style in enumerate((":", "--", "-")):
-            panels[1].plot(seconds, [max(p.errors[k], least) for p in curve], style, color=colour, **mark)
-        panels[2].plot(seconds, [max(p.penetration, least) for p in curve], color=colour, **mark)
-    last = fronts[-1]
+            faint = {"alpha": 1.0 if style == "-" else 0.45, "markersize": mark["markersize"] if style == "-" else 2}
+            panels[1].plot(seconds, [max(p.errors[k], _LEAST) for p in curve], style, **{**line, **faint})
+        label = f"{method} (default)" if method == "Impact" else method
+        panels[2].plot(seconds, [max(p.penetration, _LEAST) for p in curve], label=label, **line)
     panels[1].plot(
-        [p.seconds for p in last], [max(p.errors[-1], least) for p in last], color="0.7", linewidth=7, alpha=0.5,
-        zorder=0, label="nothing is faster and nearer (64 impacts)",
+        [p.seconds for p in front], [max(p.errors[-1], _LEAST) for p in front], color="0.7", linewidth=7, alpha=0.5,
+        zorder=0, solid_capstyle="round",
     )  # fmt: skip
-    panels[0].set(title="worst energy error of a particle", ylabel="relative error")
-    panels[1].set(title="median distance after 5 (dotted), 20 (dashed), 64 impacts (full)", ylabel="m")
+    panels[2].plot([], [], color="0.7", linewidth=7, alpha=0.5, label="nothing is faster and nearer")
+    panels[0].set(title="worst particle's energy error", ylabel="relative error")
+    panels[1].set(title="median distance after 64 impacts\n(faint: 20 dashed, 5 dotted)", ylabel="m")
     panels[2].set(title="largest penetration", ylabel="part of the scene's size")
     for axes in panels:
-        axes.set(xscale="log", yscale="log", xlabel="wall time per particle and simulated second [s], one thread")
-        axes.set_ylim(0.5 * least, 10.0)
+        axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
+        axes.set_ylim(0.5 * _LEAST, 10.0)
         axes.grid(alpha=0.3, which="major")
-    panels[0].legend(fontsize=8)
-    panels[1].legend(fontsize=8, loc="lower left")
-    picture.suptitle(f"{name}\n{advice}", fontsize=10)
+    picture.legend(loc="outside lower center", ncols=5, fontsize=9)
+    picture.suptitle(f"{name}: wall time per particle and simulated second, one thread, {machine()}", fontsize=11)
+    picture.supxlabel("\n".join(textwrap.wrap(advice + ".", 150)), fontsize=9)
     path = RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png"
     picture.savefig(path, dpi=100)
     pyplot.close(picture)

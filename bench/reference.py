@@ -1,7 +1,8 @@
-"""Billiards in 50 digits, event by event: where rigid walls really send a particle.
+"""Billiards in 50 digits: where rigid walls, and the springs of a soft sphere, really send a particle.
 
 `python -m bench.reference` writes bench/references/billiards.npz, some minutes on one core: for each scene the start
-of 256 particles and where they are after about 5, 20 and 64 impacts each.
+of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid walls go event by event; a sphere,
+rigid or with linear springs, has a closed form.
 """
 
 from collections.abc import Callable
@@ -18,6 +19,9 @@ DIGITS = 50
 PARTICLES, SPEED = 256, 0.5
 # Impacts of the mean particle at the three times.
 IMPACTS = (5, 20, 64)
+# alpha of the soft sphere, for a mass of 1 kg.
+PENALTY = 1e4
+SOFT = "soft sphere"
 _GRAVITY = (0.0, 0.0, -0.5)
 SCENES = {
     "sphere": swarm.Scene([swarm.Sphere(0.5)]),
@@ -136,12 +140,89 @@ def fly(scene: swarm.Scene, position: NDArray, velocity: NDArray, times: list[fl
     return np.array(seen), impacts
 
 
+def in_a_sphere(position: NDArray, velocity: NDArray, radius: float, time: float, penalty: float | None) -> NDArray:
+    """Position of one particle of 1 kg in a sphere about the origin: between rigid walls (None), or linear springs.
+
+    Chords of one length, and contacts of one length: each turns the particle by one angle from the one before. NaN
+    where it touches a spring at that time.
+    """
+    import mpmath
+
+    mpmath.mp.dps = DIGITS
+    mp = mpmath.mp
+    r, v = ([mp.mpf(float(a)) for a in one] for one in (position, velocity))
+    speed2 = sum(a * a for a in v)
+    b = sum(a * c for a, c in zip(r, v, strict=True))
+    root = mp.sqrt(b * b - speed2 * (sum(a * a for a in r) - mp.mpf(radius) ** 2))
+    first, chord = (root - b) / speed2, 2 * root / speed2
+    hit = [a + first * c for a, c in zip(r, v, strict=True)]
+    n = [a / radius for a in hit]
+    normal = sum(a * c for a, c in zip(v, n, strict=True))
+    tangent = [a - normal * c for a, c in zip(v, n, strict=True)]
+    along = mp.sqrt(sum(a * a for a in tangent))
+    touch, turn = (0, 0) if penalty is None else soft_contact(normal, along, mp.mpf(radius), mp.mpf(penalty))
+    if time < first:
+        return np.array([float(a + time * c) for a, c in zip(r, v, strict=True)])
+    count = mp.floor((time - first) / (touch + chord))
+    rest = time - first - count * (touch + chord) - touch
+    if rest < 0:
+        return np.full(3, np.nan)
+    # A chord spans twice the angle between velocity and wall.
+    span = 2 * mp.atan2(normal, along)
+
+    def at(angle: object) -> list:
+        return [radius * (mp.cos(angle) * a + mp.sin(angle) * c / along) for a, c in zip(n, tangent, strict=True)]
+
+    here = count * (turn + span) + turn
+    return np.array([float(a + rest / chord * (c - a)) for a, c in zip(at(here), at(here + span), strict=True)])
+
+
+def soft_contact(normal: object, along: object, radius: object, penalty: object) -> tuple[object, object]:
+    """How long a contact with a linear spring lasts, and by what angle about the centre it turns the particle.
+
+    Between r = R and the farthest r it is dt = dr/|dr/dt| and dphi = L/r^2 dt, with
+    (dr/dt)^2 = v_n^2 + v_t^2 (1 - R^2/r^2) - alpha (r - R)^2.
+    """
+    import mpmath
+
+    mp = mpmath.mp
+
+    def square(depth: object) -> object:
+        r = radius + depth
+        return normal**2 + along**2 * depth * (r + radius) / r**2 - penalty * depth**2
+
+    # From that of a flat wall; the tangential part goes deeper.
+    deepest = mpmath.findroot(square, normal / mp.sqrt(penalty) * (1 + along**2 / (penalty * radius * radius)))
+
+    def slice_of(u: object) -> tuple[object, object]:
+        # depth = deepest (1 - u^2) takes the root's zero out of the integrand.
+        depth = deepest * (1 - u * u)
+        return 4 * deepest * u / mp.sqrt(square(depth)), radius + depth
+
+    def touch(u: object) -> object:
+        return slice_of(u)[0]
+
+    def turn(u: object) -> object:
+        time, r = slice_of(u)
+        return time * radius * along / r**2
+
+    return tuple(mpmath.quad(one, [0, 1], method="gauss-legendre") for one in (touch, turn))
+
+
 def times_of(scene: swarm.Scene, particles: swarm.Particles) -> list[float]:
     """When the mean particle has had so many impacts, rounded to 1/64 s: whole steps of every dt that is tried."""
     until = 200.0
     result = swarm.simulate(scene, particles, swarm.Impact(), until=until)
     rate = result.observables["impacts"][-1] / len(particles) / until
     return [round(64.0 * count / rate) / 64.0 for count in IMPACTS]
+
+
+def soft(particles: swarm.Particles, times: list[float]) -> dict[str, NDArray]:
+    """The entries of the soft sphere."""
+    starts = list(zip(particles.position.T, particles.velocity.T, strict=True))
+    ends = [[in_a_sphere(r, v, 0.5, time, PENALTY) for time in times] for r, v in starts]
+    known = {"position": particles.position, "velocity": particles.velocity, "times": np.array(times)}
+    return {f"{SOFT}/{key}": values for key, values in {**known, "end": np.array(ends)}.items()}
 
 
 def main() -> None:
@@ -155,6 +236,8 @@ def main() -> None:
         values[f"{name}/times"] = np.array(times)
         values[f"{name}/end"] = np.array([end for end, _impacts in ends])
         print(f"{name}: {times} s, {np.mean([impacts for _end, impacts in ends]):.1f} impacts each")
+        if name == "sphere":
+            values |= soft(particles, times)
     PATH.parent.mkdir(exist_ok=True)
     np.savez_compressed(PATH, **values)
     print(f"written to {PATH}")

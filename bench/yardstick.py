@@ -44,22 +44,26 @@ def bare(what: str, processes: int = 1) -> list[float]:
 
 
 @numba.njit(error_model="numpy")
+def _spring(x, y, z, radius, alpha):
+    distance = np.sqrt(x * x + y * y + z * z)
+    gap = distance - radius
+    if gap > 0.0:
+        f = -alpha * gap / distance
+        return f * x, f * y, f * z
+    return 0.0, 0.0, 0.0
+
+
+@numba.njit(error_model="numpy")
 def plain_verlet(position, velocity, radius, alpha, dt, steps):
     """What a user would write in an afternoon: velocity Verlet with a penalty wall, particle by particle."""
     for i in range(position.shape[1]):
         x, y, z = position[0, i], position[1, i], position[2, i]
         vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
-        ax, ay, az = 0.0, 0.0, 0.0
+        ax, ay, az = _spring(x, y, z, radius, alpha)
         for _ in range(steps):
             vx, vy, vz = vx + 0.5 * dt * ax, vy + 0.5 * dt * ay, vz + 0.5 * dt * az
             x, y, z = x + dt * vx, y + dt * vy, z + dt * vz
-            distance = np.sqrt(x * x + y * y + z * z)
-            gap = distance - radius
-            if gap > 0.0:
-                f = -alpha * gap / distance
-                ax, ay, az = f * x, f * y, f * z
-            else:
-                ax, ay, az = 0.0, 0.0, 0.0
+            ax, ay, az = _spring(x, y, z, radius, alpha)
             vx, vy, vz = vx + 0.5 * dt * ax, vy + 0.5 * dt * ay, vz + 0.5 * dt * az
         position[0, i], position[1, i], position[2, i] = x, y, z
         velocity[0, i], velocity[1, i], velocity[2, i] = vx, vy, vz

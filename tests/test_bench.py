@@ -62,6 +62,20 @@ def test_scenes_quick():
     assert "formula of the ellipsoid" in told
 
 
+def test_accuracy_quick():
+    told = report("accuracy")
+    assert "sphere: Choose Impact" in told
+    assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in told
+
+
+def test_stability_quick():
+    told = report("stability")
+    assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in told
+    assert "uzawa: State I with exponent 1: 1 of 1 converge" in told
+    assert "tunnelling: Impact: 0 % of the particles pass the wall at most" in told
+    assert "grazing: Impact, angles down to 1e-12 rad: energy within" in told
+
+
 def table(path, **rows):
     """A report with these (min, median, unit)."""
     lines = [f'"{what}",{best},{median},{unit},,' for what, (best, median, unit) in rows.items()]

@@ -6,34 +6,7 @@ import pytest
 import swarm
 from bench import reference
 
-mpmath = pytest.importorskip("mpmath")
-
-
-def in_a_sphere(position, velocity, radius, time):
-    """Chords of one length, each turned by one angle from the one before: in the arithmetic of mpmath."""
-    mp = mpmath.mp
-    r, v = ([mp.mpf(float(a)) for a in one] for one in (position, velocity))
-    speed2 = sum(a * a for a in v)
-    b = sum(a * c for a, c in zip(r, v, strict=True))
-    root = mp.sqrt(b * b - speed2 * (sum(a * a for a in r) - mp.mpf(radius) ** 2))
-    first, chord = (root - b) / speed2, 2 * root / speed2
-    count = mp.floor((time - first) / chord)
-    hit = [a + first * c for a, c in zip(r, v, strict=True)]
-    n = [a / radius for a in hit]
-    normal = sum(a * c for a, c in zip(v, n, strict=True))
-    tangent = [a - normal * c for a, c in zip(v, n, strict=True)]
-    size = mp.sqrt(sum(a * a for a in tangent))
-    along = [a / size for a in tangent]
-    # A chord spans twice the angle between velocity and wall.
-    span = 2 * mp.atan2(normal, size)
-    angle, rest = count * span, time - first - count * chord
-
-    def at(turn):
-        return [radius * (mp.cos(turn) * a + mp.sin(turn) * c) for a, c in zip(n, along, strict=True)]
-
-    here, there = at(angle), at(angle + span)
-    part = rest / chord
-    return np.array([float(a + part * (c - a)) for a, c in zip(here, there, strict=True)])
+pytest.importorskip("mpmath")
 
 
 def test_chords_in_a_sphere():
@@ -42,7 +15,7 @@ def test_chords_in_a_sphere():
     for position, velocity in zip(particles.position.T, particles.velocity.T, strict=True):
         (end,), impacts = reference.fly(scene, position, velocity, [100.0])
         assert impacts > 40
-        assert end == pytest.approx(in_a_sphere(position, velocity, 0.5, 100), abs=1e-15)
+        assert end == pytest.approx(reference.in_a_sphere(position, velocity, 0.5, 100.0, None), abs=1e-15)
 
 
 def test_a_box_unfolds():
@@ -54,6 +27,19 @@ def test_a_box_unfolds():
         # Free flight, folded: a triangle wave of period 4 b.
         phase = np.mod(position + velocity * 60.0 + halves, 4.0 * halves)
         assert end == pytest.approx(np.minimum(phase, 4.0 * halves - phase) - halves, abs=1e-13)
+
+
+def test_penalty_tends_to_the_soft_sphere():
+    """A sixteenth of the error at a quarter of the step: the closed form of springs is what is converged to."""
+    with np.load(reference.PATH) as file:
+        known = {key.split("/")[1]: values for key, values in file.items() if key.startswith(reference.SOFT)}
+    particles, errors = swarm.Particles(known["position"], known["velocity"]), []
+    for dt in (2.0**-10, 2.0**-12, 2.0**-14):
+        method = swarm.Penalty(dt=dt, penalty=reference.PENALTY)
+        end = swarm.simulate(reference.SCENES["sphere"], particles, method, until=float(known["times"][1]))
+        errors.append(np.nanmedian(np.linalg.norm(end.particles.position.T - known["end"][:, 1], axis=1)))
+    assert np.isnan(known["end"]).mean() < 0.05
+    assert np.divide(errors[:-1], errors[1:]) == pytest.approx(16.0, rel=0.1)
 
 
 @pytest.mark.parametrize("name", reference.SCENES)
@@ -77,3 +63,15 @@ def test_the_file_is_what_its_command_writes(name):
     assert np.array_equal(start.position, known[f"{name}/position"])
     first, _impacts = reference.fly(scene, start.position[:, 0], start.velocity[:, 0], list(known[f"{name}/times"][:1]))
     assert np.array_equal(first[0], known[f"{name}/end"][0, 0])
+
+
+def test_the_soft_sphere_is_what_its_command_writes():
+    with np.load(reference.PATH) as file:
+        known = dict(file)
+    start, times = (
+        swarm.Particles(known["sphere/position"][:, :2], known["sphere/velocity"][:, :2]),
+        known["sphere/times"],
+    )
+    again = reference.soft(start, list(times))
+    assert np.array_equal(again[f"{reference.SOFT}/end"], known[f"{reference.SOFT}/end"][:2], equal_nan=True)
+    assert np.array_equal(known[f"{reference.SOFT}/position"], known["sphere/position"])

@@ -1,0 +1,60 @@
+"""What the maps share: heat maps of a table, and its CSV."""
+
+import csv
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..report import RESULTS, ROOT
+
+Cell = dict[str, Any]  # column -> number or word
+OMEGA = r"$\Omega = dt\,\sqrt{\alpha/m}$"
+
+
+def table(cells: Sequence[Cell], x: str, y: str, value: str) -> tuple[list[float], list[float], np.ndarray]:
+    """The values of `x` and of `y`, and the array of `value` over (y, x); NaN where there is no cell."""
+    columns, rows = (sorted({cell[axis] for cell in cells}) for axis in (x, y))
+    found = np.full((len(rows), len(columns)), np.nan)
+    for cell in cells:
+        found[rows.index(cell[y]), columns.index(cell[x])] = cell[value]
+    return columns, rows, found
+
+
+def heat(axes: Any, columns: list[str], rows: list[str], values: np.ndarray, low: float, high: float) -> Any:
+    """Colours of log10(values) from low to high; a cross where a value is infinite."""
+    with np.errstate(divide="ignore"):
+        logarithms = np.log10(np.where(np.isfinite(values), values, np.nan))
+    image = axes.imshow(
+        np.clip(logarithms, low, high), origin="lower", aspect="auto", cmap="cividis", vmin=low, vmax=high
+    )
+    axes.set_facecolor("0.85")
+    crossed, ended = np.nonzero(np.isinf(values))
+    axes.plot(ended, crossed, "x", color="0.25", markersize=5)
+    # Every second label where there are many.
+    every = 1 + len(columns) // 10
+    axes.set_xticks(range(0, len(columns), every), columns[::every], fontsize=8)
+    axes.set_yticks(range(len(rows)), rows, fontsize=8)
+    return image
+
+
+def figure(panels: int, width: float = 12.0, height: float = 4.2) -> tuple[Any, Any]:
+    """A picture of so many panels side by side."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot.subplots(1, panels, figsize=(width, height), layout="constrained")
+
+
+def save(picture: Any, cells: Sequence[Cell], name: str) -> None:
+    """The picture as PNG and its cells as CSV; they depend on no machine but for times."""
+    path = RESULTS / f"stability-{name}.png"
+    picture.savefig(path, dpi=100)
+    with open(path.with_suffix(".csv"), "w", newline="") as file:
+        out = csv.DictWriter(file, list(cells[0]), lineterminator="\n")
+        out.writeheader()
+        for cell in cells:
+            out.writerow({key: f"{one:.4g}" if isinstance(one, float) else one for key, one in cell.items()})
+    print(f"written to {path.relative_to(ROOT)} and {path.with_suffix('.csv').name}")

@@ -1,0 +1,123 @@
+"""Escapes through a thin solid over speed dt/thickness: steps can jump over it, flights to the impact cannot."""
+
+import math
+from collections.abc import Sequence
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+import swarm
+
+from . import picture
+from .picture import Cell
+
+THICKNESS, SPEED, IMPACTS = 0.01, 1.0, 100
+# A box cut in two by a thin solid box.
+SCENE = swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), swarm.Box((0.5 * THICKNESS, 2.0, 2.0), side="outside")])
+# dt sqrt(alpha/m): what is stable, and does not sink through the solid before it turns.
+_EXPLICIT, _IMPLICIT = 1.0, 3.0
+METHODS = {
+    "Penalty": (swarm.Penalty, _IMPLICIT),
+    "Verlet": (swarm.Verlet, _EXPLICIT),
+    "Midpoint": (swarm.Midpoint, _IMPLICIT),
+    "Trapezoidal": (swarm.Trapezoidal, _IMPLICIT),
+}
+PLAIN = "plain Verlet"
+_RATIOS = tuple(2.0 ** (k / 2.0) for k in range(-6, 9))
+
+
+@numba.njit(error_model="numpy")
+def _spring(r, k, alpha):
+    """Force along one axis in the box; along x of the thin wall too."""
+    force = 0.0
+    if abs(r) > 1.0:
+        force -= alpha * (abs(r) - 1.0) * np.sign(r)
+    if k == 0 and abs(r) < 0.5 * THICKNESS:
+        force += alpha * (0.5 * THICKNESS - abs(r)) * np.sign(r)
+    return force
+
+
+@numba.njit(error_model="numpy")
+def _plain_verlet(position, velocity, alpha, dt, steps):
+    """What a user would write in an afternoon, without a check of the step."""
+    for k in range(3):  # the axes do not know of one another
+        for i in range(position.shape[1]):
+            r, v = position[k, i], velocity[k, i]
+            a = _spring(r, k, alpha)
+            for _ in range(steps):
+                v += 0.5 * dt * a
+                r += dt * v
+                a = _spring(r, k, alpha)
+                v += 0.5 * dt * a
+            position[k, i], velocity[k, i] = r, v
+
+
+def start(count: int) -> swarm.Particles:
+    """Anywhere but in the walls."""
+    random = np.random.default_rng(4)
+    position = random.uniform(-0.9, 0.9, (3, count))
+    position[0] = random.choice([-1.0, 1.0], count) * random.uniform(0.1, 0.9, count)
+    velocity = random.standard_normal((3, count))
+    return swarm.Particles(position, velocity * (SPEED / np.linalg.norm(velocity, axis=0)))
+
+
+def escaped(particles: swarm.Particles, end: NDArray) -> float:
+    """Part of the particles on the other side, or nowhere."""
+    stayed = np.sign(end[0]) == np.sign(particles.position[0])
+    return float(1.0 - (stayed & (abs(end) < 1.1).all(axis=0)).mean())
+
+
+def measure(quick: bool) -> list[Cell]:
+    """Every method at every ratio; infinite where it refuses, or ends with an error."""
+    particles, found = start(20 if quick else 200), []
+    # Mean chord 4 V/S of a half of the box, twice the impacts of which a half would do.
+    until = IMPACTS * 4.0 / (2.0 * (1.0 + 2.0 + 2.0)) * 2.0 / SPEED
+    methods = {"Impact": None} if quick else {"Impact": None, **METHODS}
+    for ratio in _RATIOS[::7] if quick else _RATIOS:
+        dt = ratio * THICKNESS / SPEED
+        steps = round(until / dt)
+        for name, description in methods.items():
+            method = description[0](dt, (description[1] / dt) ** 2) if description else swarm.Impact()
+            try:
+                end = swarm.simulate(SCENE, particles, method, until=steps * dt).particles.position
+                part = escaped(particles, end)
+            except swarm.SwarmError:
+                part = math.inf
+            found.append({"method": name, "ratio": ratio, "escaped": part})
+        position, velocity = particles.position.copy(), particles.velocity.copy()
+        _plain_verlet(position, velocity, (_EXPLICIT / dt) ** 2, dt, steps)
+        found.append({"method": PLAIN, "ratio": ratio, "escaped": escaped(particles, position)})
+    return found
+
+
+def told(cells: Sequence[Cell]) -> list[str]:
+    """One sentence a method."""
+    sentences = []
+    for method in dict.fromkeys(cell["method"] for cell in cells):
+        mine = [cell for cell in cells if cell["method"] == method]
+        worst = max((c["escaped"] for c in mine if math.isfinite(c["escaped"])), default=0.0)
+        refused = [c["ratio"] for c in mine if math.isinf(c["escaped"])]
+        sentence = f"{method}: {100.0 * worst:.3g} % of the particles pass the wall at most"
+        sentences.append(sentence + (f"; refused from {min(refused):.2g} thicknesses a step" if refused else ""))
+    return sentences
+
+
+def draw(cells: Sequence[Cell]) -> None:
+    """Escapes over the ratio, one curve a method."""
+    from ..figure import COLOURS
+
+    figure, axes = picture.figure(1, width=9.0)
+    for colour, method in zip(COLOURS, dict.fromkeys(cell["method"] for cell in cells), strict=False):
+        mine = [c for c in cells if c["method"] == method]
+        done = [c for c in mine if math.isfinite(c["escaped"])]
+        axes.plot(
+            [c["ratio"] for c in done], [100.0 * c["escaped"] for c in done], color=colour, marker="o", markersize=4,
+            label=method + ("" if len(done) == len(mine) else " (refuses longer steps)"),
+        )  # fmt: skip
+    axes.axvline(1.0, color="0.5", linewidth=1.0, linestyle="--")
+    axes.set(xscale="log", xlabel="speed · dt / thickness of the solid", ylabel="particles that passed it [%]")
+    axes.set_title(f"a box cut in two by a thin solid, {IMPACTS} impacts each", fontsize=11)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
+    picture.save(figure, cells, "tunnelling")
