@@ -259,7 +259,7 @@ def _child(code: str, *args: str, **environment: str) -> str:
 
 
 def _as_usual() -> dict[str, str]:
-    """The environment, but Python keeps its bytecode, as it does unless told otherwise: else a start takes 0.2 s more."""
+    """The environment, but Python keeps its bytecode, as it does unless told otherwise: else a start takes 0.2 s."""
     return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
