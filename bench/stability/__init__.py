@@ -1,9 +1,15 @@
 """Where methods fail, as maps: `python -m bench stability`."""
 
 from ..report import machine
-from . import grazing, stiffness, tunnelling, uzawa
+from . import grazing, roundoff, stiffness, tunnelling, uzawa
 
-MAPS = {"stiffness": stiffness, "uzawa": uzawa, "tunnelling": tunnelling, "grazing": grazing}
+MAPS = {
+    "stiffness": stiffness,
+    "uzawa": uzawa,
+    "tunnelling": tunnelling,
+    "grazing": grazing,
+    "roundoff": roundoff,
+}
 
 
 def main(quick: bool) -> None:

@@ -85,7 +85,7 @@ def draw(cells: Sequence[Cell]) -> None:
     figure, panels = picture.figure(2)
     for axes, (value, title, low, high) in zip(
         panels,
-        (("seconds", "wall time a crossing [s]", -8.0, -1.0), ("distance", "distance/R", -16.0, 0.0)),
+        (("seconds", "wall time a crossing [s]", -6.0, -1.0), ("distance", "distance/R", -16.0, 0.0)),
         strict=True,
     ):
         columns, rows, values = picture.table(cells, "angle", "shortest_flight", value)

@@ -1,7 +1,7 @@
 """What the maps share: heat maps of a table, and its CSV."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,16 @@ def heat(axes: Any, columns: list[str], rows: list[str], values: np.ndarray, low
     axes.set_xticks(range(0, len(columns), every), columns[::every], fontsize=8)
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     return image
+
+
+def words(axes: Any, image: Any, values: np.ndarray, wording: Callable[[float], str]) -> None:
+    """Each finite value in its cell, dark on light and light on dark."""
+    for row, column in zip(*np.nonzero(np.isfinite(values)), strict=True):
+        light = image.get_array()[row, column] > 0.5 * (image.norm.vmin + image.norm.vmax)
+        axes.text(
+            column, row, wording(values[row, column]), ha="center", va="center", fontsize=7,
+            color="black" if light else "white",
+        )  # fmt: skip
 
 
 def figure(panels: int, width: float = 12.0, height: float = 4.2) -> tuple[Any, Any]:

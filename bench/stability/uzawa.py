@@ -42,6 +42,7 @@ def cell(exponent: float, gap: float, stiffness: float) -> Cell:
         "gap": gap,
         "stiffness": stiffness,
         "sweeps": float(len(history)) if history.converged else math.inf,
+        "left": float(history.stored_energy[-1]) / (0.5 * SPEED**2),
         "rate": float(np.median(ratios[len(ratios) // 2 :])) if len(ratios) else 0.0,
         "last_multiplier_over_first": float(history.multiplier[-1] / history.multiplier[1])
         if len(history) > 1
@@ -74,25 +75,28 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 
 def draw(cells: Sequence[Cell]) -> None:
-    """Sweeps over two planes, the rate over the third."""
+    """The energy that is left over one plane, sweeps over the next, the rate over the third."""
     figure, panels = picture.figure(3)
-    gaps = {
+    names = {
         "gap": "gap before contact / normal way of the step",
         "exponent": "exponent a",
         "stiffness": picture.OMEGA,
     }
     planes = (
-        ("gap", "exponent", "sweeps", "stiffness", STIFFNESS, rf"sweeps, $\Omega$ = {STIFFNESS:g}"),
-        ("gap", "stiffness", "sweeps", "exponent", EXPONENT, "sweeps, a = 1"),
-        ("stiffness", "exponent", "rate", "gap", GAP, r"rate: $\sqrt{V}$ over that of the sweep before, State I"),
+        ("gap", "exponent", "left", {"stiffness": STIFFNESS}, rf"V left / kinetic energy, $\Omega$ = {STIFFNESS:g}"),
+        ("gap", "stiffness", "sweeps", {"exponent": EXPONENT}, "sweeps, a = 1"),
+        ("stiffness", "exponent", "rate", {"gap": GAP}, r"rate: $\sqrt{V}$ over that of the sweep before, State I"),
     )
-    for axes, (x, y, value, fixed, number, title) in zip(panels, planes, strict=True):
-        columns, rows, values = picture.table([c for c in cells if c[fixed] == number], x, y, value)
-        low, high = (0.0, math.log10(_SWEEPS)) if value == "sweeps" else (-4.0, 0.0)
-        image = picture.heat(axes, [f"{c:.2g}" for c in columns], [f"{r:.3g}" for r in rows], values, low, high)
-        axes.set(xlabel=gaps[x], ylabel=gaps[y])
+    scales = {"left": (-20.0, 0.0), "sweeps": (0.0, math.log10(_SWEEPS)), "rate": (-2.0, 0.0)}
+    for axes, (x, y, value, fixed, title) in zip(panels, planes, strict=True):
+        ((key, number),) = fixed.items()
+        columns, rows, values = picture.table([c for c in cells if c[key] == number], x, y, value)
+        image = picture.heat(axes, [f"{c:.2g}" for c in columns], [f"{r:.3g}" for r in rows], values, *scales[value])
+        wording = {"left": lambda one: f"{math.log10(one):.0f}", "sweeps": "{:.0f}".format, "rate": "{:.2f}".format}
+        picture.words(axes, image, values, wording[value])
+        axes.set(xlabel=names[x], ylabel=names[y])
         axes.set_title(title, fontsize=10)
         axes.tick_params(axis="x", rotation=60)
-        figure.colorbar(image, ax=axes, label=f"log₁₀ of the {value}")
-    figure.suptitle(f"Uzawa's loop in one contact at 45°; x: not converged after {_SWEEPS} sweeps", fontsize=11)
+        figure.colorbar(image, ax=axes, label=r"$\log_{10}$" + f" of {title.split(',')[0].split(':')[0]}")
+    figure.suptitle(f"Uzawa's loop in one contact at 45°, {_SWEEPS} sweeps at most; x: not converged", fontsize=11)
     picture.save(figure, cells, "uzawa")

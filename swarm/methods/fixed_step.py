@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from .._jit import by_type, inlined, select
+from .._jit import by_type, inlined, kept, select
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
@@ -132,3 +132,17 @@ def free_steps(chain, gravity, dt, x, y, z, vx, vy, vz, left):
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)
     vx, vy, vz = accelerated(gravity, vx, vy, vz, t)
     return x + dx, y + dy, z + dz, vx, vy, vz, left - steps
+
+
+@inlined
+def taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz):
+    """Where a lane is after its step, if it takes one: (x, y, z, vx, vy, vz, steps left)."""
+    return (
+        select(step, x1, kept(x)),
+        select(step, y1, kept(y)),
+        select(step, z1, kept(z)),
+        select(step, wx, kept(vx)),
+        select(step, wy, kept(vy)),
+        select(step, wz, kept(vz)),
+        left - select(step, 1.0, 0.0),
+    )

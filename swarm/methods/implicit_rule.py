@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, kept, select
+from .._jit import by_type, by_type_outlined, select
 from ..contact import corner, implicit
 from ..gravity import displacement
 from ..status import Status
@@ -101,13 +101,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     inside = not walls.outside(chain, -1.0, x, y, z)
     new = step & inside & (touching | walls.outside(chain, -1.0, x1, y1, z1))
     return (
-        select(step, x1, kept(x)),
-        select(step, y1, kept(y)),
-        select(step, z1, kept(z)),
-        select(step, wx, kept(vx)),
-        select(step, wy, kept(vy)),
-        select(step, wz, kept(vz)),
-        left - select(step, 1.0, 0.0),
+        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz),
         select(touching & (not solved), base.HARD - surface, surface),
         select(step & touching, math.sqrt(kx * kx + ky * ky + kz * kz), 0.0),
         select(new, 1.0, 0.0),

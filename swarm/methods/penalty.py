@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import kept, select
+from .._jit import select
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -132,13 +132,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     e = select(touching, factor, 1.0)
     new = step & touching & (not walls.outside(chain, -1.0, x, y, z))
     return (
-        select(step, x1, kept(x)),
-        select(step, y1, kept(y)),
-        select(step, z1, kept(z)),
-        select(step, wx * e, kept(vx)),
-        select(step, wy * e, kept(vy)),
-        select(step, wz * e, kept(vz)),
-        left - select(step, 1.0, 0.0),
+        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx * e, wy * e, wz * e),
         select(touching & (not solved), base.HARD - surface, surface),
         select(step, abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz), 0.0),
         select(new, 1.0, 0.0),

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .._jit import inlined, kept, select
+from .._jit import inlined, select
 from ..contact.force import add_impulses, force
 from ..gravity import accelerated, displacement
 from ..scene import Scene
@@ -97,13 +97,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     step = (left > 0.0) & (surface > base.HARD)
     new = step & (surface >= 0.0) & (not walls.outside(chain, -1.0, x, y, z))
     return (
-        select(step, x1, kept(x)),
-        select(step, y1, kept(y)),
-        select(step, z1, kept(z)),
-        select(step, wx, kept(vx)),
-        select(step, wy, kept(vy)),
-        select(step, wz, kept(vz)),
-        left - select(step, 1.0, 0.0),
+        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz),
         surface,
         select(step, math.sqrt(kx * kx + ky * ky + kz * kz), 0.0),
         select(new, 1.0, 0.0),
