@@ -24,7 +24,7 @@ _FRAMES = 20
 ROUND_OFF = 1e-12
 
 
-def error(method: type, stiffness: float, exponent: float, particles: swarm.Particles) -> float:
+def error(method: type, exponent: float, stiffness: float, particles: swarm.Particles) -> float:
     """Worst relative energy error of a particle in any frame; infinite where the run ends with an error."""
     depth = SPEED * DT / stiffness
     penalty = (exponent + 1.0) * SPEED**2 / (2.0 * depth ** (exponent + 1.0))
