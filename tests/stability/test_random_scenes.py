@@ -16,13 +16,17 @@ import swarm
 pytestmark = pytest.mark.physics
 
 parts = st.floats(-1.0, 1.0).map(lambda part: round(part, 3))
-lengths = st.sampled_from([1e-6, 0.01, 0.1, 0.5, 1.0, 2.0])
+# No smaller cavities: 8 particles of 30 m/s fly 4 s.
+lengths = st.sampled_from([0.01, 0.1, 0.5, 1.0, 2.0])
+thicknesses = st.sampled_from([1e-9, 1e-4, 0.01, 0.1, 0.5])
 points = st.tuples(parts, parts, parts)
 speeds = st.sampled_from([0.0, 1e-6, 0.3, 1.0, 30.0])
 seeds = st.integers(0, 1000)
 
 
-@given(axes=st.tuples(lengths, lengths, lengths), center=points, normal=points, half=lengths, speed=speeds, seed=seeds)
+@given(
+    axes=st.tuples(lengths, lengths, lengths), center=points, normal=points, half=thicknesses, speed=speeds, seed=seeds
+)
 def test_a_plate_in_an_ellipsoid(axes, center, normal, half, speed, seed):
     """Some are full, some are cut in two, some are not met at all."""
 

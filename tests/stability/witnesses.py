@@ -20,7 +20,7 @@ def shipped(name, number):
     Losses would end the impacts; soft walls and multipliers are not what is witnessed here.
     """
     job = scene_file.read(SCENES / f"{name}.toml")
-    surfaces = [replace(surface, restitution=1.0) for surface in job.scene.surfaces]
+    surfaces = [replace(s, restitution=1.0) if s.restitution < 1.0 else s for s in job.scene.surfaces]
     particles = job.particles()
     few = swarm.Particles(
         *(column[..., :number] for column in (particles.position, particles.velocity, particles.mass))
@@ -29,7 +29,7 @@ def shipped(name, number):
     return swarm.Scene(surfaces, job.scene.gravity), few, method
 
 
-def fly(scene, start, method, impacts, trial=10.0):
+def fly(scene, start, method, impacts, trial=100.0):
     """Run for so many impacts a particle: the result, and how many they were in all."""
     seen = swarm.simulate(scene, start, method, until=trial, every=trial).observables
     until = trial * _SPARE * impacts * len(start) / float(seen["impacts"][-1])
