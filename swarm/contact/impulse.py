@@ -181,12 +181,13 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
     """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
     q0 = surfaces.inner(surface, x, y, z)
     g0, round_off, _tolerance = start_gap(multiplier, surface, x, y, z, q0)
-    f, _df, _g, _dg, _slope = _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, 0.0)
+    f, df, _g, _dg, _slope = _residual(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, 0.0)
     if f == 0.0:
         return 0.0, True
     # A cavity pushes with kappa > 0, a solid with kappa < 0: `sign` mirrors it.
     sign = -1.0 if f > 0.0 else 1.0
-    low, high, found = _bracket(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign, abs(f))
+    first = _first_push(multiplier, abs(f), df)
+    low, high, found = _bracket(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign, first)
     if not found:
         return sign * low, False
     k, previous = low, math.inf
@@ -212,11 +213,30 @@ def careful(law, multiplier, surface, x, y, z, px, py, pz, c):
     return sign * k, False
 
 
+@by_type
+def _first_push(multiplier, size, df):
+    """Where to look for the root first, from |F(0)| and F'(0)."""
+    raise NotImplementedError
+
+
+@_first_push.register(Nothing)
+def _(multiplier, size, df):
+    # Newton's first step, which does not pass the root where the right side of (K) is convex. From its value at 0,
+    # which is past the root of a falling g1, the bracket held the largest of three roots in a step across a long
+    # ellipsoid, where g1 falls and rises again.
+    return size / df if 1.0 < df < math.inf else size
+
+
+@_first_push.register(float)
+def _(multiplier, size, df):
+    # The right side of (K) jumps where a multiplier lets go; Newton's step is no guide to that.
+    return size
+
+
 @outlined
 def _bracket(law, multiplier, surface, x, y, z, px, py, pz, c, q0, g0, round_off, sign, first):
-    """Two sizes of kappa with F < 0 and F >= 0, from F(0) = -`first`, and whether they were found."""
-    # While g1 falls with kappa the right side of (K) is largest at 0, so its value there is past the root; on a chord
-    # across an ellipsoid g1 may rise first. The doubling ends: (K) has F > 0 both far out and before the pole.
+    """Two sizes of kappa with F < 0 and F >= 0, the latter `first` doubled some times, and whether they were found."""
+    # Doubling from below meets the smallest root first, and it ends: (K) has F > 0 both far out and before the pole.
     farthest = abs(surfaces.farthest_push(surface))
     low, high = 0.0, min(first, 0.5 * farthest)
     for _i in range(_DOUBLINGS):

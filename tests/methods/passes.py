@@ -1,4 +1,4 @@
-"""One pass of one particle in plain Python: what lanes.py does for a lane, in the one place that tests share."""
+"""Passes and runs in plain Python: what lanes.py does for a lane, in the one place that tests share."""
 
 from typing import NamedTuple
 from unittest import mock
@@ -6,6 +6,8 @@ from unittest import mock
 import numpy as np
 from conftest import call
 
+import swarm
+from swarm import blocks, observables
 from swarm.contact import energy as energies
 from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
@@ -95,3 +97,19 @@ def run(method, scene, position, velocity, left, mass=1.0, restores=True):
         passes.append(one_pass(method, scene, passes[-1].position, passes[-1].velocity, passes[-1].left, mass, energy))
         assert len(passes) < 5000
     return passes
+
+
+def simulate(scene, particles, method, until, every=None):
+    """`swarm.simulate` without the compiler."""
+    with (
+        mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
+        mock.patch.multiple(
+            observables, start_energies=_plain(observables.start_energies), observe=_plain(observables.observe)
+        ),
+        np.errstate(all="ignore"),
+    ):
+        return swarm.simulate(scene, particles, method, until=until, every=every, threads=1)
+
+
+def _plain(kernel):
+    return getattr(kernel, "py_func", kernel)

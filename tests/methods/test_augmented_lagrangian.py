@@ -8,9 +8,10 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from passes import simulate
 
 import swarm
-from swarm import blocks, observables
+from swarm import blocks
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 SCENES = {
@@ -22,22 +23,6 @@ SCENES = {
 # On the wall after 20 steps of 0.025; and between the 19th and the 20th.
 STATE_ONE = swarm.Particles((0.25, 0.10, 0.0), (0.3, 0.4, 0.0))
 STATE_TWO = swarm.Particles((0.25, 0.10, 0.0), (0.5 * math.sqrt(0.5), 0.5 * math.sqrt(0.5), 0.0))
-
-
-def simulate(scene, particles, method, until, every=None):
-    """`swarm.simulate` without the compiler."""
-    with (
-        mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
-        mock.patch.multiple(
-            observables, start_energies=_plain(observables.start_energies), observe=_plain(observables.observe)
-        ),
-        np.errstate(all="ignore"),
-    ):
-        return swarm.simulate(scene, particles, method, until=until, every=every, threads=1)
-
-
-def _plain(kernel):
-    return getattr(kernel, "py_func", kernel)
 
 
 def method_of(dt=0.025, penalty=1e4, **keywords):

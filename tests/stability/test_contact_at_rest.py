@@ -1,0 +1,59 @@
+"""Resting under gravity: springs never come to rest, and events alone never get past the last bounce; Impact does."""
+
+import math
+
+import numpy as np
+import pytest
+from methods.passes import run
+
+import swarm
+
+pytestmark = pytest.mark.physics
+
+G, ALPHA, DT = 9.81, 1e4, 2.0**-9
+FLOOR = ([0.3, 0.2, 0.0], [0.0, 0.0, 0.0])
+
+
+def floor(restitution=1.0):
+    return swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=restitution)], gravity=(0.0, 0.0, -G))
+
+
+@pytest.mark.parametrize("cls", [swarm.Penalty, swarm.Verlet, swarm.Midpoint, swarm.Trapezoidal])
+def test_springs_never_rest(cls):
+    """Laid on the floor it falls into it, twice as deep as its weight needs, and swings about that depth for ever."""
+    passes = run(cls(DT, ALPHA), floor(), *FLOOR, 512.0)
+    depths = np.array([-one.position[2] for one in passes])
+    assert depths.max() == pytest.approx(2.0 * G / ALPHA, rel=0.02)
+    speeds = np.array([abs(one.velocity[2]) for one in passes])
+    assert speeds[-64:].max() == pytest.approx(G * math.sqrt(1.0 / ALPHA), rel=0.05)
+
+
+def test_impact_rests_at_once():
+    """Not a bit moves, at the cost of one contact a frame."""
+    for time in (2.0, 2e6):
+        passes = run(swarm.Impact(), floor(), *FLOOR, time)
+        assert passes[-1].position.tolist() == FLOOR[0]
+        assert (passes[-1].velocity == 0.0).all()
+        assert len(passes) <= 4
+        assert sum(one.impulse[0] for one in passes) == pytest.approx(G * time, rel=1e-15)
+
+
+def test_events_alone_do_not_get_past_the_last_bounce():
+    """Zeno: with e = 0.9 the bounces after 1 m end at t = sqrt(2h/g) (1 + e)/(1 - e), and there are no fewer than all.
+
+    Flight by flight time stands still before that instant: t + 2v/g == t. Impact goes on from there, at rest.
+    """
+    e = 0.9
+    end = math.sqrt(2.0 / G) * (1.0 + e) / (1.0 - e)
+    time, speed, still = math.sqrt(2.0 / G), e * math.sqrt(2.0 * G), 0
+    for _bounce in range(2000):
+        following = time + 2.0 * speed / G
+        still += following == time
+        time, speed = following, e * speed
+    assert still > 1000
+    assert time == pytest.approx(end, rel=1e-13)
+    passes = run(swarm.Impact(), floor(e), [0.0, 0.0, 1.0], [0.0, 0.0, 0.0], 2.0 * end)
+    assert passes[-1].left == 0.0
+    assert passes[-1].position == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    assert (passes[-1].velocity == 0.0).all()
+    assert len(passes) < 200
