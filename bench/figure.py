@@ -127,8 +127,8 @@ def accuracy(name: str, found: list[Any], front: list[Any], advice: str) -> None
         axes.set_ylim(0.5 * _LEAST, 10.0)
         axes.grid(alpha=0.3, which="major")
     picture.legend(loc="outside lower center", ncols=5, fontsize=9)
-    picture.suptitle(f"{name}: wall time per particle and simulated second, one thread, {machine()}", fontsize=11)
-    picture.supxlabel("\n".join(textwrap.wrap(advice + ".", 150)), fontsize=9)
+    heading = f"{name}: wall time per particle and simulated second, one thread, {machine()}"
+    picture.suptitle("\n".join([heading, *textwrap.wrap(advice + ".", 150)]), fontsize=10)
     path = RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png"
     picture.savefig(path, dpi=100)
     pyplot.close(picture)
