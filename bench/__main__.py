@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, scenes, throughput
+from . import accuracy, bars, compare, endurance, scenes, throughput
 from .peers import race
 
 
@@ -16,6 +16,7 @@ def main() -> None:
     commands.add_parser("accuracy", help="work-precision diagrams of every method, a picture a scene")
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
+    commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
     for command in commands.choices.values():
         command.add_argument(
@@ -27,7 +28,14 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.command == "compare":
         sys.exit(compare.main(arguments.old, arguments.new))
-    reports = {"accuracy": accuracy, "throughput": throughput, "bars": bars, "peers": race, "scenes": scenes}
+    reports = {
+        "accuracy": accuracy,
+        "throughput": throughput,
+        "bars": bars,
+        "peers": race,
+        "scenes": scenes,
+        "endurance": endurance,
+    }
     reports[arguments.command].main(quick=arguments.quick)
 
 
