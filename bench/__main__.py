@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, scenes, stability, throughput
+from . import accuracy, bars, compare, endurance, scenes, stability, throughput
 from .peers import race
 
 
@@ -17,6 +17,7 @@ def main() -> None:
     commands.add_parser("stability", help="maps of where methods fail: stiffness, Uzawa's loop, thin solids, grazing")
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
+    commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
     for command in commands.choices.values():
         command.add_argument(
@@ -35,6 +36,7 @@ def main() -> None:
         "bars": bars,
         "peers": race,
         "scenes": scenes,
+        "endurance": endurance,
     }
     reports[arguments.command].main(quick=arguments.quick)
 

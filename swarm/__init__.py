@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
-    from .errors import FileError, RunError, SceneError, SwarmError
+    from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 _HOMES = {
-    "errors": ("FileError", "RunError", "SceneError", "SwarmError"),
+    "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
@@ -66,6 +66,7 @@ __all__ = [
     "AugmentedLagrangian",
     "Box",
     "Capsule",
+    "CompleteError",
     "Cone",
     "ContactHistory",
     "Cylinder",
@@ -92,6 +93,7 @@ __all__ = [
     "Trajectory",
     "Trapezoidal",
     "Verlet",
+    "WallTimeError",
     "__version__",
     "contact_history",
     "fill",

@@ -27,6 +27,7 @@ from .lanes import (
     following_particle,
     keep_failure,
     lanes_in,
+    leave,
     load,
     move,
     retire,
@@ -48,12 +49,13 @@ class Hard(NamedTuple):
 
 
 @kernel
-def advance_block(method, chain, gravity, hard, state, done, span, draws, halt, room):
+def advance_block(method, chain, gravity, hard, state, done, halted, span, draws, halt, room):
     """Advance what `draws` gives by `span` and return (status, particle, drawn): DONE, or the first that failed.
 
     `drawn` is how many draws that were; `span` is in the method's unit; `room` is any. `halt[0]` set to 1 by another
-    thread ends it at its next pass. Particles that are `done` are left alone, and those that arrive become it: where
-    `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
+    thread ends it at its next pass: (INTERRUPTED, live lanes, drawn), and `room` has what these held, which the next
+    call takes as `halted`. Particles that are `done` are left alone, and those that arrive become it: where `hard` is
+    None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     """
     lanes = lanes_in(room, chain)
     following, stop, drawn, live = 0, 0, 0, 0
@@ -61,12 +63,13 @@ def advance_block(method, chain, gravity, hard, state, done, span, draws, halt, 
         following, stop, drawn = following_particle(draws, done, following, stop, drawn)
         if following == stop:
             break
-        load(method, lanes, live, state, following, span)
+        load(method, lanes, live, state, halted, following, span)
         following += 1
         live += 1
     while live > 0:
         if halt[0] != 0:
-            return Status.INTERRUPTED.value, 0, drawn
+            leave(lanes, live, room.left_behind)
+            return Status.INTERRUPTED.value, live, drawn
         _fly(method, chain, gravity, lanes, live)
         solve(methods.unknown(method), method, chain, gravity, state.multipliers, lanes, live)
         retired, hard_lanes = _contact(method, chain, gravity, lanes, live)
@@ -86,7 +89,7 @@ def advance_block(method, chain, gravity, hard, state, done, span, draws, halt, 
             done[lanes.particle[lane]] = True
             following, stop, drawn = following_particle(draws, done, following, stop, drawn)
             if following < stop:
-                load(method, lanes, lane, state, following, span)
+                load(method, lanes, lane, state, halted, following, span)
                 following += 1
             else:
                 live -= 1

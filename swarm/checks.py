@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,6 +14,7 @@ from .errors import SceneError
 Vector = tuple[float, float, float]
 # Lengths whose squares and inverse squares are numbers.
 _SHORTEST, _LONGEST = 1e-100, 1e100
+_SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
@@ -60,6 +62,15 @@ def count(name: str, value: Any, least: int = 1) -> int:
     if result < least:
         raise SceneError(f"{name} must be {least} or more, got {result}")
     return result
+
+
+def duration(name: str, value: str) -> float:
+    """A time such as "2h", "1h30m", "45 min" or "90" (seconds), in seconds above 0."""
+    parts = re.findall(r"(\d+\.?\d*)\s*([a-z]*)\s*", value)
+    known = all(unit in _SECONDS for _number, unit in parts)
+    if not known or not re.fullmatch(r"(\d+\.?\d*\s*[a-z]*\s*)+", value):
+        raise SceneError(f'{name} must be a time such as "2h", "1h30m" or "90s", got {value!r}')
+    return positive(name, sum(float(number) * _SECONDS[unit] for number, unit in parts))
 
 
 def flag(name: str, value: Any) -> bool:

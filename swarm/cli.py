@@ -1,12 +1,13 @@
 """The commands. No physics, and no heavy import before it is needed: --help must be fast."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import SceneError, SwarmError
+from .errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .version import VERSION
 
 if TYPE_CHECKING:
@@ -51,15 +52,24 @@ def run(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing trajectory.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint, if there is one.")] = False,
+    walltime: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The summary as JSON.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
     from . import scene_file as files
-    from .output.trajectory import check_target
+    from .checks import duration
+    from .output.storage import Storage
+    from .output.writer import check_target
 
     job = files.read(scene_file)
     target = output or Path(job.run.trajectory or scene_file.with_suffix(".h5").name)
+    limit = None if walltime is None else duration("--walltime", walltime)
     # Before particles are made and kernels compiled.
-    check_target(target, overwrite)
+    Storage(job.run.frames, job.run.precision, job.run.compression)
+    check_target(target, overwrite or resume)
 
     from .simulation import simulate
 
@@ -76,12 +86,44 @@ def run(
             progress=not quiet,
             overwrite=overwrite,
             scene_text=job.text,
+            frames=job.run.frames,
+            precision=job.run.precision,
+            compression=job.run.compression,
+            checkpoint=job.run.checkpoint,
+            resume=resume,
+            walltime=limit,
         )
     except KeyboardInterrupt:
-        print(f"interrupted: {target} holds the frames that were finished", file=sys.stderr)
+        _stopped("interrupted", target, as_json)
         raise typer.Exit(_INTERRUPTED) from None
-    if not quiet:
+    except WallTimeError:
+        _stopped("walltime", target, as_json)
+        return
+    except CompleteError as told:
+        print(told, file=sys.stderr)
+        return
+    if as_json:
+        _json("complete", target, wall_time=result.wall_time)
+    elif not quiet:
         _summary(result, particles.volume)
+
+
+def _stopped(why: str, target: Path, as_json: bool) -> None:
+    """Say how to go on with a run that was stopped."""
+    again = [word for word in sys.argv[1:] if word not in ("--overwrite", "--resume")]
+    command = shlex.join(["swarm", *again, "--resume"])
+    reason = "interrupted" if why == "interrupted" else "the wall time is over"
+    print(f"{reason}: {target} holds the frames that were finished; go on with\n  {command}", file=sys.stderr)
+    if as_json:
+        _json(why, target, resume=command)
+
+
+def _json(status: str, target: Path, **more: Any) -> None:
+    import json
+
+    from .summary import numbers
+
+    print(json.dumps({**numbers(status, target), **more}, indent=2))
 
 
 @app.command(epilog="Example:  swarm info cavity.h5")
@@ -112,14 +154,14 @@ def _call(described: Any) -> str:
 
 def _figures(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that say whether a run went well."""
-    energy = seen["total_energy"]
+    from .observables import drift
+
     escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
     lost = seen.get("dissipated_energy", [0.0])[-1]
-    dissipated = {"dissipated": f"{lost:.4g} J of {energy[0]:.4g} J"} if lost else {}
-    drift = abs(energy[-1] + lost - energy[0]) / abs(energy[0]) if energy[0] else abs(energy[-1] + lost)
+    dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
     return {
         "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
-        "energy drift": f"{drift:.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
+        "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
         "largest penetration": f"{seen['max_penetration'].max():.1e} m",
         **dissipated,
         **escaped,

@@ -1,15 +1,18 @@
-"""SIGINT while a run is under way."""
+"""SIGINT and SIGTERM while a run is under way."""
 
 import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import Any
+
+_DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
 @contextlib.contextmanager
 def taken_by(stop: Callable[[], None]) -> Iterator[None]:
-    """Let the first SIGINT call `stop`; a second one raises KeyboardInterrupt at once, as Python does.
+    """Let the first SIGINT or SIGTERM call `stop`; after it both do at once what they do in Python.
 
     Python raises KeyboardInterrupt between any two of its instructions. Where that is inside a callback of the garbage
     collector, which runs often while Numba compiles, the exception is printed and lost, and the run goes on.
@@ -17,17 +20,20 @@ def taken_by(stop: Callable[[], None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted
         return
-    before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield  # the caller has a handler of his own, or ignores the signal
-        return
+    # The others the caller handles himself, or ignores.
+    taken = [number for number, default in _DEFAULTS.items() if signal.getsignal(number) is default]
+
+    def give_back() -> None:
+        for number in taken:
+            signal.signal(number, _DEFAULTS[number])
 
     def handle(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, before)
+        give_back()
         stop()
 
-    signal.signal(signal.SIGINT, handle)
+    for number in taken:
+        signal.signal(number, handle)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        give_back()

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import Array, by_type_outlined, inlined, next_of
+from ._jit import Array, by_type_outlined, inlined, next_of, outlined
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
@@ -46,6 +46,17 @@ class Room(NamedTuple):
     time: Array
     particle: Array
     arrived: Array
+    left_behind: Array  # (ROWS + walls, LANES) what the lanes hold when a halt ends the block
+
+
+class Halted(NamedTuple):
+    """Particles that a halt caught on their way: what their lanes held between two passes, one a column.
+
+    Their way cannot be cut in two: a flight that ends at the halt and one that goes on from there are rounded twice.
+    """
+
+    particle: Array  # int64, in order
+    rows: Array  # (ROWS + walls, particles) the lane's rows, then its impulses
 
 
 class Draws(NamedTuple):
@@ -61,7 +72,7 @@ class Draws(NamedTuple):
     mine: Array  # the draws of this thread, in order
 
 
-def room() -> Room:
+def room(walls: int) -> Room:
     """Room for one block."""
     return Room(
         np.empty(_STRIDE),
@@ -72,7 +83,13 @@ def room() -> Room:
         np.empty(_STRIDE),
         np.empty(_STRIDE, np.int64),
         np.empty(_STRIDE, np.int64),
+        np.empty((ROWS + walls, LANES)),
     )
+
+
+def nobody(walls: int) -> Halted:
+    """No particle was halted."""
+    return Halted(np.empty(0, np.int64), np.empty((ROWS + walls, 0)))
 
 
 @inlined
@@ -118,9 +135,12 @@ def following_particle(draws, done, i, stop, drawn):
 
 
 @inlined
-def load(method, lanes, lane, state, i, span):
-    """Particle i into a lane."""
+def load(method, lanes, lane, state, halted, i, span):
+    """Particle i into a lane, as it starts the frame, or as a halt left it."""
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
+    particle[lane] = i
+    if halted.particle.size > 0 and _pick_up(lanes, lane, halted, i):
+        return
     position, velocity = state.position, state.velocity
     for axis in range(3):
         rows[X + axis, lane] = position[axis, i]
@@ -132,7 +152,35 @@ def load(method, lanes, lane, state, i, span):
     rows[LEFT, lane], rows[HITS, lane] = span, 0.0
     for s in range(impulse.shape[0]):
         impulse[s, lane] = 0.0
-    particle[lane] = i
+
+
+@outlined
+def _pick_up(lanes, lane, halted, i):
+    """What a halt left of particle i into a lane; whether there is any."""
+    first, last = 0, halted.particle.size
+    while first < last:
+        middle = (first + last) // 2
+        if halted.particle[middle] < i:
+            first = middle + 1
+        else:
+            last = middle
+    if first == halted.particle.size or halted.particle[first] != i:
+        return False
+    for row in range(ROWS):
+        lanes.rows[row, lane] = halted.rows[row, first]
+    for s in range(lanes.impulse.shape[0]):
+        lanes.impulse[s, lane] = halted.rows[ROWS + s, first]
+    return True
+
+
+@outlined
+def leave(lanes, live, left_behind):
+    """The live lanes, between two passes: what one pass leaves for the next."""
+    for lane in range(live):
+        for row in range(ROWS):
+            left_behind[row, lane] = lanes.rows[row, lane]
+        for s in range(lanes.impulse.shape[0]):
+            left_behind[ROWS + s, lane] = lanes.impulse[s, lane]
 
 
 @inlined

@@ -136,6 +136,13 @@ def _(gravity, chain, x, y, z, vx, vy, vz):
     return (time == np.inf) & (vx * vx + vy * vy + vz * vz > 0.0)
 
 
+def drift(seen: dict[str, Any]) -> float:
+    """Change of the total energy over a run, what was dissipated included; relative, if there was any at the start."""
+    energy, lost = seen["total_energy"], seen["dissipated_energy"]
+    change = abs(energy[-1] + lost[-1] - energy[0])
+    return float(change / abs(energy[0]) if energy[0] else change)
+
+
 def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise.
 

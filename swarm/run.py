@@ -3,10 +3,11 @@
 import functools
 import math
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import blocks, lanes, observables
 from .errors import RunError
@@ -17,6 +18,8 @@ from .status import Status
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
+# A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
+_OUTSIDE = 1e-9
 # The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it is free
 # to take an interrupt.
 _SHORT_FRAME = 0.05
@@ -46,7 +49,8 @@ class Run:
         )
         self._far = _FAR * scene.extent() if scene.is_open() else math.inf
         self._too_fast = functools.partial(method.too_fast, scene)
-        self._failure, self._owners = method.failure, scene.owners()
+        self._failure, self._owners, self._scene = method.failure, scene.owners(), scene
+        self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
@@ -57,6 +61,8 @@ class Run:
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._halt = np.zeros(1, np.int8)
         self._done = np.zeros(n, np.bool_)
+        self._halted = lanes.nobody(len(self._owners))
+        self._cut_short = False
         self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
@@ -70,19 +76,24 @@ class Run:
         self._pool.shutdown(wait=True)
 
     def halt(self) -> None:
-        """Let the kernels return before their frame is done, and `advance` raise KeyboardInterrupt."""
+        """Let the kernels return before their frame is done."""
         self._halt[0] = 1
 
-    def advance(self, span: float, moment: float, writing: float = 0.0) -> None:
-        """Advance every particle by `span` in the method's unit, and observe it; `writing` a frame takes seconds."""
-        self._done.fill(False)
-        status, particle = self._all_shares(span, writing)
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
+
+        If not, `halt` was called, or `latest` has come [s of time.monotonic], and the next call goes on with the frame,
+        bit by bit as if it had not been cut short. `writing` a frame takes seconds.
+        """
+        if not self._cut_short:
+            self._done.fill(False)
+        status, particle = self._all_shares(span, writing, latest)
         if status == Status.HARD_CONTACT:
             self._hard = blocks.Hard(blocks.MOST_HITS)
-            status, particle = self._all_shares(span, writing)
-        if self._halt[0]:
-            raise KeyboardInterrupt
-        if status != Status.DONE:
+            status, particle = self._all_shares(span, writing, latest)
+        self._cut_short = status == Status.INTERRUPTED
+        self._halt[0] = 0
+        if status not in (Status.DONE, Status.INTERRUPTED):
             told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
             if status == Status.TOO_FAST:
                 told += f", {self._too_fast()}"
@@ -91,13 +102,14 @@ class Run:
                 left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
                 told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
             raise RunError(told)
+        return not self._cut_short
 
     def observe(self) -> None:
         """Observe the start."""
         self._done.fill(True)
         self._all_shares(0.0)
 
-    def _all_shares(self, span: float, writing: float = 0.0) -> tuple[int, int]:
+    def _all_shares(self, span: float, writing: float = 0.0, latest: float = math.inf) -> tuple[int, int]:
         """Every particle that is not done by `span`, all threads: the worst (status, particle)."""
         self._ticket[0] = 0
         # The caller's thread is one of them, unless it has to be free.
@@ -109,25 +121,59 @@ class Run:
         others = threads - helps if work > _LITTLE_WORK else 0
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
-        mine = [self._share(span)] if helps else []
-        worst = max(mine + [share.result() for share in shares])
-        if span > 0.0:
+        ends = [self._share(span)] if helps else []
+        if latest < math.inf and wait(shares, max(0.0, latest - time.monotonic())).not_done:
+            self.halt()
+        ends += [share.result() for share in shares]
+        status, particle, _ = max(ends, key=lambda end: end[:2])
+        if status == Status.INTERRUPTED:
+            self._keep([left for *_, left in ends if left is not None])
+        elif span > 0.0:
+            self._halted = lanes.nobody(len(self._owners))
             self._pace = (time.perf_counter() - began) * (others + helps) / span
-        return worst
+        return status, particle
 
-    def _share(self, span: float) -> tuple[int, int]:
-        """What one thread draws, advanced and observed."""
+    def _keep(self, left_behind: list[lanes.Halted]) -> None:
+        """What a halt left in the lanes, and what an earlier one left that no lane has picked up since."""
+        picked_up = np.concatenate([np.flatnonzero(self._done), *(left.particle for left in left_behind)])
+        waiting = ~np.isin(self._halted.particle, picked_up)
+        parts = [lanes.Halted(self._halted.particle[waiting], self._halted.rows[:, waiting]), *left_behind]
+        particle = np.concatenate([part.particle for part in parts])
+        order = np.argsort(particle)
+        rows = np.concatenate([part.rows for part in parts], axis=1)[:, order]
+        self._halted = lanes.Halted(particle[order], np.ascontiguousarray(rows))
+
+    def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
+        """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
+        room = lanes.room(len(self._owners))
         draws = lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64))
         # Without the compiler too, a division by zero is an infinity that a select throws away.
         with np.errstate(divide="ignore", invalid="ignore"):
             status, particle, drawn = blocks.advance_block(
-                self._method, self._chain, self._gravity, self._hard, self.state, self._done, span, draws,
-                self._halt, lanes.room(),
+                self._method, self._chain, self._gravity, self._hard, self.state, self._done, self._halted,
+                span, draws, self._halt, room,
             )  # fmt: skip
             if status == Status.DONE:
                 mine = draws.mine[:drawn]
                 observables.observe(self._law, self._chain, self._gravity, self.state, mine, self._size, self._partial)
-        return status, particle
+        if status != Status.INTERRUPTED:
+            return status, particle, None
+        live, particle = particle, 0
+        return status, particle, lanes.Halted(room.particle[:live].copy(), room.left_behind[:, :live].copy())
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All that `restore` needs for a run to go on bit by bit, not copied; between two calls of `advance`."""
+        arrays: dict[str, NDArray[Any]] = {"done": self._done, **_named("halted", self._halted)}
+        for name, array in self.state._asdict().items():
+            arrays |= _named(name, array) if isinstance(array, Multipliers) else {name: array}
+        return {name: array for name, array in arrays.items() if array is not None}
+
+    def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
+        """Be as the run was that gave these `arrays`, at a frame or, `cut_short`, on the way to the next."""
+        self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
+        for name, array in self.arrays().items():
+            np.copyto(array, arrays[name], casting="no")
+        self._cut_short = cut_short
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
@@ -138,15 +184,33 @@ class Run:
                 escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self.state))
         return {**seen, "escaped": escaped}
 
-    def require_finite(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError that names the first particle whose state is not finite."""
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
         # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
-        if math.isfinite(seen["total_energy"] + seen["angular_momentum"].sum()):
-            return
-        good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
-        raise RunError(
-            f"the frame at {moment:g} s failed at particle {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}"
-        )
+        if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+            good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
+            raise RunError(
+                f"the frame at {moment:g} s failed at particle {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}"
+            )
+        if seen["max_penetration"] > self._deepest:
+            self._require_inside(moment)
+
+    def _require_inside(self, moment: float) -> None:
+        # Far out in an open scene a position is as exact as its own size.
+        distances = self._scene.distances_outside(self.state.position)
+        magnitude = np.maximum(np.abs(self.state.position).max(axis=0), self._scene.finite_size())
+        outside = distances > self._deepest / self._scene.finite_size() * magnitude
+        if outside.any():
+            wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
+            raise RunError(
+                f"the frame at {moment:g} s failed at particle {particle}: it is {distances[wall, particle]:.3g} m "
+                f"outside surfaces[{wall}] ({type(self._scene.surfaces[wall]).__name__})"
+            )
+
+
+def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
+    """The arrays of a NamedTuple under dotted names."""
+    return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
 
 
 def _no_sweeps(n: int) -> Multipliers:

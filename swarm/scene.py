@@ -102,6 +102,11 @@ class Scene:
         rows = checks.array("points", points)
         return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
 
+    def distances_outside(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
+        slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
+        return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
+
     def is_open(self) -> bool:
         """Whether a particle may fly to infinity."""
         return not np.isfinite(self.bounds()).all()

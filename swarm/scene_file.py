@@ -32,12 +32,16 @@ class ParticlesTable:
 
 @dataclass(frozen=True)
 class RunTable:
-    """[run]: until when, how often to look, where to write."""
+    """[run]: until when, how often to look, where and what to write."""
 
     until: float
     every: float | None = None
     threads: int | None = None
     trajectory: str | None = None
+    frames: str | int = "all"
+    precision: str = "float64"
+    compression: str = "none"
+    checkpoint: float = 60.0
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import os
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +14,11 @@ from numpy.typing import NDArray
 from . import checks, interrupt
 from .errors import SceneError
 from .methods.base import Method
+from .output.storage import Storage
 from .particles import Multipliers, Particles
 from .run import Run
 from .scene import Scene
+from .sessions import Session
 
 if TYPE_CHECKING:
     from .output.beside import Beside
@@ -37,6 +38,7 @@ class Frame:
     time: float
     until: float
     observables: dict[str, Any]
+    written: int = 0  # frames that the trajectory holds for sure
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Result:
         particles: the particles at `until`.
         observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
             (frames, surfaces).
-        wall_time: seconds the run took, compilation included.
+        wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, what their loops took of each particle; else None.
     """
@@ -73,15 +75,22 @@ def simulate(
     overwrite: bool = False,
     scene_text: str | None = None,
     block_size: int | None = None,
+    frames: str | int = "all",
+    precision: str = "float64",
+    compression: str = "none",
+    checkpoint: float | None = None,
+    resume: bool = False,
+    walltime: float | None = None,
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
         check everything
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
-            observe; stop if a number is not finite
+            observe; stop if a number is not finite, or a particle outside rigid walls
             copy the frame; a thread beside writes and flushes it
             tell the progress display
+            save a checkpoint if one is due (within a long frame too)
 
     Args:
         scene: the walls and gravity.
@@ -97,15 +106,23 @@ def simulate(
         overwrite: replace an existing trajectory.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes on at once. Results do not depend on it.
+        frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
+        precision: "float64", or "float32" for frames of half the size; observables and checkpoints stay exact.
+        compression: of the frames, "none", "gzip" or "lzf".
+        checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none is made. It lies beside
+            the trajectory, as TRAJECTORY.checkpoint, until the run is complete.
+        resume: go on from that checkpoint, if there is one, with the same bits as if the run had never stopped.
+        walltime: seconds of wall time after which the run stops.
 
     Returns:
         A `Result`.
 
     Raises:
-        SceneError: bad input; nothing has run or been written.
+        SceneError: bad input, or a checkpoint of another run; nothing has run or been written.
         FileError: the trajectory exists or cannot be written.
         RunError: a step failed; the frames before it are in the trajectory.
-        KeyboardInterrupt: SIGINT came; the frames before it are in the trajectory.
+        KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
+        WallTimeError: the wall time is over; the frames before it are in the trajectory.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -113,7 +130,8 @@ def simulate(
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    started = time.perf_counter()
+    target = None if trajectory is None else Path(trajectory)
+    session = Session(target, checkpoint, resume, walltime)
     times = _frame_times(until, every)
     threads = _threads(threads)
     if block_size is not None:
@@ -127,36 +145,69 @@ def simulate(
 
     from .progress import display  # rich is imported only when it is shown
 
+    storage = Storage(frames, precision, compression)
+    session.prepare(scene, method, storage, particles, until, overwrite)
+
     run = Run(scene, particles, method, threads, block_size)
+    session.restore(run)
     history: list[dict[str, Any]] = []
-    writer = _output(trajectory, overwrite, scene, method, particles, scene_text)
+    writer = None if target is None else _output(target, storage, scene, method, particles, scene_text, session.first)
     writing = writer or contextlib.nullcontext(lambda *frame: None)
-    with run, interrupt.taken_by(run.halt), writing as write, display(progress) as show:
-        now = method.span("time", 0.0)
-        for number, moment in enumerate(times):
-            clock = method.span("time", moment)
-            if number > 0:
-                run.advance(clock - now, moment, writer.seconds if writer else 0.0)
-            else:
-                run.observe()
-            now = clock
+
+    def stop() -> None:
+        session.stop()
+        run.halt()
+
+    with run, interrupt.taken_by(stop), writing as write, display(progress) as show:
+        for number, before, moment in times:
+            session.require_same_time(number, moment)
+            if number < session.first:
+                continue
+            _reach(run, session, writer, method, number, before, moment)
             seen = {"time": moment, **run.seen()}
-            run.require_finite(seen, moment)
-            history.append(seen)
+            run.require_admissible(seen, moment)
+            if target is None:
+                history.append(seen)
             write(number, moment, run.state, seen)
-            show(Frame(number, moment, until, seen))
-    columns = {name: np.array([seen[name] for seen in history]) for name in history[0]}
+            show(Frame(number, moment, until, seen, writer.written if writer else 0))
+            if moment < until:
+                session.look(run, writer, number, moment, None)
+    session.finish()
     return Result(
         Particles.of(run.state),
-        columns,
-        time.perf_counter() - started,
-        None if trajectory is None else Path(trajectory),
+        _columns(history) if target is None else _read_back(target),
+        session.wall_time(),
+        target,
         run.state.multipliers,
     )
 
 
-def _frame_times(until: float, every: float | None) -> Iterator[float]:
-    """0, every, 2 every, ..., until."""
+def _reach(
+    run: Run, session: Session, writer: "Beside | None", method: Method, number: int, before: float, moment: float
+) -> None:
+    """Advance from one frame to the next, and observe it; the first is the start."""
+    if number == 0:
+        run.observe()
+        return
+    span = method.span("time", moment) - method.span("time", before)
+    while not run.advance(span, moment, writer.seconds if writer else 0.0, session.latest):
+        session.look(run, writer, number - 1, before, moment)
+
+
+def _columns(history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
+    return {name: np.array([seen[name] for seen in history]) for name in history[0]}
+
+
+def _read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
+    """All frames of all sessions. They are not kept in memory too, which would grow without end."""
+    from .output.trajectory import load
+
+    with load(trajectory) as written:
+        return written.observables
+
+
+def _frame_times(until: float, every: float | None) -> Iterator[tuple[int, float, float]]:
+    """0, every, 2 every, ..., until: number, the time before, the time."""
     end = checks.number("until", until)
     if end <= 0.0:
         raise SceneError(f"until must be after the start, 0 s, got {end:g}")
@@ -164,12 +215,13 @@ def _frame_times(until: float, every: float | None) -> Iterator[float]:
     if gap > end:
         raise SceneError(f"every must be at most until = {end:g}, got {gap:g}")
 
-    def times() -> Iterator[float]:
-        number = 0
+    def times() -> Iterator[tuple[int, float, float]]:
+        number, before = 0, 0.0
         while number * gap < end - _SAME_TIME * gap:
-            yield number * gap
+            yield number, before, number * gap
+            before = number * gap
             number += 1
-        yield end
+        yield number, before, end
 
     return times()
 
@@ -188,7 +240,7 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
     method.check(scene, particles)
     method.span("until", until)
     method.span("every", until if every is None else every)
-    distances = _distances_outside(scene, particles)
+    distances = scene.distances_outside(particles.position)
     outside = distances.max(axis=0) > _ON_THE_WALL * _magnitude(scene, particles)
     if outside.any():
         first = int(np.argmax(outside))
@@ -201,30 +253,23 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
         )
 
 
-def _distances_outside(scene: Scene, particles: Particles) -> NDArray[np.float64]:
-    """Gap over its gradient for every surface and particle."""
-    gaps = scene.gaps(particles.position)
-    slopes = [np.sqrt((surface.gradient(particles.position) ** 2).sum(axis=0)) for surface in scene.surfaces]
-    return np.asarray(gaps / np.maximum(slopes, np.finfo(np.float64).tiny))
-
-
 def _magnitude(scene: Scene, particles: Particles) -> float:
     """The size whose round-off a position on a wall has."""
     return max(float(np.abs(particles.position).max()), scene.finite_size())
 
 
 def _output(
-    path: str | os.PathLike[str] | None,
-    overwrite: bool,
+    path: Path,
+    storage: Storage,
     scene: Scene,
     method: Method,
     particles: Particles,
     scene_text: str | None,
-) -> "Beside | None":
+    first: int,
+) -> "Beside":
     """A context that gives the function which writes a frame."""
-    if path is None:
-        return None
     from .output.beside import Beside
-    from .output.trajectory import TrajectoryWriter  # h5py takes 0.2 s to import
+    from .output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    return Beside(TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text), len(particles))
+    file = TrajectoryWriter(path, storage, scene, method, particles, scene_text, first > 0)
+    return Beside(file, len(particles), storage.kept())

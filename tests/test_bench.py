@@ -79,6 +79,12 @@ def test_stability_quick():
     assert "grazing: Impact, angles down to 1e-12 rad: energy within" in told
 
 
+def test_endurance_quick():
+    told = report("endurance")
+    for row in ("checkpoint of 1000 particles", "memory grown", "a particle's path"):
+        assert row in told
+
+
 def table(path, **rows):
     """A report with these (min, median, unit)."""
     lines = [f'"{what}",{best},{median},{unit},,' for what, (best, median, unit) in rows.items()]

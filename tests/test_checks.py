@@ -77,3 +77,16 @@ def test_listed(names, text):
 def test_closest():
     assert checks.closest("raduis", ["radius", "center"]) == "; did you mean 'radius'?"
     assert checks.closest("zzz", ["radius", "center"]) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("90", 90.0), ("2h", 7200.0), ("1h30m", 5400.0), ("1.5 min", 90.0), ("1d 2s", 86402.0)]
+)
+def test_durations(text, seconds):
+    assert checks.duration("t", text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "h", "2 weeks", "-1h", "1h-", "0s", "nan"])
+def test_bad_durations_are_named(text):
+    with pytest.raises(SceneError, match="t must be"):
+        checks.duration("t", text)

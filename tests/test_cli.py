@@ -1,5 +1,6 @@
 """The commands as a user types them, in processes of their own."""
 
+import json
 import os
 import signal
 import subprocess
@@ -124,3 +125,46 @@ def test_interrupt_keeps_finished_frames(folder, request):
     with swarm.load(folder / "scene.h5") as trajectory:
         assert len(trajectory) >= frames >= 5
         assert len(trajectory.frame(-1)) == 10
+
+
+def test_wall_time_and_resume(folder):
+    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits."""
+    text = GOOD.replace("until = 1.0", "until = 8e6").replace("every = 0.5", "every = 2e6")
+    (folder / "scene.toml").write_text(text)
+    first = command("run", "scene.toml", "--walltime", "0.2s", "--json", cwd=folder)
+    assert first.returncode == 0
+    assert "the wall time is over" in first.stderr
+    told = json.loads(first.stdout)
+    assert told["status"] == "walltime"
+    assert told["resume"] == "swarm run scene.toml --walltime 0.2s --json --resume"
+    assert (folder / "scene.h5.checkpoint").exists()
+    assert command("run", "scene.toml", cwd=folder).returncode == 2
+    second = command("run", "scene.toml", "--resume", "--json", cwd=folder)
+    told = json.loads(second.stdout)
+    assert (second.returncode, second.stderr) == (0, "")
+    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 8e6, 10)
+    assert told["impacts"] > 5e7
+    assert told["energy_error"] < 1e-14
+    assert sorted(path.name for path in folder.iterdir()) == ["scene.h5", "scene.toml"]
+    third = command("run", "scene.toml", "--resume", cwd=folder)
+    assert (third.returncode, third.stdout) == (0, "")
+    assert "is complete" in third.stderr
+    command("run", "scene.toml", "-o", "whole.h5", cwd=folder)
+    with swarm.load(folder / "scene.h5") as one, swarm.load(folder / "whole.h5") as other:
+        assert (one.frame(-1).position == other.frame(-1).position).all()
+        for name, values in other.observables.items():
+            assert (one.observables[name] == values).all()
+
+
+def test_bad_wall_time_is_named(folder):
+    done = command("run", "scene.toml", "--walltime", "soon", cwd=folder)
+    assert done.returncode == 2
+    assert """--walltime must be a time such as "2h", "1h30m" or "90s", got 'soon'""" in done.stderr
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="a folder in which not even root can write")
+def test_a_read_only_folder_is_exit_code_1(folder):
+    done = command("run", "scene.toml", "-o", "/proc/self/scene.h5", cwd=folder)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: cannot write the trajectory /proc/self/scene.h5:")
+    assert len(done.stderr.splitlines()) == 1

@@ -38,6 +38,10 @@ class Method:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
         return duration
 
+    def is_rigid(self) -> bool:
+        """Whether a particle outside its walls by more than round-off is an error, and no wall that gives way."""
+        return False
+
     def has_multipliers(self) -> bool:
         """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
         return False

@@ -68,6 +68,9 @@ class Impact(base.Method):
                 "the contact step conserves the energy"
             )
 
+    def is_rigid(self) -> bool:
+        return True
+
     def seldom_hard(self, scene: Scene) -> bool:
         # In one smooth cavity only what grazes is: one launch in 1e9, if none is aimed.
         return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid() and scene.gravity is None

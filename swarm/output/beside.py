@@ -4,16 +4,15 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..particles import State
-from .trajectory import WriteFrames, Written
+from .writer import WriteFrames, Written
 
-# Frames are written many at once, up to the end of a chunk of the file (`_CHUNK` in trajectory.py): of 10 000 particles
+# Frames are written many at once, up to the end of a chunk of the file (`_CHUNK` in writer.py): of 10 000 particles
 # one alone takes 2.5 ms, ten take 0.9 ms each. None waits for others longer than this [s].
 _CHUNK_FRAMES = 10
 _PATIENCE = 0.05
@@ -25,15 +24,31 @@ _BYTES = 1 << 26
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
+class Writer(Protocol):
+    """A context that gives a function which writes frames."""
+
+    def __enter__(self) -> WriteFrames: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool | None: ...
+
+    def sync(self) -> None:
+        """Let all that was written reach the disk."""
+
+
 class Beside:
     """A context whose function returns when the frame is copied; the one it takes writes all that wait, at once.
 
-    When the context ends, every frame is written. What writing raised is raised by the next frame, or at the end.
+    When the context ends, every frame is written. What writing raised is raised by the next frame, or at the end. Of n
+    particles those are copied that are `kept`.
     """
 
-    def __init__(self, writer: AbstractContextManager[WriteFrames], n: int) -> None:
-        self._writer = writer
-        self._frames: queue.SimpleQueue[Written | None] = queue.SimpleQueue()
+    def __init__(self, writer: Writer, n: int, kept: slice = slice(None)) -> None:
+        self._writer, self._kept = writer, kept
+        n = max(1, len(range(n)[kept]))
+        # An event asks for everything before it, and is set when that is written; None is the end.
+        self._frames: queue.SimpleQueue[Written | threading.Event | None] = queue.SimpleQueue()
         # What bounds the other queue: a frame needs one of these.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
         copies = max(1, min(_COPIES, _BYTES // (48 * n)))
@@ -44,6 +59,8 @@ class Beside:
         self._problem: BaseException | None = None
         # What a frame takes to write [s], lately.
         self.seconds = 0.0
+        # Frames that are written.
+        self.written = 0
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
 
     def __enter__(self) -> WriteFrame:
@@ -65,33 +82,46 @@ class Beside:
         copy = self._copies.get()
         if self._problem is not None:
             raise self._problem
+        position, velocity = state.position[:, self._kept], state.velocity[:, self._kept]
         if copy is None:
-            copy = state._replace(position=np.empty_like(state.position), velocity=np.empty_like(state.velocity))
-        np.copyto(copy.position, state.position)
-        np.copyto(copy.velocity, state.velocity)
+            copy = state._replace(position=np.empty_like(position), velocity=np.empty_like(velocity))
+        np.copyto(copy.position, position)
+        np.copyto(copy.velocity, velocity)
         self._frames.put((number, moment, copy, seen))
 
+    def drain(self) -> None:
+        """Wait until every frame so far is on the disk."""
+        written = threading.Event()
+        self._frames.put(written)
+        written.wait()
+        if self._problem is not None:
+            raise self._problem
+        self._writer.sync()
+
     def _work(self) -> None:
-        going = True
-        while going:
-            frames, going = self._gather()
+        end: object = True
+        while end is not None:
+            frames, end = self._gather()
             # After a frame that is not there, none follows.
             if frames and self._problem is None:
                 began = time.perf_counter()
                 try:
                     self._write(frames)
+                    self.written = frames[-1][0] + 1
                 except BaseException as problem:  # whatever it is, the thread that computes raises it
                     self._problem = problem
                 self.seconds = (time.perf_counter() - began) / len(frames)
             for frame in frames:
                 self._copies.put(frame[2])
+            if isinstance(end, threading.Event):
+                end.set()
 
-    def _gather(self) -> tuple[list[Written], bool]:
-        """The next frames to write, and whether there may be more."""
+    def _gather(self) -> tuple[list[Written], object]:
+        """The next frames to write, and what ended them: None is the end of the run."""
         frames: list[Written] = []
         frame = self._frames.get()
         latest = time.monotonic() + _PATIENCE
-        while frame is not None:
+        while frame is not None and not isinstance(frame, threading.Event):
             frames.append(frame)
             # Up to the end of a chunk, not across it: numbers count from 0.
             if (frame[0] + 1) % self._at_once == 0:
@@ -100,4 +130,4 @@ class Beside:
                 frame = self._frames.get(timeout=max(0.0, latest - time.monotonic()))
             except queue.Empty:
                 return frames, True
-        return frames, False
+        return frames, frame

@@ -1,7 +1,9 @@
 """The HDF5 file: its layout, what comes back from it, and what happens when it cannot be written."""
 
+import importlib.util
 import subprocess
 import sys
+import time
 
 import h5py
 import numpy as np
@@ -105,3 +107,94 @@ def test_other_files_are_refused(tmp_path):
         swarm.load(other)
     with pytest.raises(swarm.SceneError, match=r"cannot read the trajectory .*absent\.h5"):
         swarm.load(tmp_path / "absent.h5")
+
+
+@pytest.mark.parametrize("compression", ["none", "gzip", "lzf"])
+def test_every_kth_particle_in_half_the_precision(tmp_path, compression):
+    particles = swarm.fill(SCENE, 30, speed=0.3, mass=np.linspace(1.0, 2.0, 30), seed=4)
+    exact, small = tmp_path / "exact.h5", tmp_path / "small.h5"
+    swarm.simulate(SCENE, particles, METHOD, until=0.4, every=0.1, trajectory=exact)
+    storage = {"frames": 7, "precision": "float32", "compression": compression}
+    swarm.simulate(SCENE, particles, METHOD, until=0.4, every=0.1, trajectory=small, **storage)
+    with swarm.load(exact) as whole, swarm.load(small) as part:
+        assert (len(part), part.count, len(part.frame(0))) == (5, 30, 5)
+        for k in range(5):
+            expected = whole.frame(k).position[:, ::7].astype(np.float32)
+            np.testing.assert_array_equal(part.frame(k).position, expected)
+        np.testing.assert_array_equal(part.frame(0).mass, particles.mass[::7])
+        for mine, its in zip(part.particle(14), whole.particle(14), strict=True):
+            assert mine.shape == (3, 5)
+            np.testing.assert_array_equal(mine, its.astype(np.float32))
+        for name, values in whole.observables.items():
+            np.testing.assert_array_equal(part.observables[name], values)
+        with pytest.raises(swarm.SceneError, match="one of the 5 that the file keeps, from 0 to 28, got 15"):
+            part.particle(15)
+    with h5py.File(small) as file:
+        value = file["particles/all/position/value"]
+        assert (value.dtype, value.compression) == (np.float32, None if compression == "none" else compression)
+        assert file["particles/all/id"][()].tolist() == [0, 7, 14, 21, 28]
+
+
+def test_observables_alone(tmp_path):
+    particles = swarm.fill(SCENE, 30, speed=0.3, seed=4)
+    result = swarm.simulate(
+        SCENE, particles, METHOD, until=0.4, every=0.1, trajectory=tmp_path / "run.h5", frames="none"
+    )
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        assert (len(trajectory), trajectory.count) == (5, 30)
+        np.testing.assert_array_equal(trajectory.observables["total_energy"], result.observables["total_energy"])
+        with pytest.raises(swarm.SceneError, match='keeps no particles: it was run with frames = "none"'):
+            trajectory.frame(0)
+
+
+@pytest.mark.parametrize(
+    ("storage", "message"),
+    [
+        ({"frames": "some"}, 'frames must be "all", "none", or k for every k-th particle, got \'some\''),
+        ({"frames": 0}, "frames must be 1 or more, got 0"),
+        ({"precision": "float16"}, "precision must be one of 'float32' and 'float64', got 'float16'"),
+        ({"compression": "zip"}, "compression must be one of .* got 'zip'; did you mean 'gzip'"),
+    ],
+)
+def test_bad_storage_is_named(tmp_path, storage, message):
+    particles = swarm.fill(SCENE, 5, speed=0.3)
+    with pytest.raises(swarm.SceneError, match=message):
+        swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=tmp_path / "run.h5", **storage)
+    assert list(tmp_path.iterdir()) == []
+
+
+OTHERS = """
+import sys, warnings
+import h5py
+with h5py.File(sys.argv[1], locking=False) as file:
+    print(len(file["particles/all/position/value"]), file["observables/total_energy/value"][0] > 0.0)
+if len(sys.argv) > 2:
+    warnings.simplefilter("ignore")
+    import MDAnalysis
+    universe = MDAnalysis.Universe.empty(30, trajectory=False)
+    universe.load_new(sys.argv[1], format="H5MD", convert_units=False)
+    print(universe.trajectory.n_frames, universe.trajectory[1].positions.shape, universe.trajectory[1].has_velocities)
+"""
+
+
+@pytest.mark.physics
+def test_other_programs_read_it_while_the_run_goes_on(tmp_path):
+    """h5py, and MDAnalysis where it is installed, in processes of their own, with nothing swarm has to tell them."""
+    path, told = tmp_path / "run.h5", []
+    with_mdanalysis = [] if importlib.util.find_spec("MDAnalysis") is None else ["MDAnalysis"]
+
+    def frames():
+        with swarm.load(path) as trajectory:
+            return len(trajectory)
+
+    def look(frame):
+        if frame.number == 3:
+            while not path.exists() or frames() < 4:
+                time.sleep(0.01)
+            command = [sys.executable, "-c", OTHERS, str(path), *with_mdanalysis]
+            told.append(subprocess.run(command, capture_output=True, text=True))
+
+    particles = swarm.fill(SCENE, 30, speed=0.3)
+    swarm.simulate(SCENE, particles, METHOD, until=0.05, every=0.01, trajectory=path, progress=look)
+    assert (told[0].returncode, told[0].stderr) == (0, "")
+    assert told[0].stdout.splitlines() == ["4 True", *(["4 (30, 3) True"] if with_mdanalysis else [])]

@@ -1,0 +1,45 @@
+"""What of the particles a trajectory keeps, and how."""
+
+from dataclasses import dataclass
+
+from .. import checks
+from ..errors import SceneError
+
+_PRECISIONS = ("float32", "float64")
+_COMPRESSIONS = ("none", "gzip", "lzf")
+
+
+@dataclass(frozen=True)
+class Storage:
+    """What a trajectory keeps of every frame; observables are always whole.
+
+    Args:
+        frames: "all" particles, "none", or k: every k-th one, from the first on.
+        precision: "float64", or "float32", which takes half the room.
+        compression: "none", "gzip" (level 1, bytes shuffled), or "lzf", which is twice as fast.
+
+    Raises:
+        SceneError: an argument is none of these.
+
+    >>> len(range(10)[Storage(frames=4).kept()])
+    3
+    """
+
+    frames: str | int = "all"
+    precision: str = "float64"
+    compression: str = "none"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.frames, str):
+            if self.frames not in ("all", "none"):
+                raise SceneError(f'frames must be "all", "none", or k for every k-th particle, got {self.frames!r}')
+        else:
+            checks.count("frames", self.frames)
+        checks.one_of("precision", self.precision, _PRECISIONS)
+        checks.one_of("compression", self.compression, _COMPRESSIONS)
+
+    def kept(self) -> slice:
+        """Which particles it keeps."""
+        if isinstance(self.frames, str):
+            return slice(None) if self.frames == "all" else slice(0)
+        return slice(None, None, self.frames)

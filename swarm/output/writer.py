@@ -1,0 +1,271 @@
+"""The trajectory under way: frames appended to the file of trajectory.py so that no kill can spoil it.
+
+The order of what is written makes that so: HDF5's mode for one writer and many readers, and the times last. As many
+frames are whole as there are times.
+"""
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+import tomli_w
+
+from .. import tables
+from ..errors import FileError, SceneError
+from ..methods import Method
+from ..particles import Particles, State
+from ..scene import Scene
+from ..version import VERSION
+from . import superblock
+from .storage import Storage
+
+# Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
+_CHUNK = (10, 1000)
+# The chunk cache of positions holds the chunks that one frame touches, up to this many bytes; that of an observable its
+# last chunks. One of HDF5's own size, 1 MB, would fill for 100 000 frames, which looks as if memory grew without end.
+_LARGEST_CACHE, _SMALL_CACHE = 1 << 28, 1 << 16
+# The oldest format with that mode.
+_FORMAT = ("v110", "v110")
+_PACKED: dict[str, dict[str, Any]] = {
+    "none": {},
+    "gzip": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
+    "lzf": {"compression": "lzf", "shuffle": True},
+}
+PARTS = ("position", "velocity")
+
+# Number, time [s], positions and velocities, observables.
+Written = tuple[int, float, State, dict[str, Any]]
+WriteFrames = Callable[[list[Written]], None]
+
+
+class TrajectoryWriter:
+    """A context that creates the file, or goes on with it, and gives the function that writes frames.
+
+    Frame k is row k, so a run that goes on from a checkpoint leaves no gap and no duplicate. Several frames at once
+    cost little more than one: what takes time is the fifteen datasets and the flush. A file has its name when its first
+    frame is whole; before, it ends in ".part".
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        storage: Storage,
+        scene: Scene,
+        method: Method,
+        particles: Particles,
+        scene_text: str | None,
+        following: bool = False,
+    ) -> None:
+        self._path, self._storage, self._scene, self._method = path, storage, scene, method
+        self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
+        self._following = following
+        self._part = path if following else path.with_name(path.name + ".part")
+
+    def __enter__(self) -> WriteFrames:
+        mode = "r+" if self._following else "w"
+        try:
+            if not self._following:
+                self._part.touch()
+            self._handle = os.open(self._part, os.O_RDWR)
+            if self._following:
+                superblock.mend(self._handle)
+            # HDF5's locks would shut readers out.
+            self._file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        except OSError as error:
+            raise FileError(f"cannot write the trajectory {self._path}: {error}") from error
+        self._size, self._block = 0, b""
+        if self._following:
+            self._open()
+        else:
+            self._create()
+        return self._write
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self._file.close()
+        except (OSError, RuntimeError) as problem:
+            self._abandon()
+            if error is None:
+                raise FileError(f"cannot close the trajectory {self._path}: {_reason(problem)}") from problem
+        finally:
+            os.close(self._handle)
+        if self._part != self._path:
+            # Without a frame it is no trajectory.
+            self._part.unlink(missing_ok=True)
+
+    def sync(self) -> None:
+        """Let all that was written reach the disk."""
+        try:
+            os.fsync(self._handle)
+        except OSError as error:
+            raise FileError(f"cannot write the trajectory {self._path}: {error}") from error
+
+    def _create(self) -> None:
+        file = self._file
+        h5md = file.create_group("h5md")
+        h5md.attrs["version"] = np.array([1, 1], dtype=np.int32)
+        h5md.create_group("author").attrs["name"] = "swarm"
+        creator = h5md.create_group("creator")
+        creator.attrs["name"], creator.attrs["version"] = "swarm", VERSION
+        parameters = file.create_group("parameters")
+        for name, text in descriptions(self._scene, self._method, self._storage).items():
+            parameters[name] = text
+        parameters["particles"] = self._count
+        if self._text is not None:
+            parameters["scene_file"] = self._text
+        self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
+        self._time = parameters.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
+        self._values: dict[str, Any] = {}
+        self._observables: dict[str, Any] = {}
+        n = len(self._mass)
+        if n == 0:
+            return
+        everything = file.create_group("particles/all")
+        box = everything.create_group("box")
+        box.attrs["dimension"], box.attrs["boundary"] = 3, ["none"] * 3
+        everything["mass"] = self._mass
+        everything["id"] = np.arange(self._count)[self._storage.kept()]
+        options = _PACKED[self._storage.compression]
+        # A compressed chunk is written once: one that grows would move, and a kill would find it nowhere.
+        rows = 1 if options else _CHUNK[0]
+        options = {**options, "rdcc_nbytes": self._cache()}
+        for name in PARTS:
+            self._values[name] = self._element(
+                f"particles/all/{name}", (n, 3), self._storage.precision, (rows, min(n, _CHUNK[1]), 3), **options,
+            )  # fmt: skip
+
+    def _open(self) -> None:
+        parameters = self._file["parameters"]
+        self._step, self._time = parameters["frame"], parameters["time"]
+        groups = {"particles/all": PARTS if len(self._mass) else (), "observables": tuple(self._file["observables"])}
+        self._values, self._observables = (
+            {name: self._file[f"{group}/{name}/value"] for name in names} for group, names in groups.items()
+        )
+        access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+        access.set_chunk_cache(*access.get_chunk_cache()[:1], self._cache(), 0.75)
+        for name, dataset in self._values.items():
+            self._values[name] = h5py.Dataset(h5py.h5d.open(self._file.id, dataset.name.encode(), access))
+        self._begin()
+
+    def _cache(self) -> int:
+        """Bytes of the chunk cache of positions, and of velocities."""
+        chunks = -(-len(self._mass) // _CHUNK[1])
+        return min(_LARGEST_CACHE, chunks * _CHUNK[0] * _CHUNK[1] * 24)
+
+    def _begin(self) -> None:
+        """From here on nothing is created, which is what that mode of HDF5 asks for."""
+        self._file.swmr_mode = True
+        self._flush()
+
+    def _element(self, name: str, shape: tuple[int, ...], kind: Any, chunks: tuple[int, ...], **options: Any) -> Any:
+        """A time-dependent H5MD element."""
+        group = self._file.create_group(name)
+        group["step"], group["time"] = self._step, self._time
+        return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *shape), chunks=chunks, **options)
+
+    def _write(self, frames: list[Written]) -> None:
+        try:
+            self._require_file()
+            first, seen = frames[0][0], frames[0][3]
+            if not self._observables:
+                for name in (name for name in seen if name != "time"):
+                    entry = np.asarray(seen[name])
+                    self._observables[name] = self._element(
+                        f"observables/{name}", entry.shape, entry.dtype, (1024, *entry.shape)
+                    )
+                self._begin()
+            for name, dataset in self._values.items():
+                rows = np.empty((len(frames), *dataset.shape[1:]), dataset.dtype)
+                np.stack(
+                    [getattr(state, name).T for _number, _moment, state, _seen in frames], out=rows, casting="same_kind"
+                )
+                _put(dataset, first, rows)
+            for name, dataset in self._observables.items():
+                _put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
+            self._file.flush()
+            _put(self._step, first, [number for number, _moment, _state, _seen in frames])
+            _put(self._time, first, [moment for _number, moment, _state, _seen in frames])
+            self._flush()
+            if self._part != self._path:
+                self._take_name()
+        except FileError:
+            self._abandon()
+            raise
+        except (OSError, RuntimeError) as error:
+            self._abandon()
+            os.pwrite(self._handle, self._block, 0)
+            raise FileError(f"cannot write frame {frames[0][0]} to {self._path}: {_reason(error)}") from error
+
+    def _flush(self) -> None:
+        self._file.flush()
+        self._block = superblock.unmark(self._handle)
+        self._size = os.fstat(self._handle).st_size
+
+    def _take_name(self) -> None:
+        os.replace(self._part, self._path)
+        self._part = self._path
+
+    def _require_file(self) -> None:
+        """Raise a FileError if somebody took the file away, or a part of it: HDF5 would write on into the void."""
+        mine = os.fstat(self._handle)
+        try:
+            there = os.stat(self._part)
+        except FileNotFoundError:
+            there = None
+        if there is None or not os.path.samestat(there, mine):
+            raise FileError(f"the trajectory {self._path} was deleted or replaced while the run was writing it")
+        if mine.st_size < self._size:
+            raise FileError(
+                f"the trajectory {self._path} was cut while the run was writing it, from {self._size} to "
+                f"{mine.st_size} bytes"
+            )
+
+    def _abandon(self) -> None:
+        """Let nothing more reach the file: what HDF5 still holds of a frame that failed would spoil those before it."""
+        void = os.open(os.devnull, os.O_RDWR)
+        os.dup2(void, self._file.id.get_vfd_handle())
+        os.close(void)
+
+
+def _reason(error: Exception) -> str:
+    """What the system said, without HDF5's addresses."""
+    found = re.search(r"error message = '([^']*)'", str(error))
+    return found.group(1) if found else str(error)
+
+
+def _put(dataset: Any, first: int, values: Any) -> None:
+    """Entries from row `first` on. h5py's indexing takes four times as long, and a frame writes to some fifteen."""
+    handle = dataset.id
+    count, *shape = handle.shape
+    entries = np.ascontiguousarray(values, dtype=dataset.dtype)
+    if count < first + len(entries):
+        handle.set_extent((first + len(entries), *shape))
+    space = handle.get_space()
+    space.select_hyperslab((first, *(0 for _ in shape)), entries.shape)
+    handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
+
+
+def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, str]:
+    """What makes a run another one, as texts."""
+    return {
+        "scene": tomli_w.dumps(tables.scene_table(scene)),
+        "method": tomli_w.dumps(tables.table_of(method)),
+        "storage": tomli_w.dumps(vars(storage)),
+    }
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Raise a SceneError if `path` cannot become a new file."""
+    if not path.parent.is_dir():
+        raise SceneError(f"trajectory: the folder {path.parent} does not exist; create it first")
+    if path.is_dir():
+        raise SceneError(f"trajectory: expected a file name, got the folder {path}")
+    if path.exists() and not overwrite:
+        raise SceneError(f"trajectory: {path} exists; choose another name, or overwrite it with --overwrite")

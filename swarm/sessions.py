@@ -1,0 +1,177 @@
+"""One session of a run that may take several: what it takes up, when it saves, when it has to end."""
+
+import dataclasses
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import checks
+from .errors import CompleteError, SceneError, WallTimeError
+from .methods.base import Method
+from .particles import Particles
+from .run import Run
+from .scene import Scene
+from .version import VERSION
+
+if TYPE_CHECKING:
+    from .output.beside import Beside
+    from .output.checkpoint import Arrays, Job
+    from .output.storage import Storage
+
+
+# More often than this [s] a run would do little else.
+_OFTEN = 0.01
+
+
+class Session:
+    """From a start or a checkpoint to the end, a signal or the limit of wall time.
+
+    Args:
+        trajectory: the file that is written, or None: then nothing can be saved.
+        every: seconds of wall time from one checkpoint to the next; None: no checkpoint.
+        resume: go on from the last checkpoint, if there is one.
+        limit: seconds of wall time after which it ends; None: never.
+    """
+
+    def __init__(self, trajectory: Path | None, every: float | None, resume: bool, limit: float | None) -> None:
+        self._began = time.monotonic()
+        self._every = math.inf if every is None else checks.at_least("checkpoint", every, _OFTEN)
+        self._saves, self._resumes = every is not None, resume
+        self._end = math.inf if limit is None else self._began + checks.positive("walltime", limit)
+        self._due = self._began + self._every
+        self._told_to_stop = False
+        self._trajectory, self._path = trajectory, None
+        if trajectory is not None:
+            from .output.checkpoint import path_of  # h5py is not needed for it, but by whoever writes a trajectory
+
+            self._path = path_of(trajectory)
+        elif self._saves or resume:
+            raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
+        self._job: Job | None = None
+        self._arrays: Arrays | None = None
+
+    @property
+    def first(self) -> int:
+        """The first frame that this session writes."""
+        return 0 if self._arrays is None or self._job is None else self._job.frame + 1
+
+    def prepare(
+        self, scene: Scene, method: Method, storage: "Storage", particles: Particles, until: float, overwrite: bool
+    ) -> None:
+        """Where this session begins: with a new file, or, to resume, where the checkpoint is, if there is one.
+
+        Raises:
+            SceneError: the trajectory cannot become a new file; or it, or the checkpoint, is of another run, is damaged
+                or is missing.
+            CompleteError: nothing is left to do.
+        """
+        if self._trajectory is None or self._path is None:
+            return
+        from .output.checkpoint import Job, digest_of
+        from .output.writer import check_target, descriptions
+
+        check_target(self._trajectory, overwrite or self._resumes)
+        if self._saves or self._resumes:
+            start = digest_of(particles)
+            texts: dict[str, Any] = {**descriptions(scene, method, storage)}
+            self._job = Job(VERSION, **texts, particles=len(particles), start=start)
+        if self._resumes:
+            self._take_up(self._trajectory, until)
+        if self._arrays is None:
+            self._path.unlink(missing_ok=True)
+
+    def _take_up(self, trajectory: Path, until: float) -> None:
+        from .output import checkpoint
+        from .output.trajectory import load
+
+        assert self._job is not None
+        assert self._path is not None
+        if not self._path.exists():
+            if trajectory.exists():
+                with load(trajectory) as before:
+                    texts: dict[str, Any] = before.descriptions
+                    dataclasses.replace(self._job, **texts, particles=before.count).require_same(self._job, trajectory)
+                    if len(before) and before.times[-1] >= until:
+                        raise CompleteError(f"{trajectory} is complete: its last frame is at {before.times[-1]:g} s")
+            return
+        saved, arrays = checkpoint.read(self._path)
+        saved.require_same(self._job, self._path)
+        if not trajectory.exists():
+            raise SceneError(
+                f"{self._path} needs its trajectory {trajectory}, which is gone; start afresh without resume"
+            )
+        with load(trajectory) as before:
+            if len(before) <= saved.frame:
+                raise SceneError(
+                    f"{trajectory} must hold {saved.frame + 1} frames, as {self._path} says, got {len(before)}: it was "
+                    "changed since; remove both to start afresh"
+                )
+        if saved.time >= until:
+            raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
+        self._job, self._arrays = saved, arrays
+
+    def restore(self, run: Run) -> None:
+        """Let the run be where the checkpoint is."""
+        if self._arrays is not None and self._job is not None:
+            run.restore(self._arrays, self._job.following is not None)
+            self._arrays = {}
+
+    def require_same_time(self, number: int, moment: float) -> None:
+        """Raise a SceneError if the frame of this number was, or was to be, at another time."""
+        job = self._job
+        if self._arrays is None or job is None:
+            return
+        for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
+            if number == frame and saved is not None and saved != moment:
+                raise SceneError(
+                    f"{self._path} is of another run: its frame {number} is at {saved:g} s, got {moment:g} s; leave "
+                    "until and every as they were, or make until later"
+                )
+
+    @property
+    def latest(self) -> float:
+        """When to look in again [s of time.monotonic]."""
+        return min(self._due, self._end)
+
+    def stop(self) -> None:
+        """Let the next look end the session."""
+        self._told_to_stop = True
+
+    def wall_time(self) -> float:
+        """Seconds of all sessions of the run."""
+        return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
+
+    def look(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+        """Save if it is time to, and end if it is: the last frame that is written, and the one under way.
+
+        Raises:
+            KeyboardInterrupt: somebody called `stop`.
+            WallTimeError: the limit is over.
+            FileError: the checkpoint cannot be written.
+        """
+        now = time.monotonic()
+        stops = self._told_to_stop or now >= self._end
+        if self._saves and (stops or now >= self._due):
+            self._save(run, writer, frame, moment, following)
+            self._due = time.monotonic() + self._every
+        if self._told_to_stop:
+            raise KeyboardInterrupt
+        if stops:
+            raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+
+    def _save(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+        from .output import checkpoint
+
+        assert self._job is not None
+        assert self._path is not None
+        assert writer is not None
+        # A checkpoint is never ahead of the frames.
+        writer.drain()
+        job = dataclasses.replace(self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time())
+        checkpoint.save(self._path, job, run.arrays())
+
+    def finish(self) -> None:
+        """All frames are written: nothing is left to go on with."""
+        if self._path is not None:
+            self._path.unlink(missing_ok=True)

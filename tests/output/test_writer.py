@@ -1,0 +1,208 @@
+"""What a kill, a full disk or a stranger's hand leaves of a trajectory: every frame that was reported as written."""
+
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+
+import h5py
+import numpy as np
+import pytest
+
+import swarm
+from swarm.output import superblock, writer
+from swarm.output.storage import Storage
+from swarm.particles import State
+
+SPHERE = swarm.Scene([swarm.Sphere(0.5)])
+N = 3
+
+
+def frame(number, n=N):
+    """Frame k holds the number k throughout."""
+    rows = np.full((3, n), float(number))
+    nothing = np.zeros(n)
+    state = State(rows, -rows, nothing, nothing, nothing, nothing, nothing, nothing, None)
+    return (
+        number,
+        float(number),
+        state,
+        {"time": float(number), "impacts": number, "momentum": np.full(3, float(number))},
+    )
+
+
+def writer_of(path, following=False, storage=None):
+    particles = swarm.Particles(np.zeros((3, N)), np.ones((3, N)))
+    return writer.TrajectoryWriter(path, storage or Storage(), SPHERE, swarm.Impact(), particles, None, following)
+
+
+def require_frames(path, least, n=None):
+    """The file opens, and each of its frames is what was written; how many there are."""
+    with swarm.load(path) as trajectory:
+        count = len(trajectory)
+        assert count >= least
+        assert trajectory.times.tolist() == list(range(count))
+        if count:
+            expected = np.arange(count) * np.ones((3, 1))
+            for i in (0, N - 1):
+                position, velocity = trajectory.particle(i)
+                assert np.array_equal(position, expected)
+                assert np.array_equal(velocity, -expected)
+            assert trajectory.observables["impacts"].tolist() == list(range(count))
+            assert np.array_equal(trajectory.observables["momentum"].T, expected)
+    return count
+
+
+class Log:
+    """A file that notes every write of HDF5."""
+
+    def __init__(self, path):
+        self._file = open(path, "r+b")  # noqa: SIM115
+        self.notes = []
+
+    def write(self, data):
+        data = bytearray(data)
+        if self._file.tell() == 0 and data[11] == 4:
+            # HDF5 marks what is a Python object with one bit of the two that it gives a file.
+            data[11] = 5
+            data[44:48] = superblock.checksum(bytes(data[:44])).to_bytes(4, "little")
+        self.notes.append((self._file.tell(), bytes(data)))
+        self._file.write(data)
+        self._file.flush()
+        return len(data)
+
+    def truncate(self, size=None):
+        self.notes.append((size, None))
+        return self._file.truncate(size)
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("compression", ["none", "gzip"])
+def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compression):
+    """A kill stops HDF5 between two of its writes: here between any two, and the run goes on from what is left.
+
+    So many chunks that the index of chunks grows several times: in HDF5's ordinary mode a kill in the middle of that
+    loses half of them.
+    """
+    path, image, batch, frames = tmp_path / "run.h5", tmp_path / "image.h5", 7, 700 if compression == "none" else 140
+    logs, real = [], h5py.File
+
+    def logged(name, mode, **options):
+        logs.append(Log(name))
+        options.pop("locking")
+        return real(logs[-1], mode, **options)
+
+    unmark = superblock.unmark
+    monkeypatch.setattr(writer.h5py, "File", logged)
+    monkeypatch.setattr(
+        superblock, "unmark", lambda handle: logs[-1].notes.append((0, unmark(handle))) or unmark(handle)
+    )
+    reported = []
+    with writer_of(path, storage=Storage(compression=compression)) as write:
+        for first in range(0, frames, batch):
+            write([frame(number) for number in range(first, first + batch)])
+            reported.append((len(logs[0].notes), first + batch))
+    logs[0].close()
+    monkeypatch.undo()
+    assert require_frames(path, frames) == frames
+    image.touch()
+    done, cases = 0, 0
+    with open(image, "r+b") as file:
+        for k, (place, data) in enumerate(logs[0].notes):
+            if data is None:
+                file.truncate(place)
+            else:
+                file.seek(place)
+                file.write(data)
+            file.flush()
+            done = max([number for written, number in reported if written <= k + 1], default=0)
+            # One that follows a change of the index is worth more than a hundred that append.
+            if done == 0 or (done % (10 * batch) and done < frames - 20 * batch):
+                continue
+            cases += 1
+            assert done <= require_frames(image, done) <= done + batch
+            if cases % 11 == 0:
+                # And a run that goes on from there spoils nothing.
+                shutil.copy(image, tmp_path / "again.h5")
+                with writer_of(tmp_path / "again.h5", True, Storage(compression=compression)) as write:
+                    write([frame(number) for number in range(done, done + 3 * batch)])
+                require_frames(tmp_path / "again.h5", done + 3 * batch)
+    assert cases > 100
+
+
+def test_frames_are_rows_whoever_writes_them(tmp_path):
+    """A session that goes on from an older frame writes the same rows again: no gap, no duplicate."""
+    path = tmp_path / "run.h5"
+    for first, last in ((0, 12), (7, 20), (19, 25)):
+        with writer_of(path, first > 0) as write:
+            write([frame(number) for number in range(first, last)])
+    assert require_frames(path, 25) == 25
+
+
+def test_the_checksum_is_that_of_hdf5(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w", libver="v110"):
+        pass
+    block = (tmp_path / "a.h5").read_bytes()[: superblock.SIZE]
+    assert superblock.checksum(block[:44]) == int.from_bytes(block[44:], "little")
+    assert superblock.checksum(block[:43]) != int.from_bytes(block[44:], "little")
+
+
+@pytest.mark.parametrize(
+    ("harm", "message"),
+    [
+        (os.remove, "was deleted or replaced while the run was writing it"),
+        (lambda path: os.truncate(path, 3000), "was cut while the run was writing it, from .* to 3000 bytes"),
+        (lambda path: shutil.copy(path, f"{path}.x") and os.replace(f"{path}.x", path), "was deleted or replaced"),
+    ],
+    ids=["deleted", "truncated", "replaced"],
+)
+def test_a_file_that_is_harmed_ends_the_run(tmp_path, harm, message):
+    path = tmp_path / "run.h5"
+    with pytest.raises(swarm.FileError, match=message), writer_of(path) as write:  # noqa: PT012
+        write([frame(0)])
+        harm(path)
+        write([frame(1)])
+
+
+FULL = """
+    import resource, signal, sys
+    sys.path[:0] = {path!r}
+    from test_writer import frame, writer_of
+    from pathlib import Path
+    import swarm
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
+    number = 0
+    try:
+        with writer_of(Path({file!r})) as write:
+            while number < 5000:
+                write([frame(number)])
+                number += 1
+                print(number, flush=True)
+    except swarm.FileError as error:
+        print("error:", error)
+"""
+
+
+@pytest.mark.parametrize("size", [20_000, 70_000, 72_000, 100_001])
+def test_a_full_disk_loses_no_frame(tmp_path, size):
+    """The limit of a file's size does what a full disk does: a write in the middle of others fails."""
+    path = tmp_path / "run.h5"
+    code = textwrap.dedent(FULL).format(path=sys.path, file=str(path), size=size)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    *numbers, error = told.stdout.split("\n")[:-1]
+    assert (told.returncode, told.stderr) == (0, "")
+    assert error == f"error: cannot write frame {len(numbers)} to {path}: File too large"
+    if not numbers:
+        assert list(tmp_path.iterdir()) == []
+        return
+    assert require_frames(path, len(numbers)) == len(numbers)
+    with h5py.File(path) as file:
+        assert file["particles/all/position/value"].shape[1:] == (N, 3)
+    with writer_of(path, True) as write:
+        write([frame(number) for number in range(len(numbers), len(numbers) + 100)])
+    require_frames(path, len(numbers) + 100)

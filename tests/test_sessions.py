@@ -1,0 +1,384 @@
+"""Runs in several sessions: the same bits as in one, whatever ended each of them; and what is refused."""
+
+import itertools
+import json
+import math
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+from conftest import METHODS
+
+import swarm
+from examples import long_run
+from swarm.output import checkpoint
+from swarm.progress import lines
+from swarm.run import Run
+
+SPHERE = swarm.Scene([swarm.Sphere(0.5)])
+NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
+LOSSY = swarm.Scene([swarm.Sphere(0.5, restitution=0.999)])
+CASES = {
+    "impact, sphere": (SPHERE, METHODS["impact"]),
+    "impact, nested": (NESTED, METHODS["impact"]),
+    "impact, lossy": (LOSSY, METHODS["impact"]),
+    "penalty, sphere": (SPHERE, METHODS["penalty"]),
+}
+FRAMES = 3
+
+
+def arrays_after(run, scene, method, every, between=lambda run, cut_short: run, delay=math.inf):
+    """State and observables of every frame; `between` may put another run in place of this, `delay` halts it."""
+    seen = []
+    for k in range(FRAMES):
+        span = method.span("every", every)
+        while not run.advance(span, every * (k + 1), latest=time.monotonic() + delay):
+            run, delay = between(run, True), 2.0 * delay
+        seen.append(run.seen())
+        run = between(run, False)
+    return {name: array.copy() for name, array in run.arrays().items()}, seen
+
+
+def require_resumed_is_whole(tmp_path, scene, method, n=700, every=1.0, delay=1e-4):
+    """A run that is halted again and again, each time saved and gone on with by a new one, ends as one never halted."""
+    start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=5)
+    with Run(scene, start, method, 1, None) as whole:
+        expected, expected_seen = arrays_after(whole, scene, method, every)
+    halts, threads = [], itertools.cycle([2, 1, 3])
+    job = checkpoint.Job("", "", "", "", n, "")
+
+    def begin_again(run, cut_short):
+        halts.append(cut_short)
+        checkpoint.save(tmp_path / "a.checkpoint", job, run.arrays())
+        run.__exit__()
+        other = Run(scene, start, method, next(threads), None)
+        other.restore(checkpoint.read(tmp_path / "a.checkpoint")[1], cut_short)
+        return other
+
+    run = Run(scene, start, method, 2, None)
+    found, found_seen = arrays_after(run, scene, method, every, begin_again, delay)
+    assert found.keys() == expected.keys()
+    for name, array in expected.items():
+        assert np.array_equal(found[name], array), name
+    for one, other in zip(expected_seen, found_seen, strict=True):
+        for name, value in one.items():
+            assert np.array_equal(value, other[name]), name
+    return sum(halts)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("name", CASES)
+def test_resumed_is_whole(tmp_path, name):
+    """In frames of some 20 ms, halted after 0.1 ms, 0.2 ms, ...: in the midst of most particles' flights."""
+    every = 1000.0 if name in ("impact, sphere", "impact, nested") else 50.0
+    assert require_resumed_is_whole(tmp_path, *CASES[name], every=every) >= 2
+
+
+def run(path, scene=SPHERE, method=None, until=2.0, every=0.5, n=20, **keywords):
+    start = swarm.fill(scene, n, speed=1.0, seed=keywords.pop("seed", 1))
+    return swarm.simulate(
+        scene, start, method or swarm.Impact(), until=until, every=every, trajectory=path, threads=1, **keywords
+    )
+
+
+def stopped_at(path, number, how=lambda: signal.raise_signal(signal.SIGTERM), **keywords):
+    """A run that is told to stop at a frame."""
+
+    def progress(frame):
+        if frame.number == number:
+            how()
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with pytest.raises(KeyboardInterrupt):
+        run(path, checkpoint=60.0, progress=progress, **keywords)
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "storage", [{}, {"frames": 3, "precision": "float32", "compression": "gzip"}, {"frames": "none"}]
+)
+def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
+    path, whole = tmp_path / "run.h5", tmp_path / "whole.h5"
+    stopped_at(path, 2, lambda: signal.raise_signal(number), **storage)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    saved, _arrays = checkpoint.read(checkpoint.path_of(path))
+    assert (saved.frame, saved.time, saved.following) == (2, 1.0, None)
+    with swarm.load(path) as half:
+        assert len(half) == 3
+    numbers = []
+    resumed = run(path, resume=True, progress=lambda frame: numbers.append(frame.number), **storage)
+    expected = run(whole, **storage)
+    assert numbers == [3, 4]
+    assert not checkpoint.path_of(path).exists()
+    assert np.array_equal(resumed.particles.position, expected.particles.position)
+    with swarm.load(path) as one, swarm.load(whole) as other:
+        assert len(one) == len(other) == 5
+        for name, values in expected.observables.items():
+            assert np.array_equal(values, resumed.observables[name]), name
+            assert np.array_equal(values, one.observables[name]), name
+        if storage.get("frames") != "none":
+            for k in range(5):
+                assert np.array_equal(one.frame(k).velocity, other.frame(k).velocity)
+
+
+@pytest.mark.physics
+def test_the_wall_time_ends_a_run_in_the_middle_of_a_frame(tmp_path):
+    path, whole = tmp_path / "run.h5", tmp_path / "whole.h5"
+    sessions, within, limit = 0, 0, 0.1
+    while True:
+        try:
+            result = run(path, until=6e6, every=2e6, resume=True, checkpoint=60.0, walltime=limit)
+            break
+        except swarm.WallTimeError:
+            sessions, limit = sessions + 1, 1.3 * limit
+            within += checkpoint.read(checkpoint.path_of(path))[0].following is not None
+    assert sessions >= 2
+    assert within >= 1
+    expected = run(whole, until=6e6, every=2e6)
+    assert np.array_equal(result.particles.position, expected.particles.position)
+    for name, values in expected.observables.items():
+        assert np.array_equal(values, result.observables[name]), name
+    assert result.wall_time > limit
+
+
+def test_a_longer_run_goes_on_from_a_shorter_one(tmp_path):
+    stopped_at(tmp_path / "run.h5", 3, until=2.0)
+    longer = run(tmp_path / "run.h5", until=4.0, resume=True)
+    expected = run(tmp_path / "whole.h5", until=4.0)
+    assert np.array_equal(longer.particles.position, expected.particles.position)
+    assert longer.observables["time"].tolist() == expected.observables["time"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"n": 21}, ["number of particles is 20, got 21"]),
+        ({"method": swarm.Impact(contact_step=1e-3)}, ["contact_step = 0.0", "contact_step = 0.001"]),
+        ({"method": swarm.Penalty(dt=0.125, penalty=1e3)}, ['kind = "impact"', 'kind = "penalty"']),
+        ({"scene": swarm.Scene([swarm.Sphere(0.6)])}, ["radius = 0.5", "radius = 0.6"]),
+        ({"scene": swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -1.0))}, ["gravity", "scene is"]),
+        ({"precision": "float32"}, ['precision = "float64"', 'precision = "float32"']),
+        ({"seed": 2}, ["particles at the start (seed,", "digest"]),
+        ({"every": 0.25}, ["its frame 2 is at 1 s, got 0.5 s"]),
+        ({"until": 1.0}, ["until must be after", "1 s, got 1 s"]),
+    ],
+    ids=["count", "contact step", "method", "scene", "gravity", "storage", "start", "every", "until"],
+)
+def test_another_run_is_refused_with_both_values(tmp_path, change, words):
+    path = tmp_path / "run.h5"
+    stopped_at(path, 2)
+    before = [file.read_bytes() for file in (path, checkpoint.path_of(path))]
+    with pytest.raises(swarm.SceneError) as caught:
+        run(path, **{"resume": True, **change})
+    for word in words:
+        assert word in str(caught.value)
+    if "every" not in change:
+        assert [file.read_bytes() for file in (path, checkpoint.path_of(path))] == before
+    assert len(run(path, resume=True).observables["time"]) == 5
+
+
+def test_a_run_without_checkpoint_begins_again_and_another_one_is_left_alone(tmp_path):
+    path = tmp_path / "run.h5"
+    stopped_at(path, 2)
+    checkpoint.path_of(path).unlink()
+    with pytest.raises(swarm.SceneError, match="number of particles is 20, got 30"):
+        run(path, resume=True, n=30)
+    numbers = []
+    run(path, resume=True, progress=lambda frame: numbers.append(frame.number))
+    assert numbers == [0, 1, 2, 3, 4]
+    with pytest.raises(swarm.CompleteError, match="is complete: its last frame is at 2 s"):
+        run(path, resume=True)
+
+
+def test_what_is_missing_or_damaged_is_said(tmp_path):
+    path = tmp_path / "run.h5"
+    stopped_at(path, 2)
+    saved = checkpoint.path_of(path)
+    whole, frames = saved.read_bytes(), path.read_bytes()
+    position = checkpoint.read(saved)[1]["position"].tobytes()
+    for spoiled in (whole[: len(whole) // 2], whole.replace(position, position[1:] + b"?"), b"", b"text"):
+        saved.write_bytes(spoiled)
+        with pytest.raises(swarm.SceneError, match="cannot read the checkpoint"):
+            run(path, resume=True)
+    saved.write_bytes(whole)
+    path.unlink()
+    with pytest.raises(swarm.SceneError, match=r"needs its trajectory .* gone"):
+        run(path, resume=True)
+    run(path, until=1.0, every=1.0)
+    saved.write_bytes(whole)
+    with pytest.raises(swarm.SceneError, match=r"must hold 3 frames, .* got 2"):
+        run(path, resume=True)
+    path.write_bytes(frames)
+    assert len(run(path, resume=True).observables["time"]) == 5
+    with pytest.raises(swarm.SceneError, match="need the trajectory of the run, got none"):
+        run(None, checkpoint=1.0)
+    with pytest.raises(swarm.SceneError, match=r"checkpoint must be 0.01 or more, got 0.001"):
+        run(path, checkpoint=0.001)
+
+
+def test_a_new_run_forgets_the_old_checkpoint(tmp_path):
+    path = tmp_path / "run.h5"
+    stopped_at(path, 2)
+    run(path, overwrite=True, n=5)
+    assert not checkpoint.path_of(path).exists()
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monkeypatch):
+    """The disk is full when it is half written: the run ends, and goes on later from the one before."""
+    path = tmp_path / "run.h5"
+    saved, real = [], np.savez
+
+    def full(file, **entries):
+        if len(saved) == 2:
+            file.write(b"half of it")
+            raise OSError(28, "No space left on device")
+        real(file, **entries)
+        saved.append(entries["job"])
+
+    monkeypatch.setattr(checkpoint.np, "savez", full)
+    with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the one before it"):
+        run(path, checkpoint=0.05, progress=lambda frame: time.sleep(0.06))
+    assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.h5", "run.h5.checkpoint"]
+    assert json.loads(saved[-1])["frame"] == 1
+    monkeypatch.undo()
+    numbers = []
+    run(path, resume=True, progress=lambda frame: numbers.append(frame.number))
+    assert numbers == [2, 3, 4]
+
+
+def test_without_being_asked_for_there_is_no_checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(checkpoint, "save", lambda *arguments: pytest.fail("saved"))
+    monkeypatch.setattr(checkpoint, "digest_of", lambda *arguments: pytest.fail("digested"))
+    run(tmp_path / "run.h5")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda state: state.position.__setitem__((0, 7), np.nan), "particle 7: position or velocity are no longer"),
+        (lambda state: state.velocity.__setitem__((2, 7), np.inf), "particle 7: position or velocity are no longer"),
+        (
+            lambda state: state.position.__setitem__((0, 7), 0.6),
+            r"particle 7: it is .* m outside surfaces\[0\] \(Sphere",
+        ),
+    ],
+    ids=["nan", "infinity", "outside"],
+)
+def test_a_spoiled_frame_is_never_written(tmp_path, monkeypatch, spoil, message):
+    """As a kernel gone wrong would: the frame is named, and those before it are in the file."""
+    advance = Run.advance
+
+    def gone_wrong(self, span, moment, *more):
+        if moment == 1.5:
+            spoil(self.state)
+            self._done.fill(True)
+            return self._all_shares(0.0) is not None
+        return advance(self, span, moment, *more)
+
+    monkeypatch.setattr(Run, "advance", gone_wrong)
+    with pytest.raises(swarm.RunError, match=rf"the frame at 1.5 s failed at {message}"):
+        run(tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        assert trajectory.times.tolist() == [0.0, 0.5, 1.0]
+
+
+def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    from swarm.simulation import Frame
+
+    show = lines(60.0)
+    for number in range(8):
+        # The first frame compiles for a minute and a half, which the estimate must not know of; then 20 s each.
+        clock[0] += 90.0 if number == 1 else 20.0
+        show(Frame(number, 0.5 * number, 50.0, {"impacts": 1000 * number, "energy_error": 2e-16}))
+    told = capsys.readouterr().err.splitlines()
+    assert told[0].startswith("1.0%  0.5/50 s")
+    assert told[1] == "4.0%  2/50 s  ETA 0:32:00  50 impacts/s  energy error 2.0e-16"
+    assert len(told) == 3
+
+
+@pytest.mark.physics
+def test_the_example_is_stopped_twice_and_conserves(tmp_path):
+    told = long_run.main(particles=200, impacts=3e5, limit=0.15, folder=tmp_path)
+    assert told["sessions"] == ["walltime", "walltime", "complete"]
+    assert told["frames"] == long_run.FRAMES + 1
+    assert told["impacts"] == pytest.approx(200 * 3e5, rel=0.1)
+    assert told["energy error, worst particle"] <= 1e-14
+    assert told["Joachimsthal's integral, worst relative change"] <= 1e-9
+    assert told["largest penetration [m]"] <= 4.0 * np.spacing(0.6)
+
+
+# --- Processes -------------------------------------------------------------------------------------------
+
+KILLED = """
+    import os, random, signal, sys, time
+    from pathlib import Path
+    import swarm
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    start = swarm.fill(scene, 50, speed=1.0, seed=1)
+
+    def run(path, progress=False, **more):
+        return swarm.simulate(scene, start, swarm.Impact(), until=60.0, every=0.01, trajectory=path, threads=1,
+                              progress=progress, **more)
+
+    swarm.simulate(scene, start, swarm.Impact(), until=1.0, threads=1)  # compiled, and no thread is left
+    random.seed(7)
+    kills, low = 0, 0
+    while True:
+        out, into = os.pipe()
+        child = os.fork()
+        if child == 0:
+            tell = lambda frame: os.write(into, frame.written.to_bytes(8, "little"))
+            try:
+                run({path!r}, tell, checkpoint=0.02, resume=True)
+            except swarm.CompleteError:
+                pass  # killed when all was done
+            os._exit(0)
+        os.close(into)
+        first = os.read(out, 8)
+        time.sleep(random.uniform(0.0, {longest}))
+        os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        told = first
+        while more := os.read(out, 1 << 16):
+            told += more
+        os.close(out)
+        if not os.WIFSIGNALED(status):
+            break
+        kills += 1
+        if Path({path!r}).exists():
+            reports = [int.from_bytes(told[i : i + 8], "little") for i in range(0, len(told) - 7, 8)]
+            print(len(swarm.load({path!r})), max(reports))
+    print("kills", kills)
+"""
+
+
+@pytest.mark.physics
+def test_kill_9_at_random_moments(tmp_path):
+    """Each child is killed for good and the next goes on from its checkpoint, until one is through."""
+    path = tmp_path / "run.h5"
+    code = textwrap.dedent(KILLED).format(path=str(path), longest=0.12)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=400)
+    assert (told.returncode, told.stderr) == (0, "")
+    *pairs, last = told.stdout.splitlines()
+    print(last, *pairs, sep="; ")
+    for pair in pairs:
+        held, reported = map(int, pair.split())
+        assert held >= reported
+    assert int(last.split()[1]) >= 20
+    start = swarm.fill(SPHERE, 50, speed=1.0, seed=1)
+    expected = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, every=0.01, trajectory=tmp_path / "whole.h5")
+    with swarm.load(path) as one, swarm.load(tmp_path / "whole.h5") as other:
+        assert len(one) == len(other) == 6001
+        for i in range(0, 50, 7):
+            for mine, its in zip(one.particle(i), other.particle(i), strict=True):
+                assert np.array_equal(mine, its)
+        for name, values in expected.observables.items():
+            assert np.array_equal(one.observables[name], values), name
