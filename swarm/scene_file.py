@@ -38,6 +38,10 @@ class RunTable:
     every: float | None = None
     threads: int | None = None
     trajectory: str | None = None
+    recording: str | None = None
+    record_particles: int = 5000
+    record_color: str = "speed"
+    record_megabytes: float = 100.0
 
 
 @dataclass(frozen=True)

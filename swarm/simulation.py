@@ -5,6 +5,7 @@ import logging
 import os
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from .scene import Scene
 
 if TYPE_CHECKING:
     from .output.beside import Beside
+    from .output.trajectory import WriteFrames
 
 _LOG = logging.getLogger("swarm")
 # Frames nearer to `until` than this part of `every` are `until`.
@@ -68,6 +70,10 @@ def simulate(
     every: float | None = None,
     trajectory: str | os.PathLike[str] | None = None,
     recording: str | os.PathLike[str] | None = None,
+    record_particles: int = 5000,
+    record_color: str = "speed",
+    record_megabytes: float = 100.0,
+    live: bool | str = False,
     threads: int | None = None,
     progress: bool | Callable[[Frame], None] = False,
     overwrite: bool = False,
@@ -90,11 +96,14 @@ def simulate(
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
-        recording: Rerun file to write (not yet supported).
+        recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
+        record_particles: at most so many are recorded, evenly chosen.
+        record_color: what colours them, "speed" or "energy-error".
+        record_megabytes: how large the recording may become, above 0: of too many frames every k-th is recorded.
+        live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
-
         progress: True for a progress bar, or a function that is called with every `Frame`.
-        overwrite: replace an existing trajectory.
+        overwrite: replace an existing trajectory and recording.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes on at once. Results do not depend on it.
 
@@ -103,7 +112,7 @@ def simulate(
 
     Raises:
         SceneError: bad input; nothing has run or been written.
-        FileError: the trajectory exists or cannot be written.
+        FileError: the trajectory or the recording cannot be written.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT came; the frames before it are in the trajectory.
 
@@ -118,8 +127,6 @@ def simulate(
     threads = _threads(threads)
     if block_size is not None:
         checks.count("block_size", block_size)
-    if recording is not None:
-        raise SceneError("recording is not supported yet, got a file name; leave it out and use trajectory=")
     _check(scene, particles, method, until, every)
 
     if scene.is_open():
@@ -129,7 +136,11 @@ def simulate(
 
     run = Run(scene, particles, method, threads, block_size)
     history: list[dict[str, Any]] = []
-    writer = _output(trajectory, overwrite, scene, method, particles, scene_text)
+    writers = _trajectory(trajectory, overwrite, scene, method, particles, scene_text)
+    if recording is not None or live:
+        shown = {"particles": record_particles, "color": record_color, "megabytes": record_megabytes, "live": live}
+        writers += _recording(recording, overwrite, scene, method, particles, _frame_count(until, every), shown)
+    writer = _beside(writers, len(particles))
     writing = writer or contextlib.nullcontext(lambda *frame: None)
     with run, interrupt.taken_by(run.halt), writing as write, display(progress) as show:
         now = method.span("time", 0.0)
@@ -213,18 +224,47 @@ def _magnitude(scene: Scene, particles: Particles) -> float:
     return max(float(np.abs(particles.position).max()), scene.finite_size())
 
 
-def _output(
+def _frame_count(until: float, every: float | None) -> int:
+    return sum(1 for _moment in _frame_times(until, every))
+
+
+def _beside(writers: "list[AbstractContextManager[WriteFrames]]", n: int) -> "Beside | None":
+    """A context that gives the function which writes a frame, in a thread of its own."""
+    if not writers:
+        return None
+    from .output.beside import Beside, Several
+
+    return Beside(Several(writers), n)
+
+
+def _trajectory(
     path: str | os.PathLike[str] | None,
     overwrite: bool,
     scene: Scene,
     method: Method,
     particles: Particles,
     scene_text: str | None,
-) -> "Beside | None":
-    """A context that gives the function which writes a frame."""
+) -> "list[AbstractContextManager[WriteFrames]]":
     if path is None:
-        return None
-    from .output.beside import Beside
+        return []
     from .output.trajectory import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    return Beside(TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text), len(particles))
+    return [TrajectoryWriter(Path(path), overwrite, scene, method, particles, scene_text)]
+
+
+def _recording(
+    path: str | os.PathLike[str] | None,
+    overwrite: bool,
+    scene: Scene,
+    method: Method,
+    particles: Particles,
+    frames: int,
+    shown: dict[str, Any],
+) -> "list[AbstractContextManager[WriteFrames]]":
+    from .output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from .output.recording import RecordingWriter, Settings  # rerun takes half a second
+
+    target = None if path is None else Path(path)
+    return [RecordingWriter(target, overwrite, scene, method, particles, frames, Settings(**shown))]

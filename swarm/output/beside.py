@@ -1,5 +1,6 @@
 """Frames written beside the computation: a thread of their own behind a short queue."""
 
+import contextlib
 import queue
 import threading
 import time
@@ -23,6 +24,29 @@ _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
 
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
+
+
+class Several:
+    """A context of several writers: each frame goes to all of them, one after the other."""
+
+    def __init__(self, writers: list[AbstractContextManager[WriteFrames]]) -> None:
+        self._writers = writers
+
+    def __enter__(self) -> WriteFrames:
+        with contextlib.ExitStack() as stack:
+            writes = [stack.enter_context(writer) for writer in self._writers]
+            self._stack = stack.pop_all()
+
+        def write(frames: list[Written]) -> None:
+            for one in writes:
+                one(frames)
+
+        return write
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
 
 
 class Beside:
