@@ -57,7 +57,7 @@ def _packed() -> NDArray[np.uint32]:
     return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
-_PACKED = _packed()
+_PACKED: NDArray[np.uint32] = _packed()
 
 Values = Callable[[Floats, Floats], Floats]
 

@@ -29,7 +29,7 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     end = trajectory.frame(-1)
     shapes = shapes_of(scene, end.position)
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
-    left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9])
+    left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
 
     left.set_facecolor(drawing.GROUND)
     drawn = slice(None, None, -(-len(end) // _SHOWN))

@@ -1,10 +1,10 @@
 """Recordings: what Rerun (https://rerun.io) shows, written while a run goes on or from its trajectory.
 
-    /scene/particles              Points3D, a frame's; coloured
-    /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
-    /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...)     Scalars
-    /time                         Scalars: the exact time [s], for `sim_time` counts nanoseconds
-    /about                        what the colours mean, as text and as values; static
+/scene/particles              Points3D, a frame's; coloured
+/scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
+/energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...)     Scalars
+/time                         Scalars: the exact time [s], for `sim_time` counts nanoseconds
+/about                        what the colours mean, as text and as values; static
 """
 
 import math
@@ -33,9 +33,11 @@ _MEGABYTE = 1e6
 _AT_ONCE = 10  # frames of a trajectory
 # Rows of the time series that are sent together, unless that takes longer than this [s].
 _ROWS, _PATIENCE = 50, 0.5
+# A flush takes milliseconds; where the file cannot be written, it may never end [s].
+_LONGEST = 10.0
 
 _GROUND = (24, 24, 27)
-_CAVITY, _SOLID = (120, 150, 180, 36), (205, 150, 105, 150)
+_CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
 # Okabe and Ito's, without those that a dark ground swallows.
 LINES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
@@ -91,6 +93,7 @@ class RecordingWriter:
         self._before: series.Seen = None
         self._rows: list[tuple[int, float, list[float]]] = []
         self._due = 0.0
+        self._failed = False
         self._url = viewer.live_url(settings.live) if settings.live else None
 
     def __enter__(self) -> WriteFrames:
@@ -114,6 +117,8 @@ class RecordingWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._failed:
+            return  # to flush once more would wait for ever
         try:
             self._send_rows()
             self._stream.disconnect()
@@ -125,7 +130,7 @@ class RecordingWriter:
         """What does not change."""
         log = self._stream.log
         log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(1.4)), static=True)
+        log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
         for shape in self._shapes:
             path = f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
             face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
@@ -145,8 +150,8 @@ class RecordingWriter:
         every = f", every {self._stride}th frame" if self._stride > 1 else ""
         text = (
             f"**{told}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
-            f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the plots {series.NOTHING:g} is "
-            "the logarithm of 0."
+            f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
+            f"plots {series.NOTHING:g} is the logarithm of 0."
         )
         log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         values = rr.AnyValues(
@@ -159,7 +164,7 @@ class RecordingWriter:
         chosen = [frame for frame in frames if frame[0] % self._stride == 0 or frame[0] == self._last]
         if not chosen:
             return
-        numbers, times = ([frame[part] for frame in chosen] for part in (0, 1))
+        numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
         n = len(self._some)
         points, colour = np.empty((len(chosen), n, 3), np.float32), np.empty((len(chosen), n), np.uint32)
         for k, (number, moment, state, seen) in enumerate(chosen):
@@ -176,6 +181,7 @@ class RecordingWriter:
             try:
                 self._send_rows()
             except (RuntimeError, ValueError) as error:
+                self._failed = True
                 raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
 
     def _send_rows(self) -> None:
@@ -189,7 +195,7 @@ class RecordingWriter:
         self._rows = []
         self._due = time.monotonic() + _PATIENCE
         # Without it nobody would hear of a full disk.
-        self._stream.flush()
+        self._stream.flush(timeout_sec=_LONGEST)
 
     def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
         indexes = [rr.TimeColumn("frame", sequence=numbers), rr.TimeColumn("sim_time", duration=times)]

@@ -75,7 +75,7 @@ def _logarithm_of(name: str) -> Callable[..., float]:
 
 
 def _rate(name: str, per: float, i: int | None = None) -> Callable[..., float]:
-    """The growth of what is counted since the start, over the time from the frame before; of the first there is none."""
+    """The growth of what is counted, over the time from the frame before; at the first frame there is none."""
 
     def value(moment: float, seen: dict[str, Any], before: Seen) -> float:
         if before is None:

@@ -12,7 +12,8 @@ from skimage.measure import marching_cubes
 from ..particles import Floats
 from ..scene import Scene
 
-# Points along each side of the grid whose cells the triangles lie in. A sphere's area comes out 0.07 % too small, a box's 0.6 %.
+# Points along each side of the grid whose cells the triangles lie in. A sphere's area comes out 0.07 % too small,
+# a box's 0.6 %.
 _POINTS = 48
 # Planes across each axis whose curves make the wire frame, and the points along a side of each plane.
 _PLANES, _FINE = 5, 160
@@ -94,7 +95,7 @@ def _gap(scene: Scene, points: Floats) -> Floats:
     """The largest gap of all surfaces at points (3, N): 0 on every wall. Where phi is no number, particles are not."""
     with np.errstate(all="ignore"):
         gap = scene.gaps(points).max(axis=0)
-    return np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0))
+    return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
 
 
 def _triangles(scene: Scene, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats]:

@@ -50,7 +50,9 @@ def _chosen(playback: Playback, times: list[float] | None) -> list[int]:
         return sorted({0, last // 2, last})
     for moment in times:
         if not playback.times[0] <= moment <= playback.times[last]:
-            raise SceneError(f"times must lie between {playback.times[0]:g} and {playback.times[last]:g} s, got {moment:g}")
+            raise SceneError(
+                f"times must lie between {playback.times[0]:g} and {playback.times[last]:g} s, got {moment:g}"
+            )
     return [int(np.abs(playback.times - moment).argmin()) for moment in times]
 
 
@@ -77,12 +79,14 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
         groups.setdefault(group, {})[playback.names[path]] = values
     above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
     picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
-    top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below])
+    top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
     top.set_facecolor(drawing.GROUND)
     cells = []
     for place, k in enumerate(frames):
         cells.append(top.add_subplot(above, min(_COLUMNS, len(frames)), place + 1, projection=None if found else "3d"))
-        cells[-1].set_title(f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT)
+        cells[-1].set_title(
+            f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
+        )
         if found:
             cells[-1].imshow(found[place])
             cells[-1].set_axis_off()

@@ -54,7 +54,7 @@ class _Viewer:
 
     def __init__(self, *arguments: str) -> None:
         # A file, not a pipe: nobody reads it while the viewer writes, and its child would keep a pipe open.
-        self._told = tempfile.TemporaryFile()
+        self._told = tempfile.TemporaryFile()  # noqa: SIM115 (closed by end)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rerun", "--bind", _HERE, *arguments],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True,
@@ -112,7 +112,7 @@ def headless(recording: Path) -> Iterator[Any]:
     """A viewer without a window that has loaded a recording: a `rerun.experimental.ViewerClient`.
 
     Raises:
-        RunError: it did not start, or did not load it.
+        RunError: it did not start, did not load it, or ended.
     """
     from rerun.experimental import ViewerClient
 
@@ -126,6 +126,14 @@ def headless(recording: Path) -> Iterator[Any]:
         client.open(str(recording.resolve()))
         _loaded(client, process)
         yield client
+    except RunError:
+        raise
+    except Exception as error:  # of gRPC, and without a type to tell it by
+        # If it has died, its last words say more.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.process.wait(_DRAWING)
+        process.require_alive()
+        raise RunError(f"the Rerun viewer did not draw: {error}") from error
     finally:
         process.end()
 
@@ -150,13 +158,10 @@ def pictures(recording: Path, numbers: list[int], folder: Path) -> list[Path]:
     """
     files = []
     with headless(recording) as client:
-        try:
-            (view,) = (view for view in client.get_state().views if view.view_class == "3D")
-            for number in numbers:
-                client.set_time("frame", sequence=number, play_state="paused")
-                time.sleep(_DRAWING)
-                files.append(folder / f"{number}.png")
-                client.save_screenshot(str(files[-1].resolve()), view_id=view.view_id)
-        except (RuntimeError, ValueError, ConnectionError) as error:
-            raise RunError(f"the Rerun viewer did not draw: {error}") from error
+        (view,) = (view for view in client.get_state().views if view.view_class == "3D")
+        for number in numbers:
+            client.set_time("frame", sequence=number, play_state="paused")
+            time.sleep(_DRAWING)
+            files.append(folder / f"{number}.png")
+            client.save_screenshot(str(files[-1].resolve()), view_id=view.view_id)
     return files
