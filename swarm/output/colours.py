@@ -43,7 +43,8 @@ class Scale:
     def colours(self, values: Floats) -> NDArray[np.uint32]:
         """0xRRGGBBAA of each value."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
-        return _PACKED[np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)]
+        places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
+        return _PACKED[places]
 
 
 def table() -> Floats:

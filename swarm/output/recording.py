@@ -27,8 +27,8 @@ from . import colours, series, viewer
 from .shapes import shapes_of
 from .trajectory import Trajectory, WriteFrames, Written, check_target
 
-# Bytes of a particle (position and colour) and of a number of a time series, with what Rerun adds to its row.
-_PARTICLE_BYTES, _NUMBER_BYTES = 16, 48
+# Bytes of a particle (position and colour), and of what Rerun writes at most for a number of a time series: a chunk.
+_PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
 _MEGABYTE = 1e6
 _AT_ONCE = 10  # frames of a trajectory
 # Rows of the time series that are sent together, unless that takes longer than this [s].
@@ -100,7 +100,7 @@ class RecordingWriter:
         self._shapes = shapes_of(self._scene, self._some.position)
         self._series = series.lines_of(self._scene, self._method, self._shapes)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
-        frame = _PARTICLE_BYTES * len(self._some) + _NUMBER_BYTES * (1 + len(self._series))
+        frame = _PARTICLE_BYTES * len(self._some) + _NUMBER_BYTES * (2 + len(self._series))
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
         self._stream = rr.RecordingStream("swarm")
