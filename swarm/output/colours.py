@@ -44,7 +44,7 @@ class Scale:
         """0xRRGGBBAA of each value."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
         places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
-        return _PACKED[places]
+        return _PACKED[places]  # type: ignore[no-any-return]
 
 
 def table() -> Floats:
