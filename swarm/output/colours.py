@@ -55,7 +55,7 @@ def table() -> Floats:
 
 def _packed() -> NDArray[np.uint32]:
     red, green, blue = np.rint(table().T * 255.0).astype(np.uint32)
-    return red << 24 | green << 16 | blue << 8 | 0xFF
+    return red << 24 | green << 16 | blue << 8 | 0xFF  # type: ignore[no-any-return]
 
 
 _PACKED: NDArray[np.uint32] = _packed()

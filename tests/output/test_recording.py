@@ -183,7 +183,7 @@ def test_a_full_disk_ends_the_run(tmp_path):
         "particles = swarm.fill(scene, 2000, speed=0.5)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))\n"
         "try:\n"
-        "    swarm.simulate(scene, particles, swarm.Impact(), until=2.5, every=0.005, recording='run.rrd')\n"
+        "    swarm.simulate(scene, particles, swarm.Impact(), until=50.0, every=0.1, recording='run.rrd')\n"
         "except swarm.FileError as error:\n"
         "    print(error)\n"
     )
