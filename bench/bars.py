@@ -194,6 +194,51 @@ def overhead(n: int, frames: int, repeats: int) -> list[Row]:
     return rows
 
 
+def recording(frames: int, repeats: int) -> list[Row]:
+    """The speed of a run of 10 000 particles with a recording over that without, and the recording's size and seconds.
+
+    All particles are recorded, then half of them (`record_particles = 5000`, the default).
+    """
+    from swarm.output.recording import RecordingWriter, Settings
+
+    n, crossing = 10_000, 4.0 / 3.0 * 0.5 / SPEED
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+
+    def run(every: float, path: Path | None, shown: int) -> float:
+        start = time.perf_counter()
+        swarm.simulate(
+            SPHERE, particles, swarm.Impact(), until=frames * every, every=every, recording=path,
+            record_particles=shown, overwrite=True,
+        )  # fmt: skip
+        return time.perf_counter() - start
+
+    def written(path: Path) -> float:
+        seen = {"total_energy": 1.0, "kinetic_energy": 1.0, "energy_error": 0.0, "max_penetration": 0.0}
+        seen |= {"impacts": 0, "impulse": np.zeros(1)}
+        start = time.perf_counter()
+        settings = Settings(particles=n)
+        with RecordingWriter(path, True, SPHERE, swarm.Impact(), particles, frames, settings) as write:
+            for first in range(0, frames, 10):
+                write([(k, float(k), particles, seen) for k in range(first, min(first + 10, frames))])
+        return time.perf_counter() - start
+
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        run(crossing, path, n)
+        for impacts, shown in itertools.product((10, 30, 100), (n, n // 2)):
+            every = impacts * crossing
+            cases = {"none": lambda e=every: run(e, None, 1), "recorded": lambda e=every, s=shown: run(e, path, s)}
+            (none, none2), (recorded, recorded2) = in_turn(cases, repeats).values()
+            what = f"speed of {frames} frames, {impacts} impacts each, {shown} particles recorded over not"
+            rows.append(Row(what, none / recorded, none2 / recorded2, "x", ">= 0.7"))
+        seconds, seconds2 = repeated(lambda: written(path), repeats)
+        rows.append(Row(f"  {n} particles, {frames} frames, recorded alone", seconds, seconds2, "s", "2"))
+        size = path.stat().st_size / 1e6
+        rows.append(Row("  its file", size, size, "MB", "70"))
+    return rows
+
+
 def output(frames: int, repeats: int) -> list[Row]:
     """A run that writes 10 000 particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
     import h5py
@@ -338,6 +383,7 @@ def main(quick: bool) -> None:
     rows += overhead(10_000, 50 if quick else 1_000, repeats)
     rows += scale(1_000 if quick else 100_000, 10_000 if quick else 10_000_000)
     rows += output(20 if quick else 500, repeats)
+    rows += recording(20 if quick else 500, repeats if quick else 3)
     rows += memory(100_000 if quick else 10_000_000)
     rows += start_up(1 if quick else 3)
     rows += accuracy(1e2 if quick else 1e5)

@@ -1,5 +1,6 @@
 """The commands. No physics, and no heavy import before it is needed: --help must be fast."""
 
+import itertools
 import shlex
 import sys
 from pathlib import Path
@@ -50,7 +51,11 @@ def run(
     threads: Annotated[
         int | None, typer.Option(help="Threads [default: all cores]; results do not depend on it.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing trajectory.")] = False,
+    recording: Annotated[
+        Path | None, typer.Option("--record", metavar="OUT.rrd", help="Record it for Rerun and swarm view.")
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Show it in a Rerun viewer while it runs.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint, if there is one.")] = False,
     walltime: Annotated[
@@ -70,6 +75,9 @@ def run(
     # Before particles are made and kernels compiled.
     Storage(job.run.frames, job.run.precision, job.run.compression)
     check_target(target, overwrite or resume)
+    shown = recording or (None if resume or not job.run.recording else Path(job.run.recording))
+    if shown is not None:
+        check_target(shown, overwrite, "recording")
 
     from .simulation import simulate
 
@@ -82,6 +90,11 @@ def run(
             until=job.run.until,
             every=job.run.every,
             trajectory=target,
+            recording=shown,
+            record_particles=job.run.record_particles,
+            record_color=job.run.record_color,
+            record_megabytes=job.run.record_megabytes,
+            live=live,
             threads=threads if threads is not None else job.run.threads,
             progress=not quiet,
             overwrite=overwrite,
@@ -110,12 +123,21 @@ def run(
 
 def _stopped(why: str, target: Path, as_json: bool) -> None:
     """Say how to go on with a run that was stopped."""
-    again = [word for word in sys.argv[1:] if word not in ("--overwrite", "--resume")]
-    command = shlex.join(["swarm", *again, "--resume"])
+    command = shlex.join(["swarm", *_words_again(sys.argv[1:]), "--resume"])
     reason = "interrupted" if why == "interrupted" else "the wall time is over"
     print(f"{reason}: {target} holds the frames that were finished; go on with\n  {command}", file=sys.stderr)
     if as_json:
         _json(why, target, resume=command)
+
+
+def _words_again(words: list[str]) -> list[str]:
+    """What was typed, but for what a resumed run cannot do."""
+    again: list[str] = []
+    for before, word in itertools.pairwise(["", *words]):
+        name = word.partition("=")[0]
+        if name not in ("--overwrite", "--resume", "--live", "--record") and before != "--record":
+            again.append(word)
+    return again
 
 
 def _json(status: str, target: Path, **more: Any) -> None:
@@ -126,9 +148,21 @@ def _json(status: str, target: Path, **more: Any) -> None:
     print(json.dumps({**numbers(status, target), **more}, indent=2))
 
 
-@app.command(epilog="Example:  swarm info cavity.h5")
-def info(file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")]) -> None:
-    """Say what a trajectory holds."""
+@app.command(epilog="Examples:  swarm info cavity.h5  |  swarm info --repair cavity.rrd")
+def info(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A trajectory (.h5) or a recording (.rrd).")],
+    repair: Annotated[bool, typer.Option("--repair", help="Mend a recording that a crash cut off, in place.")] = False,
+) -> None:
+    """Say what a trajectory or a recording holds."""
+    if file.suffix == ".rrd":
+        _table(_recording_rows(file, repair))
+    elif repair:
+        raise SceneError(f"--repair is for recordings (.rrd), got {file}; a trajectory needs none")
+    else:
+        _table(_trajectory_rows(file))
+
+
+def _trajectory_rows(file: Path) -> dict[str, str]:
     from .output.trajectory import load
 
     with load(file) as trajectory:
@@ -144,7 +178,119 @@ def info(file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A traject
         }
         if len(times):
             rows |= _figures(seen)
-    _table(rows)
+    return rows
+
+
+def _recording_rows(file: Path, repair: bool) -> dict[str, str]:
+    from .output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from .output import playback
+
+    if repair:
+        playback.repair(file)
+    held, whole = playback.described(file)
+    about, times = held.about, held.times
+    missing = "" if whole else "; these are the frames that swarm info --repair will keep"
+    every = f", of the run's every {about['stride']}th" if about["stride"] > 1 else ""
+    return {
+        "frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s{every}{missing}",
+        "particles": f"{about['shown']} of {about['particles']}",
+        "colour": f"{about['quantity']}, {about['low']:g} to {about['high']:g}",
+        "entities": "\n".join(f"{path} ({rows} rows)" for path, rows in sorted(held.entities.items())),
+        "size": f"{file.stat().st_size / 1e6:.1f} MB",
+        "whole": "yes" if whole else f"no, it was cut off: swarm info --repair {file}",
+    }
+
+
+@app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")
+def record(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
+    ] = None,
+    particles: Annotated[int, typer.Option(help="Record at most so many, evenly chosen.")] = 5000,
+    color: Annotated[str, typer.Option(help="What colours them: speed or energy-error.")] = "speed",
+    megabytes: Annotated[float, typer.Option(help="Record every k-th frame where it would be larger.")] = 100.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
+) -> None:
+    """Make a Rerun recording of a trajectory."""
+    from .output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from .output import recording
+    from .output.trajectory import load
+
+    target = output or file.with_suffix(".rrd")
+    with load(file) as trajectory:
+        recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
+    print(f"written to {target} ({target.stat().st_size / 1e6:.1f} MB)")
+
+
+@app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")
+def view(
+    file: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="A recording.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
+    ] = None,
+    times: Annotated[
+        str | None, typer.Option(help="Frames near these times [s], as 0,5,10 [default: first, middle, last].")
+    ] = None,
+    viewer: Annotated[
+        bool | None,
+        typer.Option("--viewer/--no-viewer", help="By the Rerun viewer or matplotlib [default: what is there]."),
+    ] = None,
+) -> None:
+    """Draw a contact sheet of a recording; no screen and no GPU are needed."""
+    from .output.extras import needed_by
+
+    with needed_by("a contact sheet", "record"):
+        from .output.playback import Playback
+    with needed_by("a contact sheet", "plot"):
+        from .output import sheet
+
+    target = output or file.with_suffix(".png")
+    _check_picture(target)
+    by = sheet.draw(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
+    print(f"written to {target}; drawn by {by}")
+
+
+@app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
+    ] = None,
+) -> None:
+    """Draw energy error, penetration, impacts, pressure, speeds and the particles of a trajectory."""
+    from .output.extras import needed_by
+
+    with needed_by("a plot", "plot"):
+        from .output import plots
+    from .output.trajectory import load
+
+    target = output or file.with_suffix(".png")
+    _check_picture(target)
+    with load(file) as trajectory:
+        plots.draw(trajectory, target)
+    print(f"written to {target}")
+
+
+def _check_picture(target: Path) -> None:
+    """A picture is made again in no time: an old one is replaced."""
+    from .output.writer import check_target
+
+    check_target(target, overwrite=True, what="picture")
+    if target.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise SceneError(f"picture: expected a file name that ends in .png, .pdf or .svg, got {target}")
+
+
+def _numbers(name: str, text: str) -> list[float]:
+    """Numbers with commas between them."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"{name} must be numbers with commas between them, got {text!r}") from None
 
 
 def _call(described: Any) -> str:

@@ -42,6 +42,10 @@ class RunTable:
     precision: str = "float64"
     compression: str = "none"
     checkpoint: float = 60.0
+    recording: str | None = None
+    record_particles: int = 5000
+    record_color: str = "speed"
+    record_megabytes: float = 100.0
 
 
 @dataclass(frozen=True)

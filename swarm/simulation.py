@@ -21,7 +21,7 @@ from .scene import Scene
 from .sessions import Session
 
 if TYPE_CHECKING:
-    from .output.beside import Beside
+    from .output.beside import Beside, Writer
 
 _LOG = logging.getLogger("swarm")
 # Frames nearer to `until` than this part of `every` are `until`.
@@ -70,6 +70,10 @@ def simulate(
     every: float | None = None,
     trajectory: str | os.PathLike[str] | None = None,
     recording: str | os.PathLike[str] | None = None,
+    record_particles: int = 5000,
+    record_color: str = "speed",
+    record_megabytes: float = 100.0,
+    live: bool | str = False,
     threads: int | None = None,
     progress: bool | Callable[[Frame], None] = False,
     overwrite: bool = False,
@@ -99,11 +103,14 @@ def simulate(
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
-        recording: Rerun file to write (not yet supported).
+        recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
+        record_particles: at most so many are recorded, evenly chosen.
+        record_color: what colours them, "speed" or "energy-error".
+        record_megabytes: how large the recording may become, above 0: of too many frames every k-th is recorded.
+        live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
-
         progress: True for a progress bar, or a function that is called with every `Frame`.
-        overwrite: replace an existing trajectory.
+        overwrite: replace an existing trajectory and recording.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes on at once. Results do not depend on it.
         frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
@@ -119,7 +126,7 @@ def simulate(
 
     Raises:
         SceneError: bad input, or a checkpoint of another run; nothing has run or been written.
-        FileError: the trajectory exists or cannot be written.
+        FileError: the trajectory or the recording cannot be written.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
         WallTimeError: the wall time is over; the frames before it are in the trajectory.
@@ -136,8 +143,6 @@ def simulate(
     threads = _threads(threads)
     if block_size is not None:
         checks.count("block_size", block_size)
-    if recording is not None:
-        raise SceneError("recording is not supported yet, got a file name; leave it out and use trajectory=")
     _check(scene, particles, method, until, every)
 
     if scene.is_open():
@@ -146,12 +151,19 @@ def simulate(
     from .progress import display  # rich is imported only when it is shown
 
     storage = Storage(frames, precision, compression)
+    shown = {"particles": record_particles, "color": record_color, "megabytes": record_megabytes, "live": live}
+    recorder = _recording(recording, overwrite, resume, scene, method, particles, _frame_times(until, every), shown)
     session.prepare(scene, method, storage, particles, until, overwrite)
 
     run = Run(scene, particles, method, threads, block_size)
     session.restore(run)
     history: list[dict[str, Any]] = []
-    writer = None if target is None else _output(target, storage, scene, method, particles, scene_text, session.first)
+    writer = _output(
+        _trajectory(target, storage, scene, method, particles, scene_text, session.first),
+        storage.kept(),
+        recorder,
+        len(particles),
+    )
     writing = writer or contextlib.nullcontext(lambda *frame: None)
 
     def stop() -> None:
@@ -258,18 +270,57 @@ def _magnitude(scene: Scene, particles: Particles) -> float:
     return max(float(np.abs(particles.position).max()), scene.finite_size())
 
 
-def _output(
-    path: Path,
+def _trajectory(
+    path: Path | None,
     storage: Storage,
     scene: Scene,
     method: Method,
     particles: Particles,
     scene_text: str | None,
     first: int,
-) -> "Beside":
-    """A context that gives the function which writes a frame."""
-    from .output.beside import Beside
+) -> "Writer | None":
+    if path is None:
+        return None
     from .output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    file = TrajectoryWriter(path, storage, scene, method, particles, scene_text, first > 0)
-    return Beside(file, len(particles), storage.kept())
+    return TrajectoryWriter(path, storage, scene, method, particles, scene_text, first > 0)
+
+
+def _recording(
+    path: str | os.PathLike[str] | None,
+    overwrite: bool,
+    resume: bool,
+    scene: Scene,
+    method: Method,
+    particles: Particles,
+    times: Iterator[Any],
+    shown: dict[str, Any],
+) -> "Writer | None":
+    """What records for Rerun, if anything is to be."""
+    if path is None and not shown["live"]:
+        return None
+    if resume:
+        raise SceneError(
+            "recording and live cannot go on with a run that was stopped; leave them out, and make the recording from "
+            "the trajectory: swarm record RUN.h5 -o OUT.rrd"
+        )
+    from .output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from .output.recording import RecordingWriter, Settings  # rerun takes half a second
+
+    target, frames = None if path is None else Path(path), sum(1 for _time in times)
+    return RecordingWriter(target, overwrite, scene, method, particles, frames, Settings(**shown))
+
+
+def _output(trajectory: "Writer | None", kept: slice, recording: "Writer | None", n: int) -> "Beside | None":
+    """A context that gives the function which writes a frame, in a thread of its own."""
+    if trajectory is None and recording is None:
+        return None
+    from .output.beside import Beside, Several
+
+    if trajectory is None or recording is None:
+        one, kept = (trajectory, kept) if trajectory is not None else (recording, slice(None))
+        assert one is not None
+        return Beside(one, n, kept)
+    return Beside(Several([(trajectory, kept), (recording, slice(None))]), n)

@@ -1,5 +1,6 @@
 """Frames written beside the computation: a thread of their own behind a short queue."""
 
+import contextlib
 import queue
 import threading
 import time
@@ -35,6 +36,38 @@ class Writer(Protocol):
 
     def sync(self) -> None:
         """Let all that was written reach the disk."""
+
+
+class Several:
+    """A context of several writers, each with what it keeps of the particles: one after the other."""
+
+    def __init__(self, writers: list[tuple[Writer, slice]]) -> None:
+        self._writers = writers
+
+    def __enter__(self) -> WriteFrames:
+        with contextlib.ExitStack() as stack:
+            writes = [(stack.enter_context(writer), kept) for writer, kept in self._writers]
+            self._stack = stack.pop_all()
+
+        def write(frames: list[Written]) -> None:
+            for one, kept in writes:
+                one([(number, moment, _some(state, kept), seen) for number, moment, state, seen in frames])
+
+        return write
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    def sync(self) -> None:
+        """Let all that was written reach the disk."""
+        for writer, _kept in self._writers:
+            writer.sync()
+
+
+def _some(state: State, kept: slice) -> State:
+    return state._replace(position=state.position[:, kept], velocity=state.velocity[:, kept])
 
 
 class Beside:

@@ -261,11 +261,11 @@ def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, st
     }
 
 
-def check_target(path: Path, overwrite: bool) -> None:
+def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
     """Raise a SceneError if `path` cannot become a new file."""
     if not path.parent.is_dir():
-        raise SceneError(f"trajectory: the folder {path.parent} does not exist; create it first")
+        raise SceneError(f"{what}: the folder {path.parent} does not exist; create it first")
     if path.is_dir():
-        raise SceneError(f"trajectory: expected a file name, got the folder {path}")
+        raise SceneError(f"{what}: expected a file name, got the folder {path}")
     if path.exists() and not overwrite:
-        raise SceneError(f"trajectory: {path} exists; choose another name, or overwrite it with --overwrite")
+        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it with --overwrite")

@@ -1,0 +1,117 @@
+"""Colours of particles, by speed or by energy error, on a dark ground: light is much."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.regularisation import stored_energy
+from ..errors import SceneError
+from ..methods.base import Method
+from ..particles import Floats, Particles
+from ..scene import Scene
+from ..surfaces import base
+
+BY = ("speed", "energy-error")
+
+# Viridis (https://bids.github.io/colormap) without its darkest third, which a dark ground swallows: every kind of eye
+# sees it go from dark to light.
+_TABLE = np.array(
+    [
+        (53, 95, 141), (44, 114, 142), (36, 134, 142), (31, 153, 138), (41, 175, 127),
+        (78, 195, 107), (122, 209, 81), (173, 220, 48), (220, 227, 25), (253, 231, 37),
+    ],
+    dtype=np.float64,
+)  # fmt: skip
+_STEPS = 256
+# Speeds up to this many times that of the mean energy of the start.
+_FASTER = 1.5
+# Decades of the relative energy error: from round-off to what a picture shows.
+_DECADES = (-16.0, -6.0)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What colours mean: the quantity with its unit, and its values at both ends."""
+
+    quantity: str
+    low: float
+    high: float
+
+    def colours(self, values: Floats) -> NDArray[np.uint32]:
+        """0xRRGGBBAA of each value."""
+        steps = (values - self.low) * (_STEPS / (self.high - self.low))
+        places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
+        return _PACKED[places]  # type: ignore[no-any-return]
+
+
+def table() -> Floats:
+    """Red, green and blue from 0 to 1, from the lowest value to the highest: (256, 3)."""
+    places = np.linspace(0.0, len(_TABLE) - 1.0, _STEPS)
+    return np.stack([np.interp(places, np.arange(len(_TABLE)), part) for part in _TABLE.T], axis=1) / 255.0
+
+
+def _packed() -> NDArray[np.uint32]:
+    red, green, blue = np.rint(table().T * 255.0).astype(np.uint32)
+    return red << 24 | green << 16 | blue << 8 | 0xFF  # type: ignore[no-any-return]
+
+
+_PACKED: NDArray[np.uint32] = _packed()
+
+Values = Callable[[Floats, Floats], Floats]
+
+
+def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[Scale, Values]:
+    """The scale, and the function of positions and velocities (3, N) that gives what it is of.
+
+    Raises:
+        SceneError: energy errors are asked for where impacts dissipate energy.
+    """
+    energy, scale = _energies(scene, method, start)
+    if by == "speed":
+        fastest = _FASTER * math.sqrt(2.0 * scale.mean()) or 1.0
+        # Two digits are enough on a legend.
+        fastest = float(f"{fastest:.1e}")
+        return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: _speed(velocity)
+    if scene.restitution() is not None:
+        raise SceneError(
+            "record_color must be 'speed' where a surface has a restitution below 1, got 'energy-error': what impacts "
+            "dissipate is no error"
+        )
+    before, inverse = energy(start.position, start.velocity), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
+
+    def errors(position: Floats, velocity: Floats) -> Floats:
+        error = np.abs(energy(position, velocity) - before) * inverse
+        return np.asarray(np.log10(np.maximum(error, 10.0 ** _DECADES[0])))
+
+    return Scale("log10 of the relative energy error", *_DECADES), errors
+
+
+def _speed(velocity: Floats) -> Floats:
+    x, y, z = velocity
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def _energies(scene: Scene, method: Method, start: Particles) -> tuple[Values, Floats]:
+    """Energies per mass as a function of positions and velocities, and what their errors are relative to."""
+    law, gravity, mass = method.law(), np.array(scene.gravity or (0.0, 0.0, 0.0)), start.mass
+
+    def stored(position: Floats) -> Floats:
+        total = np.zeros(len(mass))
+        if law is not None:
+            for surface in scene.surfaces:
+                side = base.side_sign(getattr(surface, "side", "inside"))
+                for wall in surface.walls():
+                    gap = side * base.phi(wall, *position)
+                    # Few are in a wall, and the law is for one number.
+                    for i in np.flatnonzero(gap > 0.0):
+                        total[i] += stored_energy(law, float(gap[i])) / mass[i]
+        return total
+
+    def energy(position: Floats, velocity: Floats) -> Floats:
+        return 0.5 * _speed(velocity) ** 2 - gravity @ position + stored(position)
+
+    scale = 0.5 * _speed(start.velocity) ** 2 + stored(start.position) + np.abs(gravity).sum() * scene.finite_size()
+    return energy, scale

@@ -1,0 +1,105 @@
+"""What contact sheets and plots draw, by matplotlib: particles among their walls, and time series."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.colors import ListedColormap
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from numpy.typing import ArrayLike, NDArray
+
+from ..particles import Floats
+from . import colours, series
+
+# Okabe and Ito's, for a light ground.
+LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MAP = ListedColormap(colours.table(), name="swarm")
+GROUND, LIGHT = "#18181b", "#c8c8d0"
+_WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
+_DPI = 100
+
+
+def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
+    """0xRRGGBBAA as three numbers from 0 to 1: (N, 3)."""
+    return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
+
+
+def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]]) -> None:
+    """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale."""
+    points = np.asarray(positions)
+    for solid, curves in wires:
+        lines = Line3DCollection(curves, colors=_SOLID_WIRE if solid else _WIRE, linewidths=0.5, alpha=0.7)
+        axes.add_collection3d(lines, autolim=False)
+    size = float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
+    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False)
+    corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
+        axis.set_pane_color((0.0, 0.0, 0.0, 0.0))
+        axis.line.set_color(LIGHT)
+        axis.set_tick_params(colors=LIGHT, labelsize=7, pad=-1)
+        axis.label.set_color(LIGHT)
+        axis.set_major_locator(matplotlib.ticker.MaxNLocator(3))
+        axis.set_view_interval(a, b)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_xlabel("x [m]", labelpad=-4, fontsize=8)
+    axes.set_ylabel("y [m]", labelpad=-4, fontsize=8)
+    axes.set_zlabel("z [m]", labelpad=-4, fontsize=8)
+    axes.set_aspect("equal")
+    axes.grid(False)
+    axes.set_facecolor(GROUND)
+
+
+def colour_bar(picture: Any, axes: Any, quantity: str, low: float, high: float) -> None:
+    """What the colours of the particles mean, below these axes."""
+    meaning = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(low, high), MAP)
+    bar = picture.colorbar(meaning, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02)
+    bar.set_label(f"colour: {quantity}", color=LIGHT, fontsize=9)
+    bar.ax.tick_params(colors=LIGHT, labelsize=8)
+
+
+def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarithm: bool) -> None:
+    """The time series of one plot, by their names: (times [s], values)."""
+    for colour, (name, (times, values)) in zip(LINES * (len(drawn) // len(LINES) + 1), drawn.items(), strict=False):
+        shown = 10.0**values if logarithm else values
+        axes.plot(times, shown, color=colour, linewidth=1.2, label=name, marker="." if len(times) < 30 else None)
+    if logarithm:
+        axes.set_yscale("log")
+        lowest = min(values.min() for _times, values in drawn.values())
+        highest = max(values.max() for _times, values in drawn.values())
+        # A decade around what is there, or a flat line would have no ticks.
+        axes.set_ylim(10.0 ** (np.floor(lowest) - 0.3), 10.0 ** (np.floor(highest) + 1.3))
+        if lowest == series.NOTHING:
+            axes.axhline(10.0**series.NOTHING, color="grey", linewidth=0.6, linestyle=":")
+            axes.annotate("none", (1.0, 10.0**series.NOTHING), xycoords=("axes fraction", "data"),
+                          xytext=(3, 0), textcoords="offset points", fontsize=8, color="grey", va="center")  # fmt: skip
+    else:
+        _steady(axes, drawn)
+    axes.set_title(view, fontsize=10)
+    axes.set_xlabel("time [s]", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.3)
+    if len(drawn) > 1:
+        axes.legend(fontsize=8)
+
+
+def _steady(axes: Any, drawn: dict[str, tuple[Floats, Floats]]) -> None:
+    """Where a curve is constant but for round-off, its round-off is not drawn as mountains."""
+    values = np.concatenate([values for _times, values in drawn.values()])
+    middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
+    if half <= 1e-6 * abs(middle):
+        axes.set_ylim(middle - 0.1 * abs(middle or 1.0), middle + 0.1 * abs(middle or 1.0))
+    axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-3, 6))
+
+
+def save(picture: Any, path: Path) -> None:
+    """Write a picture and forget it."""
+    try:
+        picture.savefig(path, dpi=_DPI)
+    finally:
+        pyplot.close(picture)

@@ -1,0 +1,144 @@
+"""Recordings read back: what is in a `.rrd` file, and whether it is whole."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+
+from ..errors import FileError, SceneError
+from ..particles import Floats
+
+_PARTICLES = "/scene/particles"
+_POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
+
+
+class Playback:
+    """A recording of swarm, read at once.
+
+    Attributes:
+        numbers, times: of the frames, times in [s].
+        entities: path -> number of rows.
+        series: path -> (times, values).
+        names: path -> name in the legend.
+        about: what its colours mean: quantity, low, high; particles and how many are shown; the stride of its frames.
+        wires: of each surface, whether it is a solid and its curves.
+
+    Raises:
+        SceneError: the file cannot be read, is cut off, or is no recording of swarm.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise SceneError(f"cannot read the recording {path}: there is no such file")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that it has no footer, which is_whole says
+                chunks = RrdReader(path).stream().to_chunks()
+        except (RuntimeError, ValueError, OSError) as error:
+            raise SceneError(f"cannot read the recording {path}: {error}; swarm info --repair may mend it") from error
+        self.entities: dict[str, int] = {}
+        self.series: dict[str, tuple[Floats, Floats]] = {}
+        self.names: dict[str, str] = {}
+        self.about: dict[str, Any] = {}
+        self.wires: list[tuple[bool, list[Floats]]] = []
+        self._frames: dict[int, tuple[Any, int]] = {}
+        rows: dict[str, list[tuple[NDArray[np.int64], Floats]]] = {}
+        for chunk in chunks:
+            entity = chunk.entity_path
+            if entity.startswith("/__"):
+                continue
+            self.entities[entity] = self.entities.get(entity, 0) + chunk.num_rows
+            batch = chunk.to_record_batch()
+            names = batch.schema.names
+            if _POSITIONS in names:
+                self._frames |= {number: (batch, row) for row, number in enumerate(batch.column("frame").to_pylist())}
+            if _SCALARS in names:
+                values = batch.column(_SCALARS).flatten().to_numpy(zero_copy_only=False)
+                rows.setdefault(entity, []).append((batch.column("frame").to_numpy(), values))
+            self._static(entity, batch, names)
+        if not self._frames or "/time" not in rows:
+            raise SceneError(f"{path} is not a recording of swarm, or holds no frame")
+        moments = {k: t for numbers, values in rows.pop("/time") for k, t in zip(numbers, values, strict=True)}
+        # A crash may have left more points than rows of the time series.
+        self.numbers = sorted(number for number in self._frames if number in moments)
+        self.times = np.array([moments[number] for number in self.numbers])
+        for entity, parts in rows.items():
+            numbers, values = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+            self.series[entity] = np.array([moments[number] for number in numbers]), values
+
+    def _static(self, entity: str, batch: Any, names: list[str]) -> None:
+        if "SeriesLines:names" in names:
+            self.names[entity] = batch.column("SeriesLines:names")[0].as_py()[0]
+        if entity == "/about":
+            known = {"quantity", "low", "high", "particles", "shown", "stride"}
+            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in known}
+        if "LineStrips3D:strips" in names:
+            strips = batch.column("LineStrips3D:strips")[0].as_py()
+            self.wires.append((entity.startswith("/scene/solids/"), [np.array(strip) for strip in strips]))
+
+    def frame(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+        """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
+        batch, row = self._frames[number]
+        positions = batch.column(_POSITIONS)[row].values.flatten().to_numpy(zero_copy_only=False)
+        colours = batch.column(_COLOURS)[row].values.to_numpy(zero_copy_only=False)
+        return positions.reshape(-1, 3), colours
+
+
+def is_whole(path: Path) -> bool:
+    """Whether the file ends as Rerun ends it, so that every viewer opens it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            RrdReader(path).store()
+    except (RuntimeError, ValueError, OSError):
+        return False
+    return True
+
+
+def repaired(path: Path, target: Path) -> Playback:
+    """What is left of a recording that was cut off, as a whole one in another file.
+
+    Raises:
+        SceneError: nothing is left, or it is no recording of swarm.
+        FileError: the other file cannot be written.
+    """
+    command = [sys.executable, "-m", "rerun", "rrd", "merge", "--continue-on-error", str(path), "-o", str(target)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode or not target.is_file():
+        told = done.stderr.strip().splitlines() or ["rerun said nothing"]
+        raise FileError(f"cannot repair {path}: {told[-1]}")
+    try:
+        return Playback(target)
+    except SceneError as error:
+        raise SceneError(f"{path} is not a recording of swarm, or no frame of it is left") from error
+
+
+def repair(path: Path) -> Playback:
+    """Mend a recording in place.
+
+    Raises:
+        SceneError, FileError: as `repaired`; the file is as it was.
+    """
+    target = path.with_name(f".{path.name}.repaired.rrd")
+    try:
+        repaired(path, target)
+        os.replace(target, path)
+    finally:
+        target.unlink(missing_ok=True)
+    return Playback(path)
+
+
+def described(path: Path) -> tuple[Playback, bool]:
+    """A recording, and whether it is whole: of one that is not, what could be repaired."""
+    if is_whole(path) or not path.is_file():
+        return Playback(path), True
+    with tempfile.TemporaryDirectory() as folder:
+        return repaired(path, Path(folder) / "repaired.rrd"), False

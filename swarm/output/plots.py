@@ -1,0 +1,80 @@
+"""A trajectory on one picture: whether it went well, and where the particles are."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot
+
+from ..errors import SceneError
+from . import colours, drawing, series
+from .shapes import shapes_of
+from .trajectory import Trajectory
+
+# At most so many particles are drawn.
+_SHOWN = 5000
+_BINS = 60
+_WIDE, _HIGH = 17.0, 7.6
+
+
+def draw(trajectory: Trajectory, target: Path) -> None:
+    """Draw the time series of a trajectory, its speeds, and its particles at the end.
+
+    Raises:
+        SceneError: the trajectory holds no frame.
+    """
+    if not len(trajectory):
+        raise SceneError(f"{trajectory.path} holds no frame")
+    scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observables
+    end = trajectory.frame(-1)
+    shapes = shapes_of(scene, end.position)
+    picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
+    left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
+
+    left.set_facecolor(drawing.GROUND)
+    drawn = slice(None, None, -(-len(end) // _SHOWN))
+    scale, values = colours.colouring("speed", scene, method, trajectory.frame(0))
+    axes = left.add_subplot(projection="3d")
+    packed = scale.colours(values(end.position, end.velocity)[drawn])
+    wires = [(shape.solid, shape.wires) for shape in shapes]
+    drawing.particles(axes, end.position[:, drawn].T, drawing.red_green_blue(packed), wires)
+    drawing.colour_bar(left, axes, scale.quantity, scale.low, scale.high)
+    told = f"{len(packed)} of {len(end)} particles, t = {times[-1]:.6g} s"
+    axes.set_title(told, fontsize=10, color=drawing.LIGHT)
+
+    lines = series.lines_of(scene, method, shapes)
+    before: series.Seen = None
+    rows = []
+    for k, moment in enumerate(times):
+        now = {name: column[k] for name, column in seen.items()}
+        rows.append(series.row_of(lines, moment, now, before))
+        before = moment, now
+    columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
+    views = series.views_of(lines)
+    cells = right.subplots(2, 3).ravel()
+    for cell, (view, together) in zip(cells, views.items(), strict=False):
+        known = {line.name: ~np.isnan(columns[line.path]) for line in together}
+        curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}
+        drawing.lines(cell, view, curves, together[0].logarithm)
+    _speeds(cells[len(views)], trajectory)
+    for cell in cells[len(views) + 1 :]:
+        cell.set_axis_off()
+    picture.suptitle(f"{trajectory.path.name}: {len(times)} frames, {method!r}".replace("swarm.", ""), fontsize=11)
+    drawing.save(picture, target)
+
+
+def _speeds(axes: Any, trajectory: Trajectory) -> None:
+    """How many particles have which speed, at the start and at the end."""
+    first, last = trajectory.frame(0), trajectory.frame(-1)
+    top = 1.05 * max(first.fastest(), last.fastest()) or 1.0
+    for colour, frame, name in zip(drawing.LINES, (first, last), ("start", "end"), strict=False):
+        speeds = np.sqrt((frame.velocity**2).sum(axis=0))
+        counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
+        style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
+        axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
+    axes.set_yscale("log")  # at the start all may be in one bin
+    axes.set_title(f"speeds, particles in each of {_BINS} bins [%]", fontsize=10)
+    axes.set_xlabel("speed [m/s]", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)

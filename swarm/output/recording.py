@@ -1,0 +1,259 @@
+"""Recordings: what Rerun (https://rerun.io) shows, written while a run goes on or from its trajectory.
+
+/scene/particles              Points3D, a frame's; coloured
+/scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
+/energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...)     Scalars
+/time                         Scalars: the exact time [s], for `sim_time` counts nanoseconds
+/about                        what the colours mean, as text and as values; static
+"""
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from .. import checks
+from ..errors import FileError
+from ..methods import Method
+from ..particles import Particles
+from ..scene import Scene
+from . import colours, series, viewer
+from .shapes import shapes_of
+from .trajectory import Trajectory
+from .writer import WriteFrames, Written, check_target
+
+# Bytes of a particle (position and colour), and of what Rerun writes at most for a number of a time series: a chunk.
+_PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
+_MEGABYTE = 1e6
+_AT_ONCE = 10  # frames of a trajectory
+# Rows of the time series that are sent together, unless that takes longer than this [s].
+_ROWS, _PATIENCE = 50, 0.5
+# A flush takes milliseconds; where the file cannot be written, it may never end [s].
+_LONGEST = 10.0
+
+_GROUND = (24, 24, 27)
+_CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
+_CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
+# Okabe and Ito's, without those that a dark ground swallows.
+LINES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much a recording shows.
+
+    Args:
+        particles: at most so many, evenly chosen.
+        color: "speed" or "energy-error".
+        megabytes: at most this large: of many frames every k-th is recorded, and the last.
+        live: True to show it in a viewer on this machine as it is made, or the URL of a viewer.
+    """
+
+    particles: int = 5000
+    color: str = "speed"
+    megabytes: float = 100.0
+    live: bool | str = False
+
+    def __post_init__(self) -> None:
+        checks.count("record_particles", self.particles)
+        checks.one_of("record_color", self.color, colours.BY)
+        checks.positive("record_megabytes", self.megabytes)
+
+
+class RecordingWriter:
+    """A context that begins the recording and gives the function that appends frames.
+
+    `frames` is how many there will be.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        overwrite: bool,
+        scene: Scene,
+        method: Method,
+        start: Particles,
+        frames: int,
+        settings: Settings,
+    ) -> None:
+        if path is not None:
+            check_target(path, overwrite, "recording")
+        self._path, self._scene, self._method, self._settings = path, scene, method, settings
+        self._count, self._last = len(start), frames - 1
+        # Every k-th: a slice takes a tenth of the time that a list of them takes.
+        self._drawn = slice(None, None, math.ceil(len(start) / settings.particles))
+        some = Particles(start.position[:, self._drawn], start.velocity[:, self._drawn], start.mass[self._drawn])
+        self._scale, self._values = colours.colouring(settings.color, scene, method, some)
+        self._some = some
+        self._before: series.Seen = None
+        self._rows: list[tuple[int, float, list[float]]] = []
+        self._due = 0.0
+        self._failed = False
+        self._url = viewer.live_url(settings.live) if settings.live else None
+
+    def __enter__(self) -> WriteFrames:
+        self._shapes = shapes_of(self._scene, self._some.position)
+        self._series = series.lines_of(self._scene, self._method, self._shapes)
+        fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
+        frame = _PARTICLE_BYTES * len(self._some) + _NUMBER_BYTES * (2 + len(self._series))
+        room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
+        self._stride = math.ceil((self._last + 1) * frame / room)
+        self._stream = rr.RecordingStream("swarm")
+        sinks = [rr.GrpcSink(self._url)] if self._url else []
+        try:
+            files = [rr.FileSink(self._path)] if self._path else []
+            self._stream.set_sinks(*sinks, *files, default_blueprint=_blueprint(self._series))
+        except RuntimeError as error:
+            raise FileError(f"cannot write the recording {self._path}: {error}") from error
+        self._stream.set_log_time_enabled(False)
+        self._begin()
+        return self._write
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._failed:
+            return  # to flush once more would wait for ever
+        try:
+            self._send_rows()
+            self._stream.flush(timeout_sec=_LONGEST)
+            self._stream.disconnect()
+        except (RuntimeError, ValueError) as problem:
+            if error is None:
+                raise FileError(f"cannot close the recording {self._path}: {problem}") from problem
+
+    def _begin(self) -> None:
+        """What does not change."""
+        log = self._stream.log
+        log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
+        for shape in self._shapes:
+            path = f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
+            face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
+            if len(shape.vertices):
+                mesh = rr.Mesh3D(
+                    vertex_positions=shape.vertices, triangle_indices=shape.triangles,
+                    vertex_normals=shape.normals, albedo_factor=face,
+                )  # fmt: skip
+                log(f"{path}/mesh", mesh, static=True)
+            if shape.wires:
+                lines = rr.LineStrips3D(shape.wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
+                log(f"{path}/wires", lines, static=True)
+        for colour, line in zip(_cycled(self._series), self._series, strict=True):
+            log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
+        scale, shown = self._scale, len(self._some)
+        told = f"{shown} of {self._count} particles" if shown < self._count else f"{shown} particles"
+        every = f", every {self._stride}th frame" if self._stride > 1 else ""
+        text = (
+            f"**{told}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
+            f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
+            f"plots {series.NOTHING:g} is the logarithm of 0."
+        )
+        log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
+        values = rr.AnyValues(
+            quantity=scale.quantity, low=scale.low, high=scale.high, particles=self._count, shown=shown,
+            stride=self._stride,
+        )  # fmt: skip
+        log("/about", values, static=True)
+
+    def _write(self, frames: list[Written]) -> None:
+        chosen = [frame for frame in frames if frame[0] % self._stride == 0 or frame[0] == self._last]
+        if not chosen:
+            return
+        numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
+        n = len(self._some)
+        points, colour = np.empty((len(chosen), n, 3), np.float32), np.empty((len(chosen), n), np.uint32)
+        for k, (number, moment, state, seen) in enumerate(chosen):
+            position, velocity = state.position[:, self._drawn], state.velocity[:, self._drawn]
+            points[k] = position.T
+            colour[k] = self._scale.colours(self._values(position, velocity))
+            self._rows.append((number, moment, series.row_of(self._series, moment, seen, self._before)))
+            self._before = moment, seen
+        columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
+        try:
+            self._send("/scene/particles", numbers, times, columns.partition([n] * len(chosen)))
+            self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
+            # A dozen series cost as much as the points of a few frames: sent together, but in time for a screen.
+            if len(self._rows) >= _ROWS or time.monotonic() > self._due:
+                self._send_rows()
+            # Without it nobody would hear of a full disk, and what is sent to a thread that died of it waits for ever.
+            self._stream.flush(timeout_sec=_LONGEST)
+        except (RuntimeError, ValueError) as error:
+            self._failed = True
+            raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
+
+    def sync(self) -> None:
+        """Nothing: no checkpoint refers to a recording."""
+
+    def _send_rows(self) -> None:
+        """The time series of the frames since the last time."""
+        if self._rows:
+            numbers, times = (np.array([row[part] for row in self._rows]) for part in (0, 1))
+            for line, values in zip(self._series, np.array([row[2] for row in self._rows]).T, strict=True):
+                known = ~np.isnan(values)
+                if known.any():
+                    self._send(line.path, numbers[known], times[known], rr.Scalars.columns(scalars=values[known]))
+        self._rows = []
+        self._due = time.monotonic() + _PATIENCE
+
+    def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
+        indexes = [rr.TimeColumn("frame", sequence=numbers), rr.TimeColumn("sim_time", duration=times)]
+        self._stream.send_columns(path, indexes, columns)
+
+
+# --- Looks ------------------------------------------------------------------------------------------------
+
+
+def _cycled(lines: list[series.Line]) -> list[tuple[int, int, int]]:
+    """A colour a line: in each view they begin anew."""
+    return [LINES[k % len(LINES)] for together in series.views_of(lines).values() for k in range(len(together))]
+
+
+def _blueprint(lines: list[series.Line]) -> rrb.Blueprint:
+    """The 3-D view beside the plots, paused at the start."""
+    scene = rrb.Spatial3DView(
+        origin="/scene", name="particles", background=_GROUND, line_grid=rrb.LineGrid3D(visible=False)
+    )
+    plots = []
+    for view, together in series.views_of(lines).items():
+        legend = rrb.PlotLegend(visible=len(together) > 1)
+        name = f"{view}, log10" if together[0].logarithm else view
+        paths = [line.path for line in together]
+        plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
+    about = rrb.TextDocumentView(origin="/about", name="legend")
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[8, 1]), rrb.Vertical(*plots), column_shares=[3, 2]),
+        rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
+
+
+# --- From a trajectory -----------------------------------------------------------------------------------
+
+
+def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bool = False) -> None:
+    """Make the recording of a trajectory.
+
+    Raises:
+        SceneError: the target exists, or the trajectory holds no frame.
+        FileError: the recording cannot be written.
+    """
+    frames, start, times = len(trajectory), trajectory.frame(0), trajectory.times
+    seen = trajectory.observables
+    writer = RecordingWriter(path, overwrite, trajectory.scene, trajectory.method, start, frames, settings)
+    with writer as write:
+        for first in range(0, frames, _AT_ONCE):
+            numbers = range(first, min(first + _AT_ONCE, frames))
+            write(
+                [
+                    (k, times[k], trajectory.frame(k), {name: values[k] for name, values in seen.items()})  # type: ignore[misc]
+                    for k in numbers
+                ]
+            )

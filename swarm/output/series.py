@@ -1,0 +1,87 @@
+"""The time series that recordings and plots show, from the observables of frames."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..methods import Method
+from ..scene import Scene
+from .shapes import Shape
+
+# The logarithm of a zero.
+NOTHING = -18.0
+
+# A frame's time [s], and what was observed then.
+Seen = tuple[float, dict[str, Any]] | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A time series: the plot it is in, its entity, its name in the legend, and its value at a frame.
+
+    The value is a function of the frame's time, of what was observed then and of both at the frame before; of a
+    `logarithm` it is log10.
+    """
+
+    view: str
+    path: str
+    name: str
+    value: Callable[[float, dict[str, Any], Seen], float]
+    logarithm: bool = False
+
+
+def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
+    """The time series of a scene: no line of what it does not have."""
+    energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
+    energies |= {"contact": method.law() is not None, "dissipated": scene.restitution() is not None}
+    lines = [
+        Line("energy [J]", f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there
+    ]
+    lines += [
+        Line("worst relative energy error", "/energy_error", "of a particle", _logarithm_of("energy_error"), True),
+        Line("largest penetration [m]", "/penetration", "of a particle", _logarithm_of("max_penetration"), True),
+        Line("impacts per second [1/s]", "/impacts", "all particles", _rate("impacts", 1.0)),
+    ]
+    # The walls of an open volume end where the drawing does: they have no area.
+    group, unit = ("force", "N") if scene.is_open() else ("pressure", "Pa")
+    for i, shape in enumerate(shapes):
+        area = 1.0 if scene.is_open() else shape.area()
+        if area > 0.0:
+            value = _rate("impulse", area, i)
+            lines.append(Line(f"{group} on each surface [{unit}]", f"/{group}/{shape.name}", shape.name, value))
+    return lines
+
+
+def views_of(lines: list[Line]) -> dict[str, list[Line]]:
+    """The lines of each plot."""
+    views: dict[str, list[Line]] = {}
+    for line in lines:
+        views.setdefault(line.view, []).append(line)
+    return views
+
+
+def row_of(lines: list[Line], moment: float, seen: dict[str, Any], before: Seen) -> list[float]:
+    """The value of every line at a frame; NaN where there is none."""
+    return [line.value(moment, seen, before) for line in lines]
+
+
+def _of(name: str) -> Callable[..., float]:
+    return lambda _moment, seen, _before: float(seen[name])
+
+
+def _logarithm_of(name: str) -> Callable[..., float]:
+    return lambda _moment, seen, _before: math.log10(max(seen[name], 10.0**NOTHING))
+
+
+def _rate(name: str, per: float, i: int | None = None) -> Callable[..., float]:
+    """The growth of what is counted, over the time from the frame before; at the first frame there is none."""
+
+    def value(moment: float, seen: dict[str, Any], before: Seen) -> float:
+        if before is None:
+            return math.nan
+        now, then = seen[name], before[1][name]
+        grown = now - then if i is None else now[i] - then[i]
+        return float(grown / ((moment - before[0]) * per))
+
+    return value

@@ -1,0 +1,153 @@
+"""What the walls of a scene look like, for any phi: triangles, their area, and curves of the walls as a wire frame."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import contourpy
+import numpy as np
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from ..particles import Floats
+from ..scene import Scene
+
+# Points along each side of the grid whose cells the triangles lie in. A sphere's area comes out 0.07 % too small,
+# a box's 0.6 %.
+_POINTS = 48
+# Planes across each axis whose curves make the wire frame, and the points along a side of each plane.
+_PLANES, _FINE = 5, 160
+# The outermost planes are this part of its width inside a surface: there they show rims and edges.
+_END = 0.01
+# The grid goes this many of its cells beyond the walls, so that they close.
+_MARGIN = 2.0
+# Where the volume is open, the drawing ends this many times farther out than the surfaces and particles.
+_BEYOND = 1.2
+
+Corners = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The part of one surface that is a wall of the volume.
+
+    Attributes:
+        name: its number and kind, such as "0_ellipsoid".
+        solid: whether particles are kept out of it.
+        vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
+        wires: curves (k, 3) [m].
+    """
+
+    name: str
+    solid: bool
+    vertices: Floats
+    triangles: NDArray[np.int64]
+    normals: Floats
+    wires: list[Floats]
+
+    def area(self) -> float:
+        """Of the triangles [m^2]."""
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
+
+
+def shapes_of(scene: Scene, positions: Floats) -> list[Shape]:
+    """A shape for every surface; where the volume is open, as far as the surfaces and the particles (3, N) go."""
+    box = _box(scene, positions)
+    coarse = _triangles(scene, box)
+    shapes = []
+    for i, surface in enumerate(scene.surfaces):
+        name = f"{i}_{type(surface).__name__.lower()}"
+        own = _of_surface(scene, i, *coarse)
+        around = _around(own[0], box) if len(own[0]) else _near(surface, box)
+        # Once more, as fine as the surface is small.
+        vertices, triangles, normals = _of_surface(scene, i, *_triangles(scene, around))
+        wires = _wires(scene, i, vertices, box) if len(vertices) else []
+        shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
+    return shapes
+
+
+def _box(scene: Scene, positions: Floats) -> Corners:
+    low, high = (np.array(corner) for corner in scene.bounds())
+    reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
+    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    margin = _MARGIN * (high - low) / (_POINTS - 1.0)
+    return low - margin, high + margin
+
+
+def _around(points: Floats, box: Corners) -> Corners:
+    """The box of some points, a little larger, in the box of all."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (_POINTS - 1.0)
+    return np.maximum(low - margin, box[0]), np.minimum(high + margin, box[1])
+
+
+def _near(surface: Any, box: Corners) -> Corners:
+    """Where to look for a surface that is smaller than the cells of the coarse grid."""
+    size = surface.size()
+    if not math.isfinite(size) or not hasattr(surface, "center"):
+        return box
+    center, half = np.array(surface.center), 4.0 * size
+    return np.maximum(center - half, box[0]), np.minimum(center + half, box[1])
+
+
+def _gap(scene: Scene, points: Floats) -> Floats:
+    """The largest gap of all surfaces at points (3, N): 0 on every wall. Where phi is no number, particles are not."""
+    with np.errstate(all="ignore"):
+        gap = scene.gaps(points).max(axis=0)
+    return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
+
+
+def _triangles(scene: Scene, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Vertices, triangles and normals of all walls in a box."""
+    low, high = box
+    axes = [np.linspace(a, b, _POINTS) for a, b in zip(low, high, strict=True)]
+    grid = np.array(np.meshgrid(*axes, indexing="ij"))
+    gap = _gap(scene, grid.reshape(3, -1)).reshape(grid.shape[1:])
+    if not gap.min() < 0.0 < gap.max():
+        return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3))
+    spacing = tuple((high - low) / (_POINTS - 1.0))
+    vertices, triangles, normals, _values = marching_cubes(gap, 0.0, spacing=spacing)
+    return vertices + low, triangles.astype(np.int64), normals.astype(np.float64)
+
+
+def _of_surface(
+    scene: Scene, i: int, vertices: Floats, triangles: NDArray[np.int64], normals: Floats
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Those triangles that lie on surface i, with their vertices only."""
+    if not len(triangles):
+        return vertices, triangles, normals
+    middles = vertices[triangles].mean(axis=1)
+    kept, places = np.unique(triangles[_owner(scene, middles.T) == i], return_inverse=True)
+    return vertices[kept], places.reshape(-1, 3), normals[kept]
+
+
+def _owner(scene: Scene, points: Floats) -> NDArray[np.int64]:
+    """The surface that each of the points (3, N) near a wall lies on."""
+    with np.errstate(all="ignore"):
+        return np.asarray(np.nan_to_num(scene.gaps(points), nan=-np.inf).argmax(axis=0))
+
+
+def _wires(scene: Scene, i: int, vertices: Floats, box: Corners) -> list[Floats]:
+    """Where planes across the three axes cut surface i, from end to end."""
+    first, last = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = _around(vertices, box)
+    curves = []
+    for axis in range(3):
+        u, v = (k for k in range(3) if k != axis)
+        across = np.linspace(low[u], high[u], _FINE), np.linspace(low[v], high[v], _FINE)
+        for part in np.linspace(_END, 1.0 - _END, _PLANES):
+            points = np.empty((3, _FINE, _FINE))
+            points[axis] = first[axis] + part * (last[axis] - first[axis])
+            points[u], points[v] = np.meshgrid(*across)
+            gap = _gap(scene, points.reshape(3, -1)).reshape(_FINE, _FINE)
+            for line in contourpy.contour_generator(*across, gap).lines(0.0):
+                curve = np.insert(np.asarray(line), axis, points[axis, 0, 0], axis=1)
+                curves += _runs(curve, _owner(scene, curve.T) == i)
+    return curves
+
+
+def _runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
+    """The parts of a curve whose points are kept, two points or more each."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

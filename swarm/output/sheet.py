@@ -1,0 +1,102 @@
+"""Contact sheets: some frames of a recording and its time series on one picture."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot
+
+from ..errors import RunError, SceneError
+from . import drawing, viewer
+from .playback import Playback
+
+_COLUMNS = 3
+_GROUPS = {
+    "energy": ("energy [J]", False),
+    "energy_error": ("worst relative energy error", True),
+    "penetration": ("largest penetration [m]", True),
+    "impacts": ("impacts per second [1/s]", False),
+    "pressure": ("pressure on each surface [Pa]", False),
+    "force": ("force on each surface [N]", False),
+}
+
+
+def draw(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
+    """Draw the frames nearest to these times (None: the first, the middle and the last); returns what drew them.
+
+    Args:
+        playback: the recording.
+        target: the PNG to write.
+        times: [s], within the recording.
+        with_viewer: True: by the Rerun viewer, or raise; False: by matplotlib; None: by the viewer if it can.
+
+    Raises:
+        SceneError: a time is outside the recording.
+        RunError: the viewer is wanted and cannot draw.
+    """
+    numbers = _chosen(playback, times)
+    with tempfile.TemporaryDirectory() as folder:
+        found, by = _pictures(playback, numbers, Path(folder), with_viewer)
+        picture = _sheet(playback, numbers, found, by)
+    drawing.save(picture, target)
+    return by
+
+
+def _chosen(playback: Playback, times: list[float] | None) -> list[int]:
+    """Indices of the frames."""
+    last = len(playback.times) - 1
+    if times is None:
+        return sorted({0, last // 2, last})
+    for moment in times:
+        if not playback.times[0] <= moment <= playback.times[last]:
+            raise SceneError(
+                f"times must lie between {playback.times[0]:g} and {playback.times[last]:g} s, got {moment:g}"
+            )
+    return [int(np.abs(playback.times - moment).argmin()) for moment in times]
+
+
+def _pictures(
+    playback: Playback, frames: list[int], folder: Path, with_viewer: bool | None
+) -> tuple[list[Any] | None, str]:
+    """Pictures by the viewer, or None, and what draws them."""
+    reason = "--no-viewer" if with_viewer is False else viewer.no_driver()
+    if reason is None:
+        try:
+            files = viewer.pictures(playback.path, [playback.numbers[k] for k in frames], folder)
+            return [pyplot.imread(file) for file in files], "the Rerun viewer"
+        except RunError as error:
+            reason = str(error)
+    if with_viewer:
+        raise RunError(f"the Rerun viewer cannot draw here: {reason}")
+    return None, f"matplotlib, from the data in the recording, not by the Rerun viewer: {reason}"
+
+
+def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
+    groups: dict[str, dict[str, Any]] = {}
+    for path, values in sorted(playback.series.items()):
+        group = path.strip("/").split("/")[0]
+        groups.setdefault(group, {})[playback.names[path]] = values
+    above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
+    picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
+    top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
+    top.set_facecolor(drawing.GROUND)
+    cells = []
+    for place, k in enumerate(frames):
+        cells.append(top.add_subplot(above, min(_COLUMNS, len(frames)), place + 1, projection=None if found else "3d"))
+        cells[-1].set_title(
+            f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
+        )
+        if found:
+            cells[-1].imshow(found[place])
+            cells[-1].set_axis_off()
+        else:
+            positions, packed = playback.frame(playback.numbers[k])
+            drawing.particles(cells[-1], positions, drawing.red_green_blue(packed), playback.wires)
+    about = playback.about
+    drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
+    told = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {len(playback.times)} frames"
+    top.suptitle(f"{told}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
+    for place, (group, (view, logarithm)) in enumerate((g, v) for g, v in _GROUPS.items() if g in groups):
+        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), view, groups[group], logarithm)
+    return picture

@@ -1,0 +1,167 @@
+"""The Rerun viewer: shown while a run goes on, or without a screen, for pictures."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..errors import RunError, SceneError
+
+_PORT = 9876
+_PATIENCE = 30.0  # [s]
+_PAUSE = 0.1
+# What the viewer takes to draw a frame once it is there, with a software driver, and how often it is asked [s].
+_DRAWING = 1.0
+_HERE = "127.0.0.1"
+
+
+def live_url(live: bool | str) -> str:
+    """The URL of the viewer that shows a run: the one given, one that listens on this machine, or a new one.
+
+    Raises:
+        SceneError: there is none, and no screen for one.
+    """
+    if isinstance(live, str):
+        return live
+    if not _listens(_PORT):
+        if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise SceneError(
+                "live needs a screen, or a viewer that listens on this machine (over ssh: ssh -R "
+                f"{_PORT}:localhost:{_PORT} from where a viewer runs); without one, record to a file and use swarm view"
+            )
+        _Viewer("--port", str(_PORT), "--expect-data-soon").wait_for(_PORT)
+    return _url(_PORT)
+
+
+def _url(port: int) -> str:
+    return f"rerun+http://{_HERE}:{port}/proxy"
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as connection:
+        connection.settimeout(1.0)
+        return connection.connect_ex((_HERE, port)) == 0
+
+
+class _Viewer:
+    """A viewer's process; only this machine reaches it: by default it would be all the network."""
+
+    def __init__(self, *arguments: str) -> None:
+        # A file, not a pipe: nobody reads it while the viewer writes, and its child would keep a pipe open.
+        self._told = tempfile.TemporaryFile()  # noqa: SIM115 (closed by end)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rerun", "--bind", _HERE, *arguments],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True,
+        )  # fmt: skip
+
+    def wait_for(self, port: int) -> None:
+        """Return when it listens."""
+        deadline = time.monotonic() + _PATIENCE
+        while not _listens(port):
+            self.require_alive()
+            if time.monotonic() > deadline:
+                raise RunError(f"the Rerun viewer did not start in {_PATIENCE:g} s")
+            time.sleep(_PAUSE)
+
+    def require_alive(self) -> None:
+        """Raise a RunError with its last words if it has ended."""
+        if self.process.poll() is None:
+            return
+        self._told.seek(0)
+        told = self._told.read().decode(errors="replace").splitlines()
+        reasons = [line for line in told if "adapter" in line or "panicked" in line or "rror" in line]
+        raise RunError(f"the Rerun viewer ended: {(reasons or told or ['it said nothing'])[-1].strip()}")
+
+    def end(self) -> None:
+        """End it: the process that was started, and the viewer that this one started."""
+        import psutil  # which rerun-sdk brings
+
+        with contextlib.suppress(psutil.NoSuchProcess):
+            for child in psutil.Process(self.process.pid).children(recursive=True):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    child.kill()
+        self.process.kill()
+        self.process.wait()
+        self._told.close()
+
+
+def no_driver() -> str | None:
+    """Why the viewer cannot draw here, or None: it needs a Vulkan driver, of software is enough."""
+    if sys.platform != "linux":
+        return None
+    named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
+    if named:
+        files = [Path(name) for name in named.split(os.pathsep)]
+    else:
+        shared = os.environ.get("XDG_DATA_DIRS") or "/usr/local/share:/usr/share"
+        folders = ["/etc", "/usr/local/etc", str(Path.home() / ".local/share"), *shared.split(os.pathsep)]
+        files = [file for folder in folders for file in Path(folder, "vulkan", "icd.d").glob("*.json")]
+    if any(file.is_file() for file in files):
+        return None
+    return "there is no Vulkan driver (Debian: apt install mesa-vulkan-drivers libvulkan1, which needs no GPU)"
+
+
+@contextlib.contextmanager
+def headless(recording: Path) -> Iterator[Any]:
+    """A viewer without a window that has loaded a recording: a `rerun.experimental.ViewerClient`.
+
+    Raises:
+        RunError: it did not start, did not load it, or ended.
+    """
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as free:
+        free.bind((_HERE, 0))
+        port = free.getsockname()[1]
+    process = _Viewer("--headless", "--port", str(port))
+    try:
+        process.wait_for(port)
+        client = ViewerClient.connect(_url(port))
+        client.open(str(recording.resolve()))
+        _loaded(client, process)
+        yield client
+    except RunError:
+        raise
+    except Exception as error:  # of gRPC, and without a type to tell it by
+        # If it has died, its last words say more.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.process.wait(_DRAWING)
+        process.require_alive()
+        raise RunError(f"the Rerun viewer did not draw: {error}") from error
+    finally:
+        process.end()
+
+
+def _loaded(client: Any, process: _Viewer) -> None:
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        process.require_alive()
+        state = client.get_state()
+        if state.recordings and state.views and not state.loading:
+            return
+        if time.monotonic() > deadline:
+            raise RunError(f"the Rerun viewer did not load the recording in {_PATIENCE:g} s")
+        time.sleep(_PAUSE)
+
+
+def pictures(recording: Path, numbers: list[int], folder: Path) -> list[Path]:
+    """Pictures of the 3-D view at these frames, as PNG in a folder.
+
+    Raises:
+        RunError: the viewer did not start, or ended before it had drawn.
+    """
+    files = []
+    with headless(recording) as client:
+        (view,) = (view for view in client.get_state().views if view.view_class == "3D")
+        for number in numbers:
+            client.set_time("frame", sequence=number, play_state="paused")
+            time.sleep(_DRAWING)
+            files.append(folder / f"{number}.png")
+            client.save_screenshot(str(files[-1].resolve()), view_id=view.view_id)
+    return files

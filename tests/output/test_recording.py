@@ -1,0 +1,255 @@
+"""Recordings, read back by Rerun's own reader: what is in them, how large they are, and what a crash leaves."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import rerun as rr
+
+import swarm
+from swarm.output import colours, playback, recording, sheet, viewer
+
+SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+METHOD = swarm.Impact()
+FRAMES = 41
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recording")
+    particles = swarm.fill(SCENE, 300, speed=0.5, seed=4)
+    result = swarm.simulate(
+        SCENE, particles, METHOD, until=20.0, every=0.5,
+        trajectory=folder / "run.h5", recording=folder / "run.rrd", record_particles=100,
+    )  # fmt: skip
+    return folder, result
+
+
+def test_frames_come_back(run):
+    folder, result = run
+    held = playback.Playback(folder / "run.rrd")
+    assert playback.is_whole(held.path)
+    assert held.numbers == list(range(FRAMES))
+    np.testing.assert_array_equal(held.times, result.observables["time"])
+    assert (held.about["particles"], held.about["shown"], held.about["stride"]) == (300, 100, 1)
+    with swarm.load(folder / "run.h5") as trajectory:
+        for number in (0, 17, 40):
+            positions, packed = held.frame(number)
+            frame = trajectory.frame(number)
+            np.testing.assert_array_equal(positions, frame.position[:, ::3].T.astype(np.float32))
+            speeds = np.sqrt((frame.velocity[:, ::3] ** 2).sum(axis=0))
+            scale = colours.Scale(held.about["quantity"], held.about["low"], held.about["high"])
+            np.testing.assert_array_equal(packed, scale.colours(speeds))
+    assert held.about["low"] <= 0.5 <= held.about["high"]
+
+
+def test_series_are_the_observables(run):
+    folder, result = run
+    held, seen = playback.Playback(folder / "run.rrd"), result.observables
+    times, energy = held.series["/energy/total"]
+    np.testing.assert_array_equal(times, seen["time"])
+    np.testing.assert_array_equal(energy, seen["total_energy"])
+    errors = np.maximum(seen["energy_error"], 1e-18)
+    np.testing.assert_allclose(held.series["/energy_error"][1], np.log10(errors))
+    times, rate = held.series["/impacts"]
+    np.testing.assert_allclose(rate, np.diff(seen["impacts"]) / 0.5)
+    # What has no line: gravity, soft walls, losses.
+    assert {name for name in held.series if name.startswith("/energy/")} == {"/energy/total", "/energy/kinetic"}
+    # p V = 2/3 of the kinetic energy
+    pressure = held.series["/pressure/0_sphere"][1].mean()
+    assert pressure == pytest.approx(2.0 / 3.0 * energy[0] / (np.pi / 6.0), rel=0.05)
+
+
+def test_walls_are_mesh_and_wires(run):
+    held = playback.Playback(run[0] / "run.rrd")
+    assert {"/scene/surfaces/0_sphere/mesh", "/scene/surfaces/0_sphere/wires"} <= set(held.entities)
+    ((solid, curves),) = held.wires
+    assert not solid
+    np.testing.assert_allclose(np.linalg.norm(np.vstack(curves), axis=1), 0.5, rtol=1e-3)
+
+
+def test_the_blueprint_is_in_it_and_pauses_at_the_start(run):
+    reader = rr.chunk.RrdReader(run[0] / "run.rrd")
+    (blueprint,) = reader.blueprints()
+    columns = {}
+    for chunk in reader.stream(store=blueprint).to_chunks():
+        batch = chunk.to_record_batch()
+        columns |= {name: batch.column(name)[0].as_py() for name in batch.schema.names if ":" in name}
+    # Of a time panel: 1 is paused.
+    assert columns["TimePanelBlueprint:play_state"] == [1]
+    assert columns["TimePanelBlueprint:timeline"] == ["frame"]
+    assert "ViewBlueprint:class_identifier" in columns
+
+
+def test_a_recording_of_the_trajectory_is_the_same(run, tmp_path):
+    folder, _ = run
+    with swarm.load(folder / "run.h5") as trajectory:
+        recording.record(trajectory, tmp_path / "later.rrd", recording.Settings(particles=100))
+    one, other = playback.Playback(folder / "run.rrd"), playback.Playback(tmp_path / "later.rrd")
+    assert one.numbers == other.numbers
+    assert one.about == other.about
+    assert one.series.keys() == other.series.keys()
+    for path, (times, values) in one.series.items():
+        np.testing.assert_array_equal(times, other.series[path][0])
+        np.testing.assert_array_equal(values, other.series[path][1])
+    for number in one.numbers:
+        for mine, theirs in zip(one.frame(number), other.frame(number), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("megabytes", [0.7, 1.5])
+def test_the_size_is_bounded_and_the_last_frame_is_there(tmp_path, megabytes):
+    path, particles = tmp_path / "run.rrd", swarm.fill(SCENE, 2000, speed=0.5)
+    swarm.simulate(SCENE, particles, METHOD, until=1.0, every=0.005, recording=path, record_megabytes=megabytes)
+    assert path.stat().st_size <= megabytes * 1e6
+    held = playback.Playback(path)
+    assert held.about["stride"] > 1
+    assert held.numbers == [*range(0, 200, held.about["stride"]), 200]
+    # Rates are per second whatever the stride.
+    assert held.series["/impacts"][1].mean() == pytest.approx(2000 * 0.5 / (4.0 / 3.0 * 0.5), rel=0.15)
+
+
+def test_energy_errors_as_colours(tmp_path):
+    soft = swarm.Penalty(dt=0.01, penalty=1e4, exponent=1.5)
+    scene = swarm.Scene(SCENE.surfaces, gravity=(0.0, 0.0, -1.0))
+    start = swarm.fill(scene, 50, speed=1.0, seed=2)
+    scale, values = colours.colouring("energy-error", scene, soft, start)
+    assert (values(start.position, start.velocity) == -16.0).all()
+    # In the wall: V = alpha g^(a + 1)/(a + 1); faster: half the square of the speed.
+    deep = np.array([[0.0], [0.0], [0.51]]) + np.zeros((3, 50))
+    before = 0.5 - (-1.0) * start.position[2]
+    after = 0.5 * 1.1**2 + 0.51 + 1e4 * 0.01**2.5 / 2.5
+    told = values(deep, 1.1 * start.velocity)
+    np.testing.assert_allclose(10.0**told, np.abs(after - before) / (0.5 + 0.5), rtol=1e-9)
+    assert (scale.low, scale.high) == (-16.0, -6.0)
+    lossy = swarm.Scene([swarm.Sphere(0.5, restitution=0.9)])
+    with pytest.raises(swarm.SceneError, match="record_color must be 'speed'"):
+        colours.colouring("energy-error", lossy, METHOD, start)
+
+
+@pytest.mark.parametrize("lost", [20_000, 10])
+def test_a_recording_that_was_cut_off_is_mended(run, tmp_path, lost):
+    whole = (run[0] / "run.rrd").read_bytes()
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(whole[:-lost])
+    if lost > 1000:  # more than the footer
+        with pytest.raises(swarm.SceneError, match=r"cut\.rrd.*--repair"):
+            playback.Playback(cut)
+    held, is_whole = playback.described(cut)
+    assert not is_whole
+    mended = playback.repair(cut)
+    assert playback.is_whole(cut)
+    assert mended.numbers == held.numbers == list(range(len(held.numbers)))
+    assert len(mended.numbers) > 5
+    for mine, theirs in zip(mended.frame(3), playback.Playback(run[0] / "run.rrd").frame(3), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def test_other_files_are_refused(tmp_path):
+    (tmp_path / "text.rrd").write_text("no recording")
+    with pytest.raises(swarm.SceneError, match=r"text\.rrd is not a recording of swarm"):
+        playback.described(tmp_path / "text.rrd")
+    with pytest.raises(swarm.SceneError, match=r"absent\.rrd: there is no such file"):
+        playback.described(tmp_path / "absent.rrd")
+    assert (tmp_path / "text.rrd").read_text() == "no recording"
+
+
+def test_refused_before_anything_is_touched(tmp_path):
+    particles = swarm.fill(SCENE, 5, speed=0.3)
+    present = tmp_path / "present.rrd"
+    present.write_bytes(b"mine")
+    for path, keywords, message in (
+        (present, {}, r"recording: .*present\.rrd exists.*--overwrite"),
+        (tmp_path / "nowhere" / "run.rrd", {}, r"recording: the folder .*nowhere does not exist"),
+        (tmp_path / "new.rrd", {"record_particles": 0}, "record_particles must be 1 or more, got 0"),
+        (tmp_path / "new.rrd", {"record_color": "mass"}, "record_color must be one of 'speed' and 'energy-error'"),
+        (tmp_path / "new.rrd", {"record_megabytes": 0.0}, "record_megabytes must be above 0"),
+    ):
+        with pytest.raises(swarm.SceneError, match=message):
+            swarm.simulate(SCENE, particles, METHOD, until=1.0, recording=path, **keywords)
+    assert present.read_bytes() == b"mine"
+    assert list(tmp_path.iterdir()) == [present]
+
+
+def test_a_full_disk_ends_the_run(tmp_path):
+    """A limit of the size of files stands in for the disk."""
+    code = (
+        "import resource, signal, swarm\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "scene = swarm.Scene([swarm.Sphere(0.5)])\n"
+        "particles = swarm.fill(scene, 2000, speed=0.5)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))\n"
+        "try:\n"
+        "    swarm.simulate(scene, particles, swarm.Impact(), until=50.0, every=0.1, recording='run.rrd')\n"
+        "except swarm.FileError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert "recording run.rrd" in done.stdout, done.stderr
+
+
+def test_without_rerun_one_sentence_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.delitem(sys.modules, "swarm.output.recording")
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(swarm.SceneError, match=r"a recording needs the package 'rerun'.*pip install rerun-sdk"):
+        swarm.simulate(SCENE, swarm.fill(SCENE, 5, speed=0.3), METHOD, until=1.0, recording=tmp_path / "run.rrd")
+
+
+def test_live_without_a_screen(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(viewer, "_listens", lambda port: False)
+    with pytest.raises(swarm.SceneError, match=r"live needs a screen.*swarm view"):
+        viewer.live_url(True)
+
+
+@pytest.mark.physics
+def test_live_reaches_a_viewer(tmp_path, request):
+    """A server without a window that saves what it is sent."""
+    target, port = tmp_path / "heard.rrd", 19_876
+    server = viewer._Viewer("--port", str(port), "--save", str(target))
+    request.addfinalizer(server.end)
+    server.wait_for(port)
+    particles = swarm.fill(SCENE, 50, speed=0.5)
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    swarm.simulate(SCENE, particles, METHOD, until=2.0, every=0.5, live=url, recording=tmp_path / "run.rrd")
+    deadline = time.monotonic() + 30.0
+    held = playback.Playback(tmp_path / "run.rrd")
+    heard = None
+    while time.monotonic() < deadline and (heard is None or heard.numbers != held.numbers):
+        time.sleep(0.3)
+        if target.exists() and target.stat().st_size > 1000:
+            try:
+                heard, _ = playback.described(target)
+            except swarm.SwarmError:
+                continue  # not much has come yet
+    assert heard is not None
+    assert heard.numbers == held.numbers == [0, 1, 2, 3, 4]
+
+
+def test_a_sheet_says_what_drew_it(run, tmp_path, monkeypatch):
+    held = playback.Playback(run[0] / "run.rrd")
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "none.json"))
+    told = sheet.draw(held, tmp_path / "sheet.png", [0.0, 3.1], None)
+    assert "matplotlib" in told
+    assert ("Vulkan" in told) == (sys.platform == "linux")
+    assert (tmp_path / "sheet.png").stat().st_size > 20_000
+    assert sheet._chosen(held, [0.0, 3.1]) == [0, 6]
+    assert sheet._chosen(held, None) == [0, 20, 40]
+    with pytest.raises(swarm.SceneError, match="times must lie between 0 and 20 s, got 21"):
+        sheet.draw(held, tmp_path / "sheet.png", [21.0], None)
+    if sys.platform == "linux":
+        with pytest.raises(swarm.RunError, match="the Rerun viewer cannot draw here: there is no Vulkan driver"):
+            sheet.draw(held, tmp_path / "sheet.png", None, True)
+
+
+@pytest.mark.physics
+@pytest.mark.skipif(viewer.no_driver() is not None, reason="no Vulkan driver")
+def test_the_viewer_draws(run, tmp_path):
+    held = playback.Playback(run[0] / "run.rrd")
+    assert sheet.draw(held, tmp_path / "sheet.png", None, True) == "the Rerun viewer"
+    assert os.stat(tmp_path / "sheet.png").st_size > 20_000

@@ -1,0 +1,59 @@
+"""Triangles and wires of walls lie on the walls, whatever phi is; their area is that of the closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.output.shapes import shapes_of
+
+NOWHERE = np.zeros((3, 1))
+SCENES = {
+    "sphere": swarm.Scene([swarm.Sphere(0.5, (0.2, 0.0, -0.1))]),
+    "torus": swarm.Scene([swarm.Torus(0.5, 0.2)]),
+    "formula": swarm.Scene([swarm.Formula("x**2/0.09 + y**2/0.09 + z**4/0.13 - 1")]),
+    "sphere with a floor": swarm.Scene([swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3)]),
+    "small ball in a box": swarm.Scene([swarm.Box((0.5, 0.4, 0.3)), swarm.Sphere(0.004, (0.1, 0.0, 0.0), "outside")]),
+}
+# Of each surface: a spherical cap of height h has 2 pi R h.
+AREAS = {
+    "sphere": [math.pi],
+    "torus": [4.0 * math.pi**2 * 0.5 * 0.2],
+    "sphere with a floor": [2.0 * math.pi * 0.5 * 0.8, math.pi * (0.25 - 0.09)],
+    "small ball in a box": [8.0 * (0.2 + 0.12 + 0.15), 4.0 * math.pi * 0.004**2],
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_they_lie_on_their_own_wall_and_no_other_is_before_it(name):
+    scene = SCENES[name]
+    for i, shape in enumerate(shapes_of(scene, NOWHERE)):
+        surface = scene.surfaces[i]
+        assert shape.name == f"{i}_{type(surface).__name__.lower()}"
+        assert shape.solid == surface.is_solid()
+        size = np.ptp(shape.vertices, axis=0).max()
+        for points in (shape.vertices, np.vstack(shape.wires)):
+            distance = np.abs(surface.phi(points.T)) / np.sqrt((surface.gradient(points.T) ** 2).sum(axis=0))
+            # An edge is cut off by a cell at most.
+            assert distance.max() < 0.05 * size
+            assert np.median(distance) < 1e-3 * size
+            others = np.delete(scene.gaps(points.T), i, axis=0)
+            assert others.size == 0 or others.max() < 0.05 * size
+        assert len(shape.wires) >= 5
+        np.testing.assert_allclose((shape.normals**2).sum(axis=1), 1.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", AREAS)
+def test_areas(name):
+    areas = [shape.area() for shape in shapes_of(SCENES[name], NOWHERE)]
+    np.testing.assert_allclose(areas, AREAS[name], rtol=0.015)
+
+
+def test_an_open_volume_is_drawn_as_far_as_its_particles():
+    floor = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], gravity=(0.0, 0.0, -1.0))
+    (shape,) = shapes_of(floor, np.array([[3.0], [0.0], [1.0]]))
+    low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    assert low[0] <= -3.0
+    assert high[0] >= 3.0
+    assert np.abs(shape.vertices[:, 2]).max() < 1e-6
