@@ -29,6 +29,7 @@ def test_a_box_unfolds():
         assert end == pytest.approx(np.minimum(phase, 4.0 * halves - phase) - halves, abs=1e-13)
 
 
+@pytest.mark.physics
 def test_penalty_tends_to_the_soft_sphere():
     """A sixteenth of the error at a quarter of the step: the closed form of springs is what is converged to."""
     with np.load(reference.PATH) as file:
