@@ -7,6 +7,8 @@
 /about                        what the colours mean, as text and as values; static
 """
 
+import atexit
+import ctypes
 import math
 import time
 from dataclasses import dataclass
@@ -186,6 +188,9 @@ class RecordingWriter:
             self._stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             self._failed = True
+            # Whatever ends the stream, and Rerun at the end of the process, waits for ever for its dead thread: none does.
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
+            atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
 
     def sync(self) -> None:
