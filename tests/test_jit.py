@@ -234,6 +234,7 @@ LAYERS = [
     ["output", "progress", "run"],
     ["tables", "filling"],
     ["observables", "blocks", "history"],
+    ["inner_solve"],
     ["lanes"],
     ["methods"],
     ["scene", "particles"],
