@@ -231,6 +231,7 @@ LAYERS = [
     ["cli"],
     ["scene_file"],
     ["simulation"],
+    ["sessions", "summary"],
     ["output", "progress", "run"],
     ["tables", "filling"],
     ["observables", "blocks", "history"],
