@@ -188,7 +188,7 @@ class RecordingWriter:
             self._stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             self._failed = True
-            # Whatever ends the stream, and Rerun at the end of the process, waits for ever for its dead thread: none does.
+            # What ends the stream, and Rerun at the end of the process, waits for ever for its dead thread.
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
