@@ -169,7 +169,7 @@ def _trajectory_rows(file: Path) -> dict[str, str]:
         times, seen = trajectory.times, trajectory.observables
         rows = {
             "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
-            "particles": f"{len(trajectory.frame(0)) if len(times) else 0}",
+            "particles": f"{trajectory.count}",
             "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
             "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
             "method": _call(trajectory.method),

@@ -44,6 +44,25 @@ def test_quiet_prints_nothing(folder):
     assert (folder / "other.h5").exists()
 
 
+def test_record_view_plot_and_info(folder):
+    assert command("run", "scene.toml", "--quiet", "--record", "run.rrd", cwd=folder).returncode == 0
+    for words, told in (
+        (["record", "scene.h5", "-o", "again.rrd"], "written to again.rrd"),
+        (["info", "again.rrd"], "3, 0 s to 1 s"),
+        (["info", "run.rrd"], "speed [m/s]"),
+        (["view", "run.rrd", "-o", "sheet.png", "--times", "0,1", "--no-viewer"], "sheet.png; drawn by matplotlib"),
+        (["plot", "scene.h5"], "written to scene.png"),
+    ):
+        done = command(*words, cwd=folder)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert told in done.stdout
+    for picture in ("sheet.png", "scene.png"):
+        assert (folder / picture).read_bytes().startswith(b"\x89PNG")
+    refused = command("run", "scene.toml", "--resume", "--record", "more.rrd", cwd=folder)
+    assert refused.returncode == 2
+    assert "recording and live cannot go on with a run that was stopped" in refused.stderr
+
+
 def test_results_do_not_depend_on_threads(folder):
     for threads in ("1", "2"):
         assert command("run", "scene.toml", "--threads", threads, "-o", f"{threads}.h5", cwd=folder).returncode == 0

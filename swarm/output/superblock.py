@@ -2,7 +2,7 @@
 
 In the mode for one writer and many readers (SWMR) HDF5 writes in an order in which every prefix of its writes is a
 whole file: what a kill leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
-loses the half of it, tests/output/test_killed.py does it.) But it marks the file, so that readers which do not ask for
+loses the half of it.) But it marks the file, so that readers which do not ask for
 that mode refuse it, even after the writer is dead. The mark is a byte of the superblock, whose layout is fixed: HDF5
 File Format Specification, II.A, superblock version 3.
 """
