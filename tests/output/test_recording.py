@@ -100,6 +100,7 @@ def test_a_recording_of_the_trajectory_is_the_same(run, tmp_path):
             np.testing.assert_array_equal(mine, theirs)
 
 
+@pytest.mark.physics
 @pytest.mark.parametrize("megabytes", [0.7, 1.5])
 def test_the_size_is_bounded_and_the_last_frame_is_there(tmp_path, megabytes):
     path, particles = tmp_path / "run.rrd", swarm.fill(SCENE, 2000, speed=0.5)
@@ -174,6 +175,7 @@ def test_refused_before_anything_is_touched(tmp_path):
     assert list(tmp_path.iterdir()) == [present]
 
 
+@pytest.mark.physics
 def test_a_full_disk_ends_the_run(tmp_path):
     """A limit of the size of files stands in for the disk."""
     code = (
