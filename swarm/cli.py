@@ -148,7 +148,7 @@ def _json(status: str, target: Path, **more: Any) -> None:
     print(json.dumps({**numbers(status, target), **more}, indent=2))
 
 
-@app.command(epilog="Examples:  swarm info cavity.h5  |  swarm info --repair cavity.rrd")
+@app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")
 def info(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A trajectory (.h5) or a recording (.rrd).")],
     repair: Annotated[bool, typer.Option("--repair", help="Mend a recording that a crash cut off, in place.")] = False,

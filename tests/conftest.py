@@ -26,6 +26,12 @@ settings.load_profile("swarm")
 
 EPSILON = float(np.finfo(np.float64).eps)
 
+
+def rarely(*values):
+    """A case of a table whose kernels cost CI too much: it is in the long ring."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
 TURN = {"axis": (1.0, -2.0, 3.0), "angle": 1.2}
 # Every surface at every scale: `SURFACES[name](scale)`.
 SURFACES = {

@@ -43,6 +43,7 @@ def test_peers_quick():
     assert "plain Verlet in Numba" in told
 
 
+@pytest.mark.long
 def test_bars_quick():
     told = report("bars")
     for row in (
@@ -56,6 +57,7 @@ def test_bars_quick():
         assert row in told
 
 
+@pytest.mark.long
 def test_scenes_quick():
     told = report("scenes")
     assert "capped cylinder" in told

@@ -103,7 +103,7 @@ def test_version_and_help(folder):
     told = command("--help", cwd=folder)
     assert told.returncode == 0
     assert "swarm run examples/scenes/cavity.toml" in told.stdout
-    for name in ("run", "info"):
+    for name in ("run", "info", "record", "view", "plot"):
         assert "Example:" in command(name, "--help", cwd=folder).stdout
 
 

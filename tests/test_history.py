@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import rarely
 
 import swarm
 
@@ -160,9 +161,9 @@ def test_reflection_start_for_an_exponent_above_one(exponent):
     ("exponent", "gradient", "pull"),
     [
         (1.0, "composite", None),
-        (1.5, "composite", (0.1, -0.2, -1.0)),
         (4.0, "mean-value", (0.1, -0.2, -1.0)),
-        (1.5, "mean-value", None),
+        rarely(1.5, "composite", (0.1, -0.2, -1.0)),
+        rarely(1.5, "mean-value", None),
     ],
 )
 def test_penalty_is_one_sweep(exponent, gradient, pull):

@@ -184,6 +184,7 @@ def test_the_bend_bounds_second_derivatives(text, side):
         assert (entries <= np.array(form.bend.high) + 1e-12).all()
 
 
+@pytest.mark.long
 def test_an_open_volume_is_open():
     tube = swarm.Formula("x**2 + y**2 - 0.25")
     assert tube.bounds() == base.UNBOUNDED
