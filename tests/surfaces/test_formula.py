@@ -117,6 +117,7 @@ def test_turned_and_moved():
     assert np.allclose(*(scene.bounds() for scene in scenes), atol=0.01)
 
 
+@pytest.mark.long
 def test_a_pill_keeps_energy_and_particles_with_gravity_and_soft_walls():
     scene = swarm.Scene([swarm.Formula(PILL)], gravity=(0.0, 0.0, -1.0))
     particles = swarm.fill(scene, 10, speed=0.5, seed=2)

@@ -447,6 +447,7 @@ sys.exit()
 
 @compiled_only
 @pytest.mark.physics
+@pytest.mark.long
 def test_a_trajectory_is_never_an_old_one(run):
     first = run(extra=SIMULATE)
     assert (first.hits, first.misses) == (0, 1)
