@@ -5,6 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from conftest import rarely
 from physics.billiards import EPSILON, run
 
 import swarm
@@ -125,7 +126,7 @@ def cusp(gap, gravity=None):
     return swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(0.5, (0.5 - gap, 0.0, 0.0), side="outside")], gravity)
 
 
-@pytest.mark.parametrize("gravity", [None, (9.81, 0.0, 0.0), (5.0, 0.0, -5.0)], ids=str)
+@pytest.mark.parametrize("gravity", [None, rarely((9.81, 0.0, 0.0)), rarely((5.0, 0.0, -5.0))], ids=str)
 @pytest.mark.parametrize("gap", GAPS)
 def test_a_cusp_costs_a_bounded_number_of_impacts(gap, gravity):
     """Shot into it, aimed at its tip, let go, and along the wall into it: 1e4 steps a crossing, and some."""

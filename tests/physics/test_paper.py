@@ -142,6 +142,7 @@ def test_sweeps_of_the_accelerations(acceleration, paper, exact):
     assert seen.short[acceleration, 1e-28].observables["energy_error"].max() <= 1e-12
 
 
+@pytest.mark.long
 def test_pin_in_a_hole():
     part, seen = PARTS["beyond_clearance"], numbers("beyond_clearance")
     stiff = seen.hertz.result.observables

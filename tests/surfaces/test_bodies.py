@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import call
+from conftest import call, rarely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -126,7 +126,7 @@ def test_an_open_face_lets_through_and_the_others_do_not(face):
     assert straight.bounds()["-+".index(face[0])]["xyz".index(face[1])] == (-math.inf if face[0] == "-" else math.inf)
 
 
-@pytest.mark.parametrize("name", CAVITIES)
+@pytest.mark.parametrize("name", [rarely(name) if name.startswith("rotated") else name for name in CAVITIES])
 def test_particles_stay_and_keep_their_energy(name):
     scene = swarm.Scene([CAVITIES[name]])
     particles = swarm.fill(scene, 200, speed=0.5, seed=1)

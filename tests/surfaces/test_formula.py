@@ -104,6 +104,7 @@ def test_the_trajectory_is_that_of_the_ellipsoid(text):
     assert ends[0].observables["energy_error"].max() < 1e-14
 
 
+@pytest.mark.long
 def test_turned_and_moved():
     rotation = (0.5, 0.1, -0.3, 0.7)
     place = {"center": (0.3, -0.1, 0.2), "rotation": rotation}
