@@ -420,6 +420,7 @@ def test_an_edited_phi_never_gives_an_old_answer(run):
 
 
 @compiled_only
+@pytest.mark.long
 def test_processes_that_share_a_cache_do_not_break_one_another(run):
     sphere = "surface = swarm.Sphere(0.5)"
     formula = 'surface = swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": 0.5})'
