@@ -14,7 +14,9 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("throughput", help="every method, scene, number of particles, threads and output; the limits")
     commands.add_parser("accuracy", help="work-precision diagrams of every method, a picture a scene")
-    commands.add_parser("stability", help="maps of where methods fail: stiffness, Uzawa's loop, thin solids, grazing")
+    commands.add_parser(
+        "stability", help="maps of where methods fail: stiffness, Uzawa's loop, thin solids, grazing, round-off"
+    )
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")

@@ -2,6 +2,7 @@
 
 import statistics
 import textwrap
+from pathlib import Path
 from typing import Any
 
 from .report import RESULTS, ROOT, machine, name_of_machine
@@ -15,14 +16,28 @@ Found = dict[Any, list[float]]  # case -> nanoseconds an impact or step
 Limits = dict[str, list[float]]  # yardstick -> nanoseconds
 
 
-def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
-    """Impacts a second by scene, steps a second by method, and what a second thread brings, as PNG."""
+def subplots(count: int, width: float, height: float, **options: Any) -> tuple[Any, Any]:
+    """A picture of so many panels side by side [inches], drawn without a screen."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    picture, (impacts, steps, scaling) = pyplot.subplots(1, 3, figsize=(16, 5.4), layout="constrained")
+    return pyplot.subplots(1, count, figsize=(width, height), layout="constrained", **options)
+
+
+def save(picture: Any, path: Path) -> None:
+    """Write it, and let it go."""
+    from matplotlib import pyplot
+
+    picture.savefig(path, dpi=100)
+    pyplot.close(picture)
+    print(f"written to {path.relative_to(ROOT)}")
+
+
+def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
+    """Impacts a second by scene, steps a second by method, and what a second thread brings, as PNG."""
+    picture, (impacts, steps, scaling) = subplots(3, 16.0, 5.4)
     scenes = list(dict.fromkeys(case.scene for case in found))
     _speeds(impacts, found, [("Impact", scene, scene) for scene in scenes])
     _speeds(steps, found, [(method, "sphere", method) for method in fixed_step])
@@ -38,9 +53,7 @@ def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
         axes.grid(alpha=0.3, which="major")
         axes.legend(fontsize=8, loc="lower right")
     picture.suptitle(f"{machine()}: one thread (full), two (dashed), one and a trajectory (dotted)", fontsize=10)
-    path = RESULTS / f"throughput-{name_of_machine()}.png"
-    picture.savefig(path, dpi=100)
-    print(f"written to {path.relative_to(ROOT)}")
+    save(picture, RESULTS / f"throughput-{name_of_machine()}.png")
 
 
 def _speeds(axes: Any, found: Found, lines: list[tuple[str, str, str]]) -> None:
@@ -97,12 +110,7 @@ _LEAST = 1e-17
 
 def accuracy(name: str, found: list[Any], front: list[Any], advice: str) -> None:
     """Errors over wall time, one curve a method, as PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    picture, panels = pyplot.subplots(1, 3, figsize=(12, 5.6), layout="constrained", sharex=True)
+    picture, panels = subplots(3, 12.0, 5.6, sharex=True)
     for method in dict.fromkeys(p.method for p in found):
         curve = [p for p in found if p.method == method]
         seconds = [p.seconds for p in curve]
@@ -129,7 +137,4 @@ def accuracy(name: str, found: list[Any], front: list[Any], advice: str) -> None
     picture.legend(loc="outside lower center", ncols=5, fontsize=9)
     heading = f"{name}: wall time per particle and simulated second, one thread, {machine()}"
     picture.suptitle("\n".join([heading, *textwrap.wrap(advice + ".", 150)]), fontsize=10)
-    path = RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png"
-    picture.savefig(path, dpi=100)
-    pyplot.close(picture)
-    print(f"written to {path.relative_to(ROOT)}")
+    save(picture, RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png")

@@ -315,12 +315,9 @@ def _recording(
 
 def _output(trajectory: "Writer | None", kept: slice, recording: "Writer | None", n: int) -> "Beside | None":
     """A context that gives the function which writes a frame, in a thread of its own."""
-    if trajectory is None and recording is None:
+    outputs = [(one, some) for one, some in ((trajectory, kept), (recording, slice(None))) if one is not None]
+    if not outputs:
         return None
     from .output.beside import Beside, Several
 
-    if trajectory is None or recording is None:
-        one, kept = (trajectory, kept) if trajectory is not None else (recording, slice(None))
-        assert one is not None
-        return Beside(one, n, kept)
-    return Beside(Several([(trajectory, kept), (recording, slice(None))]), n)
+    return Beside(Several(outputs), n) if len(outputs) > 1 else Beside(outputs[0][0], n, outputs[0][1])

@@ -79,6 +79,7 @@ def test_stability_quick():
     )
     assert "tunnelling: plain Verlet: 5" in told
     assert "grazing: Impact, angles down to 1e-12 rad: energy within" in told
+    assert "roundoff: Impact, sphere: worst energy error" in told
 
 
 def test_endurance_quick():

@@ -13,7 +13,7 @@ import numpy as np
 import swarm
 from swarm.run import Run
 
-from .. import reference
+from .. import figure, reference
 from . import picture
 from .picture import Cell
 
@@ -82,7 +82,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """Cost and distance, two heat maps."""
-    figure, panels = picture.figure(2)
+    drawn, panels = figure.subplots(2, 12.0, 4.2)
     for axes, (value, title, low, high) in zip(
         panels,
         (("seconds", "wall time a crossing [s]", -6.0, -1.0), ("distance", "distance/R", -16.0, 0.0)),
@@ -92,7 +92,7 @@ def draw(cells: Sequence[Cell]) -> None:
         names = [f"{r:.0e}" + (" (default)" if r == DEFAULT else "") for r in rows]
         image = picture.heat(axes, [f"{c:.0e}" for c in columns], names, values, low, high)
         axes.set(title=f"{title}, {CROSSINGS} crossings", xlabel="angle to the wall [rad]")
-        figure.colorbar(image, ax=axes, label=f"log₁₀ of the {value}")
+        drawn.colorbar(image, ax=axes, label=f"log₁₀ of the {value}")
     panels[0].set_ylabel("shortest_flight / crossing time")
-    figure.suptitle("Impact in a sphere, from grazing to steep", fontsize=11)
-    picture.save(figure, cells, "grazing")
+    drawn.suptitle("Impact in a sphere, from grazing to steep", fontsize=11)
+    picture.save(drawn, cells, "grazing")

@@ -1,4 +1,4 @@
-"""What the maps share: heat maps of a table, and its CSV."""
+"""What the maps share: heat maps of a table, its words, and its CSV."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..report import RESULTS, ROOT
+from .. import figure
+from ..report import RESULTS
 
 Cell = dict[str, Any]  # column -> number or word
 OMEGA = r"$\Omega = dt\,\sqrt{\alpha/m}$"
@@ -48,23 +49,12 @@ def words(axes: Any, image: Any, values: np.ndarray, wording: Callable[[float], 
         )  # fmt: skip
 
 
-def figure(panels: int, width: float = 12.0, height: float = 4.2) -> tuple[Any, Any]:
-    """A picture of so many panels side by side."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    return pyplot.subplots(1, panels, figsize=(width, height), layout="constrained")
-
-
 def save(picture: Any, cells: Sequence[Cell], name: str) -> None:
     """The picture as PNG and its cells as CSV; they depend on no machine but for times."""
     path = RESULTS / f"stability-{name}.png"
-    picture.savefig(path, dpi=100)
+    figure.save(picture, path)
     with open(path.with_suffix(".csv"), "w", newline="") as file:
         out = csv.DictWriter(file, list(cells[0]), lineterminator="\n")
         out.writeheader()
         for cell in cells:
             out.writerow({key: f"{one:.4g}" if isinstance(one, float) else one for key, one in cell.items()})
-    print(f"written to {path.relative_to(ROOT)} and {path.with_suffix('.csv').name}")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import swarm
 
+from .. import figure
 from . import picture
 from .picture import Cell
 
@@ -89,10 +90,8 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """One curve a method and scene."""
-    from ..figure import COLOURS
-
-    figure, axes = picture.figure(1, width=9.0)
-    for colour, (name, mine) in zip(COLOURS, _curves(cells).items(), strict=False):
+    drawn, axes = figure.subplots(1, 9.0, 4.2)
+    for colour, (name, mine) in zip(figure.COLOURS, _curves(cells).items(), strict=False):
         # Zero has no place on a logarithmic axis.
         errors = [max(c["energy_error"], 1e-17) for c in mine]
         axes.plot([c["impacts"] for c in mine], errors, color=colour, marker="o", markersize=4, label=name)
@@ -101,4 +100,4 @@ def draw(cells: Sequence[Cell]) -> None:
     axes.set_title(f"the worst of {PARTICLES} particles (plain: {_PLAIN_PARTICLES})", fontsize=11)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=9)
-    picture.save(figure, cells, "roundoff")
+    picture.save(drawn, cells, "roundoff")

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import swarm
 
+from .. import figure
 from . import picture
 from .picture import Cell
 
@@ -94,7 +95,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """One heat map a method."""
-    figure, panels = picture.figure(len(METHODS), height=3.8)
+    drawn, panels = figure.subplots(len(METHODS), 12.0, 3.8)
     for axes, method in zip(panels, METHODS, strict=True):
         mine = [cell for cell in cells if cell["method"] == method.__name__]
         columns, rows, values = picture.table(mine, "stiffness", "exponent", "energy_error")
@@ -102,6 +103,6 @@ def draw(cells: Sequence[Cell]) -> None:
         axes.set(title=method.__name__, xlabel=picture.OMEGA)
         axes.tick_params(axis="x", rotation=60)
     panels[0].set_ylabel("exponent a")
-    figure.colorbar(image, ax=panels, label="log₁₀ of the energy error")
-    figure.suptitle(f"worst relative energy error after {IMPACTS} impacts; x: the run ended with an error", fontsize=11)
-    picture.save(figure, cells, "stiffness")
+    drawn.colorbar(image, ax=panels, label="log₁₀ of the energy error")
+    drawn.suptitle(f"worst relative energy error after {IMPACTS} impacts; x: the run ended with an error", fontsize=11)
+    picture.save(drawn, cells, "stiffness")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import swarm
 
+from .. import figure
 from . import picture
 from .picture import Cell
 
@@ -110,7 +111,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """Escapes over the ratio, one row a method."""
-    figure, axes = picture.figure(1, width=10.0, height=3.4)
+    drawn, axes = figure.subplots(1, 10.0, 3.4)
     methods, ratios = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ("method", "ratio"))
     ranked = [{**cell, "rank": methods.index(cell["method"])} for cell in cells]
     _columns, _rows, values = picture.table(ranked, "ratio", "rank", "escaped")
@@ -124,4 +125,4 @@ def draw(cells: Sequence[Cell]) -> None:
     axes.set_title(
         f"particles on the wrong side of a thin solid after {IMPACTS} impacts; x: the run ended", fontsize=10
     )
-    picture.save(figure, cells, "tunnelling")
+    picture.save(drawn, cells, "tunnelling")

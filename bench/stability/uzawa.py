@@ -10,6 +10,7 @@ import numpy as np
 
 import swarm
 
+from .. import figure
 from . import picture
 from .picture import Cell
 
@@ -76,7 +77,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """The energy that is left over one plane, sweeps over the next, the rate over the third."""
-    figure, panels = picture.figure(3)
+    drawn, panels = figure.subplots(3, 12.0, 4.2)
     names = {
         "gap": "gap before contact / normal way of the step",
         "exponent": "exponent a",
@@ -97,6 +98,6 @@ def draw(cells: Sequence[Cell]) -> None:
         axes.set(xlabel=names[x], ylabel=names[y])
         axes.set_title(title, fontsize=10)
         axes.tick_params(axis="x", rotation=60)
-        figure.colorbar(image, ax=axes, label=r"$\log_{10}$" + f" of {title.split(',')[0].split(':')[0]}")
-    figure.suptitle(f"Uzawa's loop in one contact at 45°, {_SWEEPS} sweeps at most; x: not converged", fontsize=11)
-    picture.save(figure, cells, "uzawa")
+        drawn.colorbar(image, ax=axes, label=r"$\log_{10}$" + f" of {title.split(',')[0].split(':')[0]}")
+    drawn.suptitle(f"Uzawa's loop in one contact at 45°, {_SWEEPS} sweeps at most; x: not converged", fontsize=11)
+    picture.save(drawn, cells, "uzawa")

@@ -115,11 +115,11 @@ class Beside:
         copy = self._copies.get()
         if self._problem is not None:
             raise self._problem
-        position, velocity = state.position[:, self._kept], state.velocity[:, self._kept]
+        some = _some(state, self._kept)
         if copy is None:
-            copy = state._replace(position=np.empty_like(position), velocity=np.empty_like(velocity))
-        np.copyto(copy.position, position)
-        np.copyto(copy.velocity, velocity)
+            copy = some._replace(position=np.empty_like(some.position), velocity=np.empty_like(some.velocity))
+        np.copyto(copy.position, some.position)
+        np.copyto(copy.velocity, some.velocity)
         self._frames.put((number, moment, copy, seen))
 
     def drain(self) -> None:

@@ -25,11 +25,12 @@ SCENES = {
 EVERY = {"impact": 16.0, "impact, chord": 16.0}
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    ("scene", "method"),
+    # Steps that are cut at the impact know no gravity.
+    [(s, m) for s in SCENES for m in METHODS if not ("gravity" in s and m == "augmented Lagrangian")],
+)
 def test_every_method_in_every_scene(tmp_path, scene, method):
-    if "gravity" in scene and method == "augmented Lagrangian":
-        pytest.skip("adaptive steps know no gravity")
     require_resumed_is_whole(tmp_path, SCENES[scene], METHODS[method], n=300, every=EVERY.get(method, 4.0))
 
 

@@ -161,8 +161,9 @@ def test_pin_in_a_hole():
 
 def test_the_command_draws_every_figure(tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
-    for name, part in PARTS.items():
-        monkeypatch.setattr(part, "numbers", functools.partial(numbers, name))
+    # All of them before the first is replaced: `numbers` asks the part.
+    for part, seen in [(part, numbers(name)) for name, part in PARTS.items()]:
+        monkeypatch.setattr(part, "numbers", functools.partial(lambda seen: seen, seen))
     monkeypatch.setattr(sys, "argv", ["paper", "-o", str(tmp_path / "new")])
     runpy.run_module("examples.paper", run_name="__main__")
     images = sorted(path.name for path in (tmp_path / "new").glob("*.png"))
