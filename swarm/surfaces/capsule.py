@@ -9,7 +9,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector, at_least, length
 from . import base, smooth
-from .course import rise_time
+from .course import ball_rise_time
 from .revolved import Revolved
 
 
@@ -142,14 +142,13 @@ smooth.marches(CapsuleNumbers)
 def _(surface, x, y, z, vx, vy, vz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     side, half, radius2 = surface.side, surface.half, surface.radius * surface.radius
-    c, b, a = dx * dx + dy * dy - radius2, dx * vx + dy * vy, vx * vx + vy * vy
-    tube = rise_time(side * c, side * b, side * a)
+    tube = ball_rise_time(side, radius2, dx, dy, 0.0, vx, vy, 0.0)
     # Where the flight meets the tube without ends decides: there, or at the sphere of that end. A flight towards a
     # solid that is inside that tube already is before its end.
-    height = dz + select((side < 0.0) & (c < 0.0), 0.0, vz * tube)
+    within = dx * dx + dy * dy < radius2
+    height = dz + select((side < 0.0) & within, 0.0, vz * tube)
     wz = dz - select(height > 0.0, half, -half)
-    c, b, a = dx * dx + dy * dy + wz * wz - radius2, b + wz * vz, a + vz * vz
-    cap = rise_time(side * c, side * b, side * a)
+    cap = ball_rise_time(side, radius2, dx, dy, wz, vx, vy, vz)
     return select(abs(height) > half, cap, tube), True
 
 

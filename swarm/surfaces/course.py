@@ -6,6 +6,8 @@ first root is found by safe steps: none is skipped, however close to a double on
 
 import math
 
+import numpy as np
+
 from .._jit import inlined, select
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
@@ -13,6 +15,12 @@ SAFE_STEPS = 4
 MORE_STEPS = 16
 # A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
 _CLOSE = 1e-16
+# A fall at a solid from more than this many of its sizes away ends where it has come this many times nearer: the
+# coefficients of the level know the place only to round-off of the distance, and are made again from there. (To end it
+# on the way there, whether or not it comes near, cost a fall in a sphere with a small ball 6 times its time.)
+_FAR = 32.0
+# The length of a last step that found no hit: no time is changed by it.
+_NO_HIT = float(np.finfo(np.float64).tiny)
 
 
 @inlined
@@ -21,7 +29,12 @@ def rise_time(c, b, a):
 
     A cavity has a > 0, a solid a < 0, a plane a = 0. Branch-free.
     """
-    discriminant = b * b - a * c
+    return rise_time_by(c, b, a, b * b - a * c)
+
+
+@inlined
+def rise_time_by(c, b, a, discriminant):
+    """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
     root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
     approaching = b > 0.0
@@ -34,8 +47,33 @@ def rise_time(c, b, a):
 
 
 @inlined
+def ball_rise_time(side, radius2, dx, dy, dz, vx, vy, vz):
+    """`rise_time` for |d + v t|^2 - R^2, from however far."""
+    c = dx * dx + dy * dy + dz * dz - radius2
+    b = dx * vx + dy * vy + dz * vz
+    a = vx * vx + vy * vy + vz * vz
+    # b^2 - a c = R^2 |v|^2 - |d x v|^2, Lagrange's identity; near the wall the first form is the better one.
+    wx, wy, wz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+    from_afar = radius2 * a - (wx * wx + wy * wy + wz * wz)
+    return rise_time_by(side * c, side * b, side * a, select(c > radius2, from_afar, b * b - a * c))
+
+
+@inlined
+def level_and_window(c, own, size, speed2, pull2):
+    """(c, window) of a fall's course by its level, the level's sizes on the surface and here, square speed and pull.
+
+    The window is a time in which the fall crosses the surface; from outside, the way there and what is beyond it. From
+    afar c is that of a level set around the surface and the window is negative: to rise through it is no hit.
+    """
+    far = abs(c) > _FAR * _FAR * own
+    window = 2.0 * math.sqrt(size / (speed2 + math.sqrt(size * pull2)))
+    return select(far, 1.0 - 1.0 / (_FAR * _FAR), 1.0) * c, select(far, -window, window)
+
+
+@inlined
 def safe_rise_time(c, b, a2, a3, a4, window):
-    """A time up to `window` during which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 surely stays <= 0."""
+    """A time up to |window| during which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 surely stays <= 0."""
+    window = abs(window)
     time = rise_time(c, b, a2 + _rise_by(_steepest(a3, a4, window), window))
     return select(c > 0.0, 0.0, select(time < window, time, window))
 
@@ -61,6 +99,7 @@ def leave(c, b, a2, a3, a4, window):
     a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under a
     ceiling needs: the parabola of the whole window rises at once there.
     """
+    window = abs(window)
     time = rise_time(2.0 * b, 0.5 * a2, _steepest(a3, a4, window))
     time = select(b <= 0.0, select(time < window, time, window), 0.0)
     return time, select(time < math.inf, math.inf, 0.0)
@@ -74,6 +113,7 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
     double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
     and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on.
     """
+    there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
     reach = select(2.0 * last < window, 2.0 * last, window)
     # The Taylor coefficients at t
     ct = c + t * (2.0 * b + t * (a2 + t * (a3 + t * a4)))
@@ -86,7 +126,7 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
     # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
     at_root = time <= reach
     close = reach * step * step <= _CLOSE * window * window * window
-    return t + step, select(at_root & close, 0.0, step)
+    return t + step, select(at_root & close, there, step)
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from .._jit import inlined, select
 from ..checks import Vector, length, vector
 from . import base
-from .course import rise_time
+from .course import level_and_window, rise_time, rise_time_by
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -42,7 +42,8 @@ class Ellipsoid(base.Surface):
 
     def numbers(self) -> "EllipsoidNumbers":
         a, b, c = (1.0 / (axis * axis) for axis in self.semi_axes)
-        return EllipsoidNumbers(*self.own_center(), a, b, c, base.side_sign(self.side))
+        kind = EllipsoidNumbers if self.side == "inside" else EllipsoidFromAfar
+        return kind(*self.own_center(), a, b, c, base.side_sign(self.side))
 
     def size(self) -> float:
         return min(self.semi_axes)
@@ -65,6 +66,10 @@ class EllipsoidNumbers(NamedTuple):
     ay: float
     az: float
     side: float
+
+
+class EllipsoidFromAfar(EllipsoidNumbers):
+    """A solid: it may be small or thin compared with the way to it."""
 
 
 @inlined
@@ -102,6 +107,19 @@ def _(surface, x, y, z, vx, vy, vz):
     return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
+@base.first_hit.register(EllipsoidFromAfar)
+def _(surface, x, y, z, vx, vy, vz):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
+    b = _dot(surface, dx, dy, dz, vx, vy, vz)
+    a = _dot(surface, vx, vy, vz, vx, vy, vz)
+    # b^2 - a c = v.A v - w.(det A) A^-1 w with w = d x v, Lagrange's identity; near the wall the first form is better.
+    wx, wy, wz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+    ww = surface.ay * surface.az * wx * wx + surface.ax * surface.az * wy * wy + surface.ax * surface.ay * wz * wz
+    discriminant = select(c > 1.0, a - ww, b * b - a * c)
+    return rise_time_by(surface.side * c, surface.side * b, surface.side * a, discriminant), True
+
+
 @base.course.register(EllipsoidNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
@@ -114,7 +132,7 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     a3 = _dot(surface, vx, vy, vz, gx, gy, gz)
     # By the distance where that is more than the axes: a solid is looked for from afar.
     size = 1.0 + select(c > 0.0, c, 0.0)
-    window = 2.0 * math.sqrt(size / (a + math.sqrt(size * gg)))
+    c, window = level_and_window(c, 1.0, size, a, gg)
     side = surface.side
     return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
 

@@ -11,7 +11,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector
 from . import base
-from .course import rise_time
+from .course import level_and_window, rise_time, rise_time_by
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -35,12 +35,18 @@ class QuadricNumbers(NamedTuple):
     side: float
 
 
+class QuadricFromAfar(QuadricNumbers):
+    """One that is no convex cavity: it, or its waist, may be small compared with the way to it."""
+
+
 def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, side: str) -> QuadricNumbers:
     """The numbers of a quadric in its principal frame."""
     (ax, ay, az), (bx, by, bz) = map(float, curvatures), map(float, linear)
     steepest = max(abs(ax), abs(ay), abs(az))
     scale = abs(level) + ((bx * bx + by * by + bz * bz) / (4.0 * steepest) if steepest > 0.0 else 0.0)
-    return QuadricNumbers(*center, ax, ay, az, bx, by, bz, level, scale, base.side_sign(side))
+    sign = base.side_sign(side)
+    kind = QuadricNumbers if min(sign * ax, sign * ay, sign * az) >= 0.0 else QuadricFromAfar
+    return kind(*center, ax, ay, az, bx, by, bz, level, scale, sign)
 
 
 @inlined
@@ -104,6 +110,29 @@ def _(surface, x, y, z, vx, vy, vz):
     return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
+@base.first_hit.register(QuadricFromAfar)
+def _(surface, x, y, z, vx, vy, vz):
+    dx, dy, dz = _from_center(surface, x, y, z)
+    c = _dot(surface, dx, dy, dz, dx, dy, dz) + _linear(surface, dx, dy, dz) - surface.level
+    along = 0.5 * _linear(surface, vx, vy, vz)
+    b = _dot(surface, dx, dy, dz, vx, vy, vz) + along
+    a = _dot(surface, vx, vy, vz, vx, vy, vz)
+    # b^2 - a c = level v.A v + (b.v)^2/4 - w.(det A) A^-1 w + A v.(b x w) with w = d x v, Lagrange's identity. Of both
+    # forms the one with the smaller terms.
+    wx, wy, wz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+    u = surface.ay * surface.az * wx * wx, surface.ax * surface.az * wy * wy, surface.ax * surface.ay * wz * wz
+    s = (
+        surface.ax * vx * (surface.by * wz - surface.bz * wy),
+        surface.ay * vy * (surface.bz * wx - surface.bx * wz),
+        surface.az * vz * (surface.bx * wy - surface.by * wx),
+    )
+    from_afar = surface.level * a + along * along - (u[0] + u[1] + u[2]) + (s[0] + s[1] + s[2])
+    terms = abs(surface.level * a) + along * along + abs(u[0]) + abs(u[1]) + abs(u[2])
+    terms += abs(s[0]) + abs(s[1]) + abs(s[2])
+    discriminant = select(terms < b * b + abs(a * c), from_afar, b * b - a * c)
+    return rise_time_by(surface.side * c, surface.side * b, surface.side * a, discriminant), True
+
+
 @base.course.register(QuadricNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = _from_center(surface, x, y, z)
@@ -113,22 +142,28 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     a2 += 0.5 * _linear(surface, gx, gy, gz)
     # q(r + v t + G t^2/2) - level, a quartic in t
     a3, a4 = _dot(surface, vx, vy, vz, gx, gy, gz), 0.25 * _dot(surface, gx, gy, gz, gx, gy, gz)
-    window = _window(surface, dx, dy, dz, vx, vy, vz, gx, gy, gz)
+    c, window = _window(surface, c, dx, dy, dz, vx, vy, vz, gx, gy, gz)
     # What is left of a3 where G A G is below the smallest number would be infinite after an infinite time.
     curved = surface.side * select(window < math.inf, 1.0, 0.0)
     return surface.side * c, surface.side * b, surface.side * a2, curved * a3, curved * a4, window
 
 
 @inlined
-def _window(surface, dx, dy, dz, vx, vy, vz, gx, gy, gz):
-    """The time in which the flight changes q by as much as it varies here; infinite where its level is a parabola."""
+def _window(surface, c, dx, dy, dz, vx, vy, vz, gx, gy, gz):
+    """(c, window) by the time in which the flight changes q by as much as it varies here.
+
+    The window is infinite where the level is a parabola.
+    """
     terms = _size(surface, dx, dy, dz) + abs(surface.bx * dx) + abs(surface.by * dy) + abs(surface.bz * dz)
     size = select(terms > surface.scale, terms, surface.scale)
     moving, falling = _size(surface, vx, vy, vz), _size(surface, gx, gy, gz)
     # At the apex of a cone there is no size: the time after which the fall is as fast as the start.
     size = select(size > 0.0, size, moving * moving / falling)
-    window = 2.0 * math.sqrt(size / (moving + math.sqrt(size * falling)))
-    return select(falling > 0.0, select(window > 0.0, window, 1.0), math.inf)
+    # A cone has no size of its own to be far from.
+    own = select(surface.scale > 0.0, surface.scale, math.inf)
+    level, window = level_and_window(c, own, size, moving, falling)
+    window = select(abs(window) > 0.0, window, 1.0)
+    return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
 
 @inlined

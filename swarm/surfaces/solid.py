@@ -165,7 +165,9 @@ def _entry(surface, gravity, x, y, z, vx, vy, vz):
         if not found or not wait < math.inf:
             return t + wait, found
         sx, sy, sz = displacement(gravity, wx, wy, wz, wait)
-        if abs(sx) + abs(sy) + abs(sz) <= 4.0 * _EPSILON * (abs(px) + abs(py) + abs(pz) + surface.extent):
+        # The place is known to round-off of its own coordinates and of those the flight comes from.
+        coordinates = abs(px) + abs(py) + abs(pz) + abs(x) + abs(y) + abs(z)
+        if abs(sx) + abs(sy) + abs(sz) <= 4.0 * _EPSILON * (coordinates + surface.extent):
             return t + wait, True
         t += wait
     return t, False

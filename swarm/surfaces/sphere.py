@@ -9,7 +9,7 @@ import numpy as np
 from .._jit import select
 from ..checks import Vector, length
 from . import base
-from .course import rise_time
+from .course import ball_rise_time, level_and_window, rise_time
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,7 +38,8 @@ class Sphere(base.Surface):
 
     def numbers(self) -> "SphereNumbers":
         side = base.side_sign(self.side)
-        return SphereNumbers(*self.center, self.radius, self.radius**2, side / self.radius, side)
+        kind = SphereNumbers if self.side == "inside" else SphereFromAfar
+        return kind(*self.center, self.radius, self.radius**2, side / self.radius, side)
 
     def walls(self) -> tuple["SphereNumbers"]:
         return (self.numbers(),)  # whatever its rotation
@@ -63,6 +64,10 @@ class SphereNumbers(NamedTuple):
     radius2: float
     curvature: float  # side/R
     side: float
+
+
+class SphereFromAfar(SphereNumbers):
+    """A ball: it may be small compared with the way to it."""
 
 
 # --- The level set ---------------------------------------------------------------------------------------
@@ -92,6 +97,12 @@ def _(surface, x, y, z, vx, vy, vz):
     return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
+@base.first_hit.register(SphereFromAfar)
+def _(surface, x, y, z, vx, vy, vz):
+    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
+    return ball_rise_time(surface.side, surface.radius2, dx, dy, dz, vx, vy, vz), True
+
+
 @base.course.register(SphereNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
@@ -104,7 +115,7 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     a3 = vx * gx + vy * gy + vz * gz
     # By the distance where that is more than the radius: a ball is looked for from afar.
     size = surface.radius2 + select(c > 0.0, c, 0.0)
-    window = 2.0 * math.sqrt(size / (a + math.sqrt(size * gg)))
+    c, window = level_and_window(c, surface.radius2, size, a, gg)
     side = surface.side
     return side * c, side * b, side * a2, side * a3, side * 0.25 * gg, window
 

@@ -40,6 +40,20 @@ def test_impact_never_passes(thickness, speed):
     assert end.observables["max_penetration"].max() <= 4.0 * np.finfo(float).eps
 
 
+@pytest.mark.parametrize("thickness", [1e-6, 1e-12])
+def test_no_flight_passes_a_thin_ellipsoid(thickness):
+    """A disc wider than its cavity: every particle stays in its half. Seen from afar it is a double root."""
+    disc = swarm.Ellipsoid((2.0, 0.5 * thickness, 2.0), side="outside")
+    scene = swarm.Scene([disc, swarm.Ellipsoid((1.0, 1.0, 1.0))])
+    position = np.random.default_rng(4).uniform(0.1, 0.5, (3, 50))
+    position[1, ::2] *= -1.0
+    start = swarm.Particles(position, np.random.default_rng(5).standard_normal((3, 50)))
+    end = swarm.simulate(scene, start, swarm.Impact(), until=1000.0, every=100.0)
+    assert (np.sign(end.particles.position[1]) == np.sign(position[1])).all()
+    assert end.observables["impacts"][-1] > 50 * 1000
+    assert end.observables["max_penetration"].max() <= 4.0 * np.finfo(float).eps
+
+
 @pytest.mark.parametrize("cls", STEPPING)
 def test_a_step_longer_than_the_wall_is_refused(cls):
     method = cls(dt=2.0 * THIN, penalty=1e4)
