@@ -1,10 +1,12 @@
 """One session of a run that may take several: what it takes up, when it saves, when it has to end."""
 
+import contextlib
 import dataclasses
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from . import checks
 from .errors import CompleteError, SceneError, WallTimeError
@@ -25,7 +27,7 @@ _OFTEN = 0.01
 
 
 class Session:
-    """From a start or a checkpoint to the end, a signal or the limit of wall time.
+    """From a start or a checkpoint to the end, a signal or the limit of wall time; no other holds the trajectory then.
 
     Args:
         trajectory: the file that is written, or None: then nothing can be saved.
@@ -50,6 +52,15 @@ class Session:
             raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
         self._job: Job | None = None
         self._arrays: Arrays | None = None
+        self._held = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._held.close()
 
     @property
     def first(self) -> int:
@@ -65,13 +76,16 @@ class Session:
             SceneError: the trajectory cannot become a new file; or it, or the checkpoint, is of another run, is damaged
                 or is missing.
             CompleteError: nothing is left to do.
+            FileError: another run writes that trajectory.
         """
         if self._trajectory is None or self._path is None:
             return
         from .output.checkpoint import Job, digest_of
+        from .output.lock import only_writer
         from .output.writer import check_target, descriptions
 
         check_target(self._trajectory, overwrite or self._resumes)
+        self._held.enter_context(only_writer(self._trajectory))
         if self._saves or self._resumes:
             start = digest_of(particles)
             texts: dict[str, Any] = {**descriptions(scene, method, storage)}

@@ -126,7 +126,7 @@ def simulate(
 
     Raises:
         SceneError: bad input, or a checkpoint of another run; nothing has run or been written.
-        FileError: the trajectory or the recording cannot be written.
+        FileError: the trajectory or the recording cannot be written, or another run is writing it.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
         WallTimeError: the wall time is over; the frames before it are in the trajectory.
@@ -153,45 +153,46 @@ def simulate(
     storage = Storage(frames, precision, compression)
     shown = {"particles": record_particles, "color": record_color, "megabytes": record_megabytes, "live": live}
     recorder = _recording(recording, overwrite, resume, scene, method, particles, _frame_times(until, every), shown)
-    session.prepare(scene, method, storage, particles, until, overwrite)
+    with session:
+        session.prepare(scene, method, storage, particles, until, overwrite)
 
-    run = Run(scene, particles, method, threads, block_size)
-    session.restore(run)
-    history: list[dict[str, Any]] = []
-    writer = _output(
-        _trajectory(target, storage, scene, method, particles, scene_text, session.first),
-        storage.kept(),
-        recorder,
-        len(particles),
-    )
-    writing = writer or contextlib.nullcontext(lambda *frame: None)
+        run = Run(scene, particles, method, threads, block_size)
+        session.restore(run)
+        history: list[dict[str, Any]] = []
+        writer = _output(
+            _trajectory(target, storage, scene, method, particles, scene_text, session.first),
+            storage.kept(),
+            recorder,
+            len(particles),
+        )
+        writing = writer or contextlib.nullcontext(lambda *frame: None)
 
-    def stop() -> None:
-        session.stop()
-        run.halt()
+        def stop() -> None:
+            session.stop()
+            run.halt()
 
-    with run, interrupt.taken_by(stop), writing as write, display(progress) as show:
-        for number, before, moment in times:
-            session.require_same_time(number, moment)
-            if number < session.first:
-                continue
-            _reach(run, session, writer, method, number, before, moment)
-            seen = {"time": moment, **run.seen()}
-            run.require_admissible(seen, moment)
-            if target is None:
-                history.append(seen)
-            write(number, moment, run.state, seen)
-            show(Frame(number, moment, until, seen, writer.written if writer else 0))
-            if moment < until:
-                session.look(run, writer, number, moment, None)
-    session.finish()
-    return Result(
-        Particles.of(run.state),
-        _columns(history) if target is None else _read_back(target),
-        session.wall_time(),
-        target,
-        run.state.multipliers,
-    )
+        with run, interrupt.taken_by(stop), writing as write, display(progress) as show:
+            for number, before, moment in times:
+                session.require_same_time(number, moment)
+                if number < session.first:
+                    continue
+                _reach(run, session, writer, method, number, before, moment)
+                seen = {"time": moment, **run.seen()}
+                run.require_admissible(seen, moment)
+                if target is None:
+                    history.append(seen)
+                write(number, moment, run.state, seen)
+                show(Frame(number, moment, until, seen, writer.written if writer else 0))
+                if moment < until:
+                    session.look(run, writer, number, moment, None)
+        session.finish()
+        return Result(
+            Particles.of(run.state),
+            _columns(history) if target is None else _read_back(target),
+            session.wall_time(),
+            target,
+            run.state.multipliers,
+        )
 
 
 def _reach(

@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -179,6 +180,30 @@ def test_bad_wall_time_is_named(folder):
     done = command("run", "scene.toml", "--walltime", "soon", cwd=folder)
     assert done.returncode == 2
     assert """--walltime must be a time such as "2h", "1h30m" or "90s", got 'soon'""" in done.stderr
+
+
+def test_a_full_disk_is_exit_code_1_and_the_run_goes_on_later(folder):
+    """A limit of the size of files stands in for the disk."""
+    text = GOOD.replace("count = 10", "count = 200").replace("until = 1.0", "until = 1e3")
+    (folder / "scene.toml").write_text(text)
+    # The kernels are not to be what is too large.
+    whole = command("run", "scene.toml", "-o", "whole.h5", cwd=folder)
+    assert (whole.returncode, whole.stderr) == (0, "")
+    limit = 8_000_000
+    done = subprocess.run(
+        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=100,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: cannot write frame ")
+    assert len(done.stderr.splitlines()) == 1
+    with swarm.load(folder / "scene.h5") as trajectory:
+        assert 20 < len(trajectory) < 2001
+    resumed = command("run", "scene.toml", "--resume", cwd=folder)
+    assert (resumed.returncode, resumed.stderr) == (0, "")
+    with swarm.load(folder / "scene.h5") as one, swarm.load(folder / "whole.h5") as other:
+        assert len(one) == len(other) == 2001
+        assert (one.frame(-1).position == other.frame(-1).position).all()
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="a folder in which not even root can write")

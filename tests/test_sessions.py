@@ -229,6 +229,24 @@ def test_a_new_run_forgets_the_old_checkpoint(tmp_path):
     assert not checkpoint.path_of(path).exists()
 
 
+@pytest.mark.parametrize("keywords", [{"resume": True}, {"overwrite": True}])
+def test_no_second_run_writes_the_same_trajectory(tmp_path, keywords):
+    """While it runs it is refused and nothing is touched; the file is as if nobody had tried. What a kill left of the
+    lock locks nobody out."""
+    path = tmp_path / "run.h5"
+    (tmp_path / "run.h5.lock").touch()
+
+    def meddle(frame):
+        with pytest.raises(swarm.FileError, match=r"run\.h5 is being written by another run; wait until"):
+            run(path, **keywords)
+
+    run(path, checkpoint=60.0, progress=meddle)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.h5"]
+    with swarm.load(path) as trajectory:
+        assert trajectory.times.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    run(path, overwrite=True)
+
+
 def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monkeypatch):
     """The disk is full when it is half written: the run ends, and goes on later from the one before."""
     path = tmp_path / "run.h5"

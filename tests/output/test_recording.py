@@ -149,6 +149,34 @@ def test_a_recording_that_was_cut_off_is_mended(run, tmp_path, lost):
         np.testing.assert_array_equal(mine, theirs)
 
 
+@pytest.mark.physics
+def test_kill_9_while_recording(tmp_path, request):
+    """What is left is mended, and holds frames as they were."""
+    code = (
+        "import swarm\n"
+        "scene = swarm.Scene([swarm.Sphere(0.5)])\n"
+        "particles = swarm.fill(scene, 2000, speed=0.5, seed=4)\n"
+        "swarm.simulate(scene, particles, swarm.Impact(), until=2e3, every=0.5, trajectory='run.h5',\n"
+        "    recording='run.rrd', record_particles=100, progress=lambda frame: print(frame.number, flush=True))\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    request.addfinalizer(process.kill)
+    for line in process.stdout:
+        if int(line) >= 300:
+            break
+    process.kill()
+    process.communicate()
+    assert not playback.is_whole(tmp_path / "run.rrd")
+    mended = playback.repair(tmp_path / "run.rrd")
+    assert playback.is_whole(tmp_path / "run.rrd")
+    assert mended.numbers == list(range(len(mended.numbers)))
+    assert len(mended.numbers) > 100
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        for number in (0, 50, 100):
+            kept = trajectory.frame(number).position[:, ::20].T.astype(np.float32)
+            np.testing.assert_array_equal(mended.frame(number)[0], kept)
+
+
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.rrd").write_text("no recording")
     with pytest.raises(swarm.SceneError, match=r"text\.rrd is not a recording of swarm"):
