@@ -5,6 +5,7 @@ loops in C, plain Verlet in Numba, and the machine's limits; `ratio` is a time o
 does the same in a sphere.
 """
 
+import importlib.util
 import itertools
 import statistics
 import tempfile
@@ -40,6 +41,8 @@ _REFUSED = {("AugmentedLagrangian, dt=0.025", "sphere, gravity")}
 # What a measurement takes [s], and its repeats.
 _SECONDS, _REPEATS = 0.15, 3
 _MOST_FRAMES = 200
+# What is written: nothing, a trajectory of all particles, that and a recording of 5000 of them.
+_OUTPUTS = ("none", "HDF5", "HDF5+Rerun")
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class Case:
     scene: str
     n: int
     threads: int
-    output: str  # "none" or "HDF5"
+    output: str  # of _OUTPUTS
 
     def __str__(self) -> str:
         return f"{self.method}, {self.scene}, {self.n:.0e}, {self.threads} thr, {self.output}".replace("e+0", "e")
@@ -88,11 +91,12 @@ class Case:
 
 def cases(quick: bool) -> Iterator[Case]:
     """All of them; a quick run has one of each kind."""
+    outputs = _OUTPUTS if importlib.util.find_spec("rerun") else _OUTPUTS[:2]
     if quick:
-        yield from (Case("Impact", "sphere", 1_000, threads, kind) for threads in (1, 2) for kind in ("none", "HDF5"))
+        yield from (Case("Impact", "sphere", 1_000, threads, kind) for threads in (1, 2) for kind in outputs)
         yield Case("Penalty, dt=0.025", "sphere", 1_000, 1, "none")
         return
-    for method, scene, n, threads, kind in itertools.product(METHODS, SCENES, _PARTICLES, (1, 2), ("none", "HDF5")):
+    for method, scene, n, threads, kind in itertools.product(METHODS, SCENES, _PARTICLES, (1, 2), outputs):
         if (method, scene) in _REFUSED:
             continue
         if n <= _MOST_WRITTEN or (kind == "none" and scene == _LARGEST_IN):
@@ -110,7 +114,8 @@ def run(case: Case, particles: swarm.Particles, frames: int, folder: Path) -> tu
         way.method,
         until=frames * every,
         every=frames * every if case.output == "none" else every,
-        trajectory=None if case.output == "none" else folder / "trajectory.h5",
+        trajectory=folder / "trajectory.h5" if "HDF5" in case.output else None,
+        recording=folder / "recording.rrd" if "Rerun" in case.output else None,
         overwrite=True,
         threads=case.threads,
         progress=lambda frame: clock.append(time.perf_counter()),
@@ -170,6 +175,8 @@ def yardsticks(quick: bool) -> dict[str, list[float]]:
 def main(quick: bool) -> None:
     """Measure and print; unless quick, write the CSV and the PNG of this machine."""
     limits = yardsticks(quick)
+    if importlib.util.find_spec("rerun") is None:
+        print('recordings are left out: rerun-sdk is not installed; pip install -e ".[record]"')
     rows = [
         Row(name, min(values), statistics.median(values), f"ns/{_ITEMS.get(name.split(':')[0], 'item')}")
         for name, values in limits.items()
@@ -212,7 +219,8 @@ def table(found: dict[Case, list[float]]) -> None:
     numbers = sorted({case.n for case in found})
     print("nanoseconds an impact, or a step of a particle: minimum (median)")
     head = "".join(f"{f'N = {n:.0e}'.replace('e+0', 'e'):>18}" for n in numbers)
-    for threads, kind in sorted({(case.threads, case.output) for case in found}):
+    tables = {(_OUTPUTS.index(case.output), case.threads) for case in found}
+    for kind, threads in [(_OUTPUTS[which], threads) for which, threads in sorted(tables)]:
         print(f"\n{f'{threads} thread{(threads > 1) * chr(115)}, output: {kind}':<50}{head}")
         for method, scene in dict.fromkeys((case.method, case.scene) for case in found):
             cells = [found.get(Case(method, scene, n, threads, kind)) for n in numbers]

@@ -26,7 +26,8 @@ def test_throughput_quick():
     for row in (
         "bare loop in C, sphere",
         "limit: a square root",
-        "1 thread, output: HDF5",
+        "1 thread, output: HDF5+Rerun",
+        "2 threads, output: HDF5 ",
         "2 threads, output: none",
         "Impact, sphere",
         "Penalty, dt=0.025, sphere",
