@@ -1,34 +1,56 @@
 """The progress display of a run: a bar on a terminal, else a line a minute."""
 
 import contextlib
+import math
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 # ETA and speed come from the last seconds only: compile time would spoil an average from the start.
 _WINDOW = 10.0
-# Seconds from one plain line to the next.
-_A_MINUTE = 60.0
+# Seconds from one plain line to the next, and from one change of the bar to the next within a long frame.
+_A_MINUTE, _A_MOMENT = 60.0, 1.0
+
+
+def _nothing(*_args: Any) -> None:
+    """For those who do not want to be told."""
+
+
+@dataclass(frozen=True)
+class Display:
+    """What is told of a run.
+
+    Args:
+        frame: is called with every frame.
+        within: is called with the time that the particles have reached on average on the way to the next frame, and
+            the time of the end.
+        every: seconds of wall time from one such call to the next.
+    """
+
+    frame: Callable[[Any], None]
+    within: Callable[[float, float], None] = _nothing
+    every: float = math.inf
 
 
 @contextlib.contextmanager
-def display(progress: bool | Callable[[Any], None]) -> Iterator[Callable[[Any], None]]:
-    """A function to call with every frame: nothing, the caller's own, or a bar or lines on standard error."""
+def display(progress: bool | Callable[[Any], None]) -> Iterator[Display]:
+    """Nothing, the caller's own function, or a bar or lines on standard error."""
     if callable(progress):
-        yield progress
+        yield Display(progress)
     elif not progress:
-        yield lambda frame: None
+        yield Display(_nothing)
     elif sys.stderr.isatty():
-        with _bar() as show:
-            yield show
+        with _bar() as bar:
+            yield bar
     else:
         yield lines(_A_MINUTE)
 
 
 @contextlib.contextmanager
-def _bar() -> Iterator[Callable[[Any], None]]:
+def _bar() -> Iterator[Display]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
@@ -41,45 +63,72 @@ def _bar() -> Iterator[Callable[[Any], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0, line="compiling (the next run will not)")
 
-        def show(frame: Any) -> None:
-            if frame.number > 0:  # the first frame is the start: kernels compile after it
-                bar.update(task, completed=frame.time / frame.until, line=recent.line(frame))
+        def frame(done: Any) -> None:
+            line = recent.frame(done)
+            if done.number > 0:  # the first frame is the start: kernels compile after it
+                bar.update(task, completed=done.time / done.until, line=line)
 
-        yield show
+        def within(moment: float, until: float) -> None:
+            bar.update(task, completed=moment / until, line=recent.within(moment, until))
+
+        yield Display(frame, within, _A_MOMENT)
 
 
-def lines(interval: float) -> Callable[[Any], None]:
-    """A function that prints a frame's line if the last one is `interval` seconds old."""
+def lines(interval: float) -> Display:
+    """Prints a line when the last one is `interval` seconds old."""
     recent, last = _Recent(), time.monotonic()
 
-    def show(frame: Any) -> None:
+    def tell(share: float, line: str) -> None:
         nonlocal last
-        if frame.number == 0:
-            return
-        line, now = recent.line(frame), time.monotonic()
+        now = time.monotonic()
         if now - last >= interval:
-            print(f"{100.0 * frame.time / frame.until:.1f}%  {line}", file=sys.stderr, flush=True)
+            print(f"{100.0 * share:.1f}%  {line}", file=sys.stderr, flush=True)
             last = now
 
-    return show
+    def frame(done: Any) -> None:
+        line = recent.frame(done)
+        if done.number > 0:
+            tell(done.time / done.until, line)
+
+    def within(moment: float, until: float) -> None:
+        tell(moment / until, recent.within(moment, until))
+
+    return Display(frame, within, interval)
 
 
 class _Recent:
-    """The frames of the last seconds."""
+    """The last seconds of a run."""
 
     def __init__(self) -> None:
-        self._frames: deque[tuple[float, float, int]] = deque()
+        self._moments: deque[tuple[float, float]] = deque()
+        self._impacts: deque[tuple[float, float]] = deque()
+        self._energy = ""
 
-    def line(self, frame: Any) -> str:
+    def frame(self, frame: Any) -> str:
         """Time, ETA, speed and energy error, now that this frame is done."""
-        recent, now = self._frames, time.perf_counter()
-        recent.append((now, frame.time, frame.observables["impacts"]))
-        while len(recent) > 2 and now - recent[0][0] > _WINDOW:
-            recent.popleft()
-        line = f"{frame.time:.4g}/{frame.until:.4g} s"
-        elapsed, advanced = now - recent[0][0], frame.time - recent[0][1]
+        self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
+        if frame.number == 0:
+            return ""
+        _note(self._impacts, frame.observables["impacts"])
+        return self.within(frame.time, frame.until)
+
+    def within(self, moment: float, until: float) -> str:
+        """The same on the way to a frame, speed and energy error being those of the last one."""
+        elapsed, advanced = _note(self._moments, moment)
+        line = f"{moment:.4g}/{until:.4g} s"
         if elapsed > 0.0 and advanced > 0.0:
-            left = int(elapsed * (frame.until - frame.time) / advanced)
-            rate = (recent[-1][2] - recent[0][2]) / elapsed
-            line += f"  ETA {left // 3600}:{left // 60 % 60:02}:{left % 60:02}  {rate:.3g} impacts/s"
-        return line + f"  energy error {frame.observables['energy_error']:.1e}"
+            left = int(elapsed * (until - moment) / advanced)
+            line += f"  ETA {left // 3600}:{left // 60 % 60:02}:{left % 60:02}"
+        if len(self._impacts) > 1:
+            (before, few), (after, many) = self._impacts[0], self._impacts[-1]
+            line += f"  {(many - few) / (after - before):.3g} impacts/s" if after > before else ""
+        return line + self._energy
+
+
+def _note(values: deque[tuple[float, float]], value: float) -> tuple[float, float]:
+    """Add a value of now, forget those of long ago: (seconds, difference) from the first to the last."""
+    now = time.perf_counter()
+    values.append((now, value))
+    while len(values) > 2 and now - values[0][0] > _WINDOW:
+        values.popleft()
+    return now - values[0][0], value - values[0][1]

@@ -104,6 +104,11 @@ class Run:
             raise RunError(told)
         return not self._cut_short
 
+    def share_done(self, span: float) -> float:
+        """How much of a frame that was cut short is done, on average over the particles."""
+        left = self._halted.rows[lanes.LEFT]
+        return float(self._done.sum() + (1.0 - left / span).sum()) / len(self._done)
+
     def observe(self) -> None:
         """Observe the start."""
         self._done.fill(True)

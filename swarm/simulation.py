@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import os
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from .sessions import Session
 
 if TYPE_CHECKING:
     from .output.beside import Beside, Writer
+    from .progress import Display
 
 _LOG = logging.getLogger("swarm")
 # Frames nearer to `until` than this part of `every` are `until`.
@@ -176,13 +178,13 @@ def simulate(
                 session.require_same_time(number, moment)
                 if number < session.first:
                     continue
-                _reach(run, session, writer, method, number, before, moment)
+                _reach(run, session, writer, method, show, number, before, moment, until)
                 seen = {"time": moment, **run.seen()}
                 run.require_admissible(seen, moment)
                 if target is None:
                     history.append(seen)
                 write(number, moment, run.state, seen)
-                show(Frame(number, moment, until, seen, writer.written if writer else 0))
+                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
                 if moment < until:
                     session.look(run, writer, number, moment, None)
         session.finish()
@@ -196,14 +198,18 @@ def simulate(
 
 
 def _reach(
-    run: Run, session: Session, writer: "Beside | None", method: Method, number: int, before: float, moment: float
-) -> None:
+    run: Run, session: Session, writer: "Beside | None", method: Method, show: "Display",
+    number: int, before: float, moment: float, until: float,
+) -> None:  # fmt: skip
     """Advance from one frame to the next, and observe it; the first is the start."""
     if number == 0:
         run.observe()
         return
     span = method.span("time", moment) - method.span("time", before)
-    while not run.advance(span, moment, writer.seconds if writer else 0.0, session.latest):
+    while not run.advance(
+        span, moment, writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
+    ):
+        show.within(before + run.share_done(span) * (moment - before), until)
         session.look(run, writer, number - 1, before, moment)
 
 

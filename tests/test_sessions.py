@@ -15,6 +15,7 @@ from conftest import METHODS, rarely
 
 import swarm
 from examples import long_run
+from swarm import progress
 from swarm.output import checkpoint
 from swarm.progress import lines
 from swarm.run import Run
@@ -316,11 +317,29 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
     for number in range(8):
         # The first frame compiles for a minute and a half, which the estimate must not know of; then 20 s each.
         clock[0] += 90.0 if number == 1 else 20.0
-        show(Frame(number, 0.5 * number, 50.0, {"impacts": 1000 * number, "energy_error": 2e-16}))
+        show.frame(Frame(number, 0.5 * number, 50.0, {"impacts": 1000 * number, "energy_error": 2e-16}))
     told = capsys.readouterr().err.splitlines()
     assert told[0].startswith("1.0%  0.5/50 s")
     assert told[1] == "4.0%  2/50 s  ETA 0:32:00  50 impacts/s  energy error 2.0e-16"
     assert len(told) == 3
+    clock[0] += 100.0
+    show.within(3.75, 50.0)  # half of the way to the next frame; the last 10 s and more were the last 0.25 s
+    assert capsys.readouterr().err.splitlines() == ["7.5%  3.75/50 s  ETA 5:08:20  50 impacts/s  energy error 2.0e-16"]
+
+
+@pytest.mark.physics
+def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
+    """A run without frames in between tells how far it is all the same."""
+    monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: False)
+    monkeypatch.setattr(progress, "_A_MINUTE", 0.05)
+    start = swarm.fill(SPHERE, 300, speed=1.0, seed=1)
+    whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1)
+    told = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1, progress=True)
+    assert np.array_equal(told.particles.position, whole.particles.position)
+    shares = [float(line.split("%")[0]) for line in capsys.readouterr().err.splitlines()]
+    assert len(shares) >= 3
+    assert shares == sorted(shares)
+    assert 0.0 < shares[len(shares) // 2] < 100.0
 
 
 @pytest.mark.physics

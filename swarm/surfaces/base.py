@@ -185,7 +185,7 @@ def course(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     """The level along the parabola r + v t + G t^2/2 of a quadric: c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4.
 
     Returns (c, b, a2, a3, a4, window), window being a time in which the flight crosses the surface's size, infinite
-    where the level is a parabola. Only what `is_quartic` has one.
+    where the level is a parabola; from afar both are as `level_and_window` says. Only what `is_quartic` has one.
     """
     raise NotImplementedError
 

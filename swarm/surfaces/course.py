@@ -111,7 +111,8 @@ def safe_step(c, b, a2, a3, a4, window, t, last):
 
     It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
     double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
-    and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on.
+    and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on, or
+    next to it with a negative window, that is from afar: no hit, but a place to begin again from.
     """
     there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
     reach = select(2.0 * last < window, 2.0 * last, window)
