@@ -7,31 +7,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from .._jit import by_type, by_type_outlined, kept, outlined, select
+from .._jit import kept, select
 from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
-from ..contact.discrete_gradient import form_of, nested
-from ..contact.reflection import chord, exact
-from ..contact.sliding import impact
+from ..contact.discrete_gradient import form_of
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
-from ..surfaces import flights
-from . import base, fixed_step
+from . import adaptive_step, base, fixed_step
 
 RAISE, COUNT, IMPACT = 0, 1, 2
 _POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
 _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
-# Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
-_SAME_INSTANT = 1e-6
-_MOST_BOUNCES = 1000
-# A |v|^2 that is off its first value by more than this has lost energy to a tolerance, which is not to be hidden.
-_ROUND_OFF = 1e-13
 
 
 @dataclass(frozen=True)
@@ -118,7 +110,7 @@ class AugmentedLagrangian(base.Method):
             self.dt,
             self.law(),
             form_of(self.gradient),
-            Adaptive(base.SHORTEST * scene.finite_size()) if self.adaptive else None,
+            adaptive_step.Adaptive(base.SHORTEST * scene.finite_size()) if self.adaptive else None,
             self.tolerance,
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
@@ -148,12 +140,6 @@ class AugmentedLagrangian(base.Method):
         )
 
 
-class Adaptive(NamedTuple):
-    """Chooses steps that are cut at the impact."""
-
-    shortest_length: float  # of the flights of particles that graze where a step is not possible
-
-
 class AugmentedLagrangianNumbers(NamedTuple):
     """What kernels know of the method."""
 
@@ -177,61 +163,9 @@ def _(method, mass, energy, vx, vy, vz):
     return 0.5 / mass, energy, 0.0
 
 
-@by_type
-def _flight(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
-    raise NotImplementedError
-
-
-@_flight.register(type(None))
-def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
-    x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    surface, count = walls.touched(chain, x, y, z, px, py, pz)
-    surface = select((count > 1.0) | nested(method.form), base.HARD - surface, surface)
-    jumps = fixed_step.too_fast(method.longest, px, py, pz)
-    surface = select(jumps, base.HARD, surface)
-    touched = (left > 0.0) & ((count > 0.0) | jumps)
-    return x, y, z, vx, vy, vz, left, select(touched, surface, -1.0)
-
-
-@_flight.register(Adaptive)
-def _(adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left):
-    time, surface = flights.first_hit(chain, None, x, y, z, vx, vy, vz)
-    hit = time <= left
-    t = select(hit, time, left)
-    x, y, z = x + t * vx, y + t * vy, z + t * vz
-    sx, sy, sz = walls.settle(chain, surface, x, y, z)
-    hit = hit & (surface >= 0.0)
-    surface = select(nested(method.form), base.HARD - surface, surface)
-    # A hit in the last instant of a frame is met again in the next one.
-    hit = hit & (left - t > 0.0)
-    x, y, z = select(hit, sx, x), select(hit, sy, y), select(hit, sz, z)
-    return x, y, z, vx, vy, vz, left - t, select(hit, surface, -1.0)
-
-
-@by_type
-def _step(adaptive, method, left):
-    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
-    raise NotImplementedError
-
-
-@_step.register(type(None))
-def _(adaptive, method, left):
-    return method.dt, 1.0, method.law
-
-
-@_step.register(Adaptive)
-def _(adaptive, method, left):
-    # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger alpha.
-    dt = method.dt
-    h = select(dt < left, dt, left)
-    part = dt / h
-    return h, h, law_of.stiffened(method.law, part * part)
-
-
 @base.flight.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    return _flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
+    return adaptive_step.flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
 
 
 @base.most_sweeps.register(AugmentedLagrangianNumbers)
@@ -241,7 +175,7 @@ def _(method, chain):
 
 @base.guess.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    h, _used, law = _step(method.adaptive, method, left)
+    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     kappa = contact_impulse.guess(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
     touching = surface >= 0.0
@@ -250,7 +184,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
 
 @base.improve.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    h, _used, law = _step(method.adaptive, method, left)
+    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     step, more, mean, stored, gain = contact_impulse.improve(
         chain, surface, law, multiplier, x, y, z, px, py, pz, k0 * h * h, kappa
@@ -265,7 +199,7 @@ def _(method):
 
 @base.first_multiplier.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
-    h, _used, law = _step(method.adaptive, method, left)
+    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     better, multiplier = uzawa.reflection(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
     use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
@@ -275,7 +209,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
 
 @base.next_multiplier.register(AugmentedLagrangianNumbers)
 def _(method, left, acceleration, multiplier, mean, stored, multiplier_before, miss_before):
-    _h, _used, law = _step(method.adaptive, method, left)
+    _h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
     miss = law.alpha * mean
     following = uzawa.next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before)
     return following, miss, not (stored <= method.tolerance)
@@ -284,7 +218,7 @@ def _(method, left, acceleration, multiplier, mean, stored, multiplier_before, m
 @base.contact.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
-    h, used, _law = _step(method.adaptive, method, left)
+    h, used, _law = adaptive_step.step_of(method.adaptive, method, left)
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
     gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
@@ -293,14 +227,14 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
     given = abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz)
 
-    free = _free(method.adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa)
+    free = adaptive_step.is_alone(method.adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa)
     solved = free & (not unsolved) & walls.pushes(chain, surface, kappa)
     touching = surface >= 0.0
     step = (left > 0.0) & touching & solved
     factor, _balanced = energies.restored(
         method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
     )
-    new = step & _is_new(method.adaptive, chain, x, y, z)
+    new = step & adaptive_step.is_new(method.adaptive, chain, x, y, z)
     # A step without contact: only fixed steps end here that way, just before one.
     loose = (left > 0.0) & (surface > base.HARD) & (not touching)
     ex, ey, ez = accelerated(gravity, vx, vy, vz, h)
@@ -319,50 +253,17 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     )
 
 
-@by_type
-def _is_new(adaptive, chain, x, y, z):
-    """Whether a contact step starts with an impact."""
-    raise NotImplementedError
-
-
-@_is_new.register(type(None))
-def _(adaptive, chain, x, y, z):
-    return not walls.outside(chain, -1.0, x, y, z)
-
-
-@_is_new.register(Adaptive)
-def _(adaptive, chain, x, y, z):
-    return True
-
-
-@by_type
-def _free(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
-    """Whether no other wall has a part in the step, which then one lane can do alone."""
-    raise NotImplementedError
-
-
-@_free.register(type(None))
-def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
-    return not walls.outside(chain, surface, x1, y1, z1)
-
-
-@_free.register(Adaptive)
-def _(adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa):
-    # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free flight
-    # ends outside again) was hit all the same.
-    cut, _other = flights.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
-    return (cut > 1.0) & (kappa != 0.0)
-
-
 # --- Several walls, nested solves, and loops that do not converge ----------------------------------------
 
 
 @base.hard_pass.register(AugmentedLagrangianNumbers)
 def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    h, used, law = _step(method.adaptive, method, left)
-    if _is_blocked(method.adaptive, method.law, chain, surface, x, y, z, h * vx, h * vy, h * vz):
+    h, used, law = adaptive_step.step_of(method.adaptive, method, left)
+    if adaptive_step.is_blocked(method.adaptive, method.law, chain, surface, x, y, z, h * vx, h * vy, h * vz):
         record[uzawa.SWEEPS, lane] = 0.0
-        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane)
+        return adaptive_step.as_impacts(
+            method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane
+        )
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     if fixed_step.too_fast(method.longest, px, py, pz):
         return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
@@ -373,11 +274,13 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     record[uzawa.SWEEPS, lane], record[uzawa.STORED, lane] = sweeps, stored
     record[uzawa.UNCONVERGED, lane] = 0.0 if converged else 1.0
     if not converged and method.policy == IMPACT:
-        return _impact(method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane)
+        return adaptive_step.as_impacts(
+            method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane
+        )
     if not converged and (method.policy == RAISE or not solved):
         status = Status.UNCONVERGED.value if solved else Status.UNSOLVED.value
         return x, y, z, vx, vy, vz, left, 0.0, k0, status
-    new = 1.0 if _is_new(method.adaptive, chain, x, y, z) else 0.0
+    new = 1.0 if adaptive_step.is_new(method.adaptive, chain, x, y, z) else 0.0
     rx, ry, rz = corner.total(reactions)
     f = 2.0 / h
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
@@ -388,79 +291,3 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
         method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
     )
     return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, k0, Status.DONE.value
-
-
-@by_type
-def _is_blocked(adaptive, law, chain, surface, x, y, z, px, py, pz):
-    """Whether the chord on `surface` meets another wall later in the step, or passes a solid by."""
-    return False
-
-
-@_is_blocked.register(Adaptive)
-def _(adaptive, law, chain, surface, x, y, z, px, py, pz):
-    kappa = chord(chain, surface, x, y, z, px, py, pz)
-    x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
-    cut, other = flights.other_hit(chain, surface, x, y, z, x1 - x, y1 - y, z1 - z)
-    # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-    later = cut <= 1.0 and not uzawa.has_limit(chain, other, law, x, y, z)
-    later = later or uzawa.meets_later(chain, surface, law, x, y, z, px, py, pz)
-    return not walls.pushes(chain, surface, kappa) or kappa == 0.0 or later
-
-
-@by_type_outlined
-def _impact(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
-    """The contact as exact impacts: the result of `hard_pass`."""
-    raise NotImplementedError
-
-
-@_impact.register(Adaptive)
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
-    speed2 = _first_speed2(energy, vx, vy, vz)
-    shortest = adaptive.shortest_length / math.sqrt(speed2)
-    touch = _SAME_INSTANT * adaptive.shortest_length
-    x, y, z, vx, vy, vz, used, _energy = impact(
-        None,
-        None,
-        chain,
-        None,
-        surface,
-        x,
-        y,
-        z,
-        vx,
-        vy,
-        vz,
-        left,
-        speed2,
-        0.5 / speed2,
-        shortest,
-        touch,
-        impulse,
-        lane,
-    )
-    return x, y, z, vx, vy, vz, left - used, 1.0, k0, Status.DONE.value
-
-
-@_impact.register(type(None))
-def _(adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, energy, surface, impulse, lane):
-    speed2 = _first_speed2(energy, vx, vy, vz)
-    remaining, hits = h, 0.0
-    for _i in range(_MOST_BOUNCES):
-        time, wall = flights.first_hit(chain, None, x, y, z, vx, vy, vz)
-        t = min(time, remaining)
-        x, y, z, remaining = x + t * vx, y + t * vy, z + t * vz, remaining - t
-        if not time < math.inf or remaining <= 0.0:
-            return x, y, z, vx, vy, vz, left - used, hits, k0, Status.DONE.value
-        if wall < 0.0:
-            continue
-        vx, vy, vz, given, _energy = exact(None, chain, None, wall, x, y, z, vx, vy, vz, speed2, 0.5 / speed2)
-        impulse[int(wall), lane] += given
-        hits += 1.0
-    return x, y, z, vx, vy, vz, left, hits, k0, Status.STALLED.value
-
-
-@outlined
-def _first_speed2(energy, vx, vy, vz):
-    """|v|^2 at the start of the run, if it is that up to round-off, else |v|^2 now."""
-    now = vx * vx + vy * vy + vz * vz
-    return 2.0 * energy if abs(2.0 * energy - now) <= _ROUND_OFF * now else now

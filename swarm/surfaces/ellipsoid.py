@@ -98,21 +98,24 @@ def _(surface, x, y, z):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
+@inlined
+def _parabola(surface, dx, dy, dz, vx, vy, vz):
+    """(c, b, a) of q(d + v t) - 1 = c + 2 b t + a t^2."""
+    c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
+    return c, _dot(surface, dx, dy, dz, vx, vy, vz), _dot(surface, vx, vy, vz, vx, vy, vz)
+
+
 @base.first_hit.register(EllipsoidNumbers)
 def _(surface, x, y, z, vx, vy, vz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
-    b = _dot(surface, dx, dy, dz, vx, vy, vz)
-    a = _dot(surface, vx, vy, vz, vx, vy, vz)
+    c, b, a = _parabola(surface, dx, dy, dz, vx, vy, vz)
     return rise_time(surface.side * c, surface.side * b, surface.side * a), True
 
 
 @base.first_hit.register(EllipsoidFromAfar)
 def _(surface, x, y, z, vx, vy, vz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
-    b = _dot(surface, dx, dy, dz, vx, vy, vz)
-    a = _dot(surface, vx, vy, vz, vx, vy, vz)
+    c, b, a = _parabola(surface, dx, dy, dz, vx, vy, vz)
     # b^2 - a c = v.A v - w.(det A) A^-1 w with w = d x v, Lagrange's identity; near the wall the first form is better.
     wx, wy, wz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
     ww = surface.ay * surface.az * wx * wx + surface.ax * surface.az * wy * wy + surface.ax * surface.ay * wz * wz
@@ -123,9 +126,7 @@ def _(surface, x, y, z, vx, vy, vz):
 @base.course.register(EllipsoidNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    c = _dot(surface, dx, dy, dz, dx, dy, dz) - 1.0
-    b = _dot(surface, dx, dy, dz, vx, vy, vz)
-    a = _dot(surface, vx, vy, vz, vx, vy, vz)
+    c, b, a = _parabola(surface, dx, dy, dz, vx, vy, vz)
     gg = _dot(surface, gx, gy, gz, gx, gy, gz)
     # q(r + v t + G t^2/2) - 1, a quartic in t
     a2 = a + _dot(surface, dx, dy, dz, gx, gy, gz)

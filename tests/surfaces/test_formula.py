@@ -46,9 +46,9 @@ def test_derivatives(text):
 def test_small_powers_are_products(monkeypatch):
     written = []
     monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_none()))
-    from swarm.surfaces import formula
+    from swarm.surfaces import derivatives
 
-    formula._derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
+    derivatives.derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
     assert written
     assert not any("**" in text for text in written)
 
