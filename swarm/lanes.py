@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ._jit import Array, by_type_outlined, inlined, next_of, outlined
+from ._jit import Array, by_type_outlined, inlined, next_of, outlined, spaced
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
@@ -15,14 +16,18 @@ from .surfaces import flights
 LANES = 256
 # The row stride is not a power of two, so that the rows of a lane do not share a cache set.
 _STRIDE = 264
+# Bytes of a line of the cache, and of a number of eight flags.
+_LINE, EIGHT = 64, 8
 X, Y, Z, VX, VY, VZ, LEFT, K0, K1, K2, HITS, ROWS = range(12)
+
+with_distances = spaced(_STRIDE)
 
 
 class Lanes(NamedTuple):
-    """Arrays of one column a lane."""
+    """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
 
     rows: Array  # (ROWS, stride) position, velocity, time left, the method's constants, impacts
-    impulse: Array  # (surfaces, stride) normal impulse per mass
+    impulse: Array  # (walls, stride) normal impulse per mass
     surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     unsolved: Array  # bool, whether its solve goes on
@@ -32,21 +37,11 @@ class Lanes(NamedTuple):
     time: Array  # when the flight meets `surface`
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
-    arrived: Array  # int64, the lanes that reached the end of the frame in this pass, `_arrivals` of them
-
-
-class Room(NamedTuple):
-    """The arrays of `Lanes` that NumPy makes: in a kernel each kind of them takes a tenth of a second to compile."""
-
-    surface: Array
-    kappa: Array
-    unsolved: Array
-    sweeping: Array
-    record: Array
-    time: Array
-    particle: Array
-    arrived: Array
-    left_behind: Array  # (ROWS + walls, LANES) what the lanes hold when a halt ends the block
+    arrived: Array  # bool, whether it has reached the end of the frame
+    eights: Array  # int64, `arrived` of eight lanes in one number: the same memory
+    some: Array  # int64, those `eights` of which one has arrived
+    order: Array  # int64, the lanes that have arrived
+    left_behind: Array  # (ROWS + walls, stride) what the lanes hold when a halt ends the block
 
 
 class Halted(NamedTuple):
@@ -72,49 +67,40 @@ class Draws(NamedTuple):
     mine: Array  # the draws of this thread, in order
 
 
-def room(walls: int) -> Room:
-    """Room for one block."""
-    return Room(
-        np.empty(_STRIDE),
-        np.zeros(_STRIDE),
-        np.zeros(_STRIDE, np.bool_),
-        np.zeros(_STRIDE, np.bool_),
-        np.zeros((RECORDS, _STRIDE)),
-        np.empty(_STRIDE),
-        np.empty(_STRIDE, np.int64),
-        np.empty(_STRIDE, np.int64),
-        np.empty((ROWS + walls, LANES)),
+def empty(walls: int) -> Lanes:
+    """Lanes for one block."""
+    eights = np.zeros(_STRIDE // EIGHT, np.int64)
+    return Lanes(
+        rows=_table(ROWS),
+        impulse=_table(walls),
+        surface=_table(1)[0],
+        kappa=_table(1)[0],
+        unsolved=np.zeros(_STRIDE, np.bool_),
+        sweeping=np.zeros(_STRIDE, np.bool_),
+        record=_table(RECORDS),
+        course=_table(walls * flights.COURSE),
+        time=_table(1)[0],
+        turned=_table(4),
+        particle=np.zeros(_STRIDE, np.int64),
+        arrived=eights.view(np.bool_),
+        eights=eights,
+        some=np.zeros_like(eights),
+        order=np.zeros(_STRIDE, np.int64),
+        left_behind=_table(ROWS + walls),
     )
+
+
+def _table(rows: int) -> NDArray[np.float64]:
+    """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
+    size = 8 * rows * _STRIDE
+    memory = np.zeros(size + _LINE, np.uint8)
+    first = -memory.ctypes.data % _LINE
+    return memory[first : first + size].view(np.float64).reshape(rows, _STRIDE)
 
 
 def nobody(walls: int) -> Halted:
     """No particle was halted."""
     return Halted(np.empty(0, np.int64), np.empty((ROWS + walls, 0)))
-
-
-@inlined
-def lanes_in(room, chain):
-    """Lanes in that room. The tables of a pass are made here, where the compiler sees how far their rows are apart."""
-    count = walls.length(chain)
-    return Lanes(
-        _table(ROWS),
-        _table(count),
-        room.surface,
-        room.kappa,
-        room.unsolved,
-        room.sweeping,
-        room.record,
-        _table(count * flights.COURSE),
-        room.time,
-        _table(4),
-        room.particle,
-        room.arrived,
-    )
-
-
-@inlined
-def _table(rows):
-    return np.empty((rows, _STRIDE))
 
 
 @inlined
@@ -135,7 +121,7 @@ def following_particle(draws, done, i, stop, drawn):
 
 
 @inlined
-def load(method, lanes, lane, state, halted, i, span):
+def load(method, chain, lanes, lane, state, halted, i, span):
     """Particle i into a lane, as it starts the frame, or as a halt left it."""
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
     particle[lane] = i
@@ -150,7 +136,7 @@ def load(method, lanes, lane, state, halted, i, span):
     )
     rows[K0, lane], rows[K1, lane], rows[K2, lane] = constants
     rows[LEFT, lane], rows[HITS, lane] = span, 0.0
-    for s in range(impulse.shape[0]):
+    for s in range(walls.length(chain)):
         impulse[s, lane] = 0.0
 
 
@@ -174,8 +160,9 @@ def _pick_up(lanes, lane, halted, i):
 
 
 @outlined
-def leave(lanes, live, left_behind):
+def leave(lanes, live):
     """The live lanes, between two passes: what one pass leaves for the next."""
+    left_behind = lanes.left_behind
     for lane in range(live):
         for row in range(ROWS):
             left_behind[row, lane] = lanes.rows[row, lane]
@@ -184,7 +171,7 @@ def leave(lanes, live, left_behind):
 
 
 @inlined
-def retire(method, lanes, lane, state):
+def retire(method, chain, lanes, lane, state):
     """A lane back into its particle."""
     rows, impulse = lanes.rows, lanes.impulse
     position, velocity, impacts, total = state.position, state.velocity, state.impacts, state.impulse
@@ -193,7 +180,7 @@ def retire(method, lanes, lane, state):
         position[axis, i] = rows[X + axis, lane]
         velocity[axis, i] = rows[VX + axis, lane]
     impacts[i] += np.int64(rows[HITS, lane])
-    for s in range(impulse.shape[0]):
+    for s in range(walls.length(chain)):
         total[s, i] += impulse[s, lane] * state.mass[i]
     if methods.dissipates(method):
         # Each particle knows its energy: what it has lost is accounted for with it.
@@ -203,12 +190,12 @@ def retire(method, lanes, lane, state):
 
 
 @inlined
-def move(lanes, source, target):
+def move(chain, lanes, source, target):
     """The last live lane into the free slot. What flight and contact leave for each other need not move."""
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
     for row in range(ROWS):
         rows[row, target] = rows[row, source]
-    for s in range(impulse.shape[0]):
+    for s in range(walls.length(chain)):
         impulse[s, target] = impulse[s, source]
     particle[target] = particle[source]
 

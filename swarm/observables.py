@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import by_type, inlined, kernel, select
+from ._jit import by_type, inlined, kernel, scratch, select
 from .contact.energy import contact_energy
 from .gravity import Nothing, potential
 from .particles import State
@@ -75,7 +75,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
     """
     position, velocity, mass = state.position, state.velocity, state.mass
     energy, inverse_scale = state.energy, state.inverse_scale
-    sums = np.empty((ROWS, _COLUMNS))
+    sums = scratch((ROWS, _COLUMNS), np.float64)
     for k in drawn:
         for begin in range(k * size, min((k + 1) * size, mass.size), CHUNK):
             end = min(begin + CHUNK, mass.size)

@@ -150,21 +150,23 @@ class Run:
 
     def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
         """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
-        room = lanes.room(len(self._owners))
+        mine = lanes.empty(len(self._owners))
         draws = lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64))
         # Without the compiler too, a division by zero is an infinity that a select throws away.
         with np.errstate(divide="ignore", invalid="ignore"):
             status, particle, drawn = blocks.advance_block(
                 self._method, self._chain, self._gravity, self._hard, self.state, self._done, self._halted,
-                span, draws, self._halt, room,
+                span, draws, self._halt, mine,
             )  # fmt: skip
             if status == Status.DONE:
-                mine = draws.mine[:drawn]
-                observables.observe(self._law, self._chain, self._gravity, self.state, mine, self._size, self._partial)
+                drawn_here = draws.mine[:drawn]
+                observables.observe(
+                    self._law, self._chain, self._gravity, self.state, drawn_here, self._size, self._partial
+                )
         if status != Status.INTERRUPTED:
             return status, particle, None
         live, particle = particle, 0
-        return status, particle, lanes.Halted(room.particle[:live].copy(), room.left_behind[:, :live].copy())
+        return status, particle, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All that `restore` needs for a run to go on bit by bit, not copied; between two calls of `advance`."""

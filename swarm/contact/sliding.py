@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, inlined, outlined, select
+from .._jit import by_type, by_type_outlined, inlined, outlined, scratch, select
 from ..gravity import accelerated
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
@@ -39,7 +39,7 @@ def impact(
     If the next flight would be shorter than `shortest` too, the particle slides for that time instead. Walls within
     `touch` hold it as well. Adds to impulse[:, lane].
     """
-    given = np.zeros(walls.length(chain))
+    given = scratch(walls.length(chain), np.float64)
     wx, wy, wz, energy, wall = vx, vy, vz, twice_energy, surface
     for _blow in range(_BLOWS):
         wx, wy, wz, blow, energy = reflection.exact(
@@ -86,13 +86,14 @@ def _slide(
 ):
     """One sliding step: the result of `impact`."""
     count = walls.length(chain)
-    depth, touched, held, normal = np.empty(count), np.zeros(count, np.bool_), np.zeros(count), np.zeros((count, 3))
+    depth, touched = scratch(count, np.float64), scratch(count, np.bool_)
+    held, normal = scratch(count, np.float64), scratch((count, 3), np.float64)
     _depths(chain, 0, x, y, z, depth)
     size = max(abs(x), abs(y), abs(z))
     for i in range(count):
         touched[i] = depth[i] >= -touch
     touched[int(surface)] = True
-    given = np.zeros(count)
+    given = scratch(count, np.float64)
     vx, vy, vz, energy = _landed(restitution, chain, touched, normal, given, x, y, z, vx, vy, vz, twice_energy)
     if _goes_straight(chain, gravity, touched, normal, held, x, y, z, vx, vy, vz):
         h = left
@@ -176,7 +177,7 @@ def _landed(restitution, chain, touched, normal, given, x, y, z, vx, vy, vz, twi
 
 @_landed.register(walls.Chain)
 def _(restitution, chain, touched, normal, given, x, y, z, vx, vy, vz, twice_energy):
-    lossy = np.zeros(touched.size, np.bool_)
+    lossy = scratch(touched.size, np.bool_)
     for i in range(touched.size):
         lossy[i] = touched[i] and reflection.bounciness(restitution, float(i)) < 2.0
         if lossy[i]:

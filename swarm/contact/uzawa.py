@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from .._jit import by_type, inlined, outlined, select
+from .._jit import by_type, inlined, outlined, scratch, select
 from ..gravity import Nothing
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
@@ -124,7 +124,7 @@ def sweep_all(method, law, chain, x, y, z, px, py, pz, c, multipliers, before, m
     """
     count = multipliers.shape[0]
     x1, y1, z1, solved = corner.hold(method.form, law, multipliers, chain, x, y, z, px, py, pz, c, reactions)
-    first, last = np.zeros(count), reactions[:, 3]
+    first, last = scratch(count, np.float64), reactions[:, 3]
     corner.constraints(chain, law, 0, x, y, z, first)
     stored = 0.0
     for k in range(count):
@@ -154,7 +154,8 @@ def start(method, law, chain, x, y, z, px, py, pz, c, multipliers):
 def loop(method, law, chain, x, y, z, px, py, pz, c, reactions):
     """Sweeps until V <= tolerance: (x1, y1, z1, sweeps, V, solved, converged)."""
     count = walls.length(chain)
-    multipliers, before, misses = np.zeros(count), np.zeros(count), np.zeros(count)
+    multipliers, before = scratch(count, np.float64), scratch(count, np.float64)
+    misses = scratch(count, np.float64)
     start(method, law, chain, x, y, z, px, py, pz, c, multipliers)
     x1, y1, z1, stored = x, y, z, math.inf
     for sweep in range(method.max_sweeps):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from .._jit import kept, select
+from .._jit import kept, scratch, select
 from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -267,7 +267,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     if fixed_step.too_fast(method.longest, px, py, pz):
         return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
-    reactions = np.zeros((walls.length(chain), 4))
+    reactions = scratch((walls.length(chain), 4), np.float64)
     x1, y1, z1, sweeps, stored, solved, converged = uzawa.loop(
         method, law, chain, x, y, z, px, py, pz, k0 * h * h, reactions
     )

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, select
+from .._jit import by_type, by_type_outlined, scratch, select
 from ..contact import corner, implicit
 from ..gravity import displacement
 from ..status import Status
@@ -119,7 +119,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     if fixed_step.too_fast(method.longest, px, py, pz):
         return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
     px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
-    reactions = np.zeros((walls.length(chain), 4))
+    reactions = scratch((walls.length(chain), 4), np.float64)
     sx, sy, sz, solved = corner.hold(implicit.AtEnd(), method.law, None, chain, x, y, z, px, py, pz, k0, reactions)
     add_impulses(method.rule, h, method.law, chain, x, y, z, k0, reactions, impulse, lane)
     rx, ry, rz = corner.total(reactions)

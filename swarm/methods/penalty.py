@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import select
+from .._jit import scratch, select
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -149,7 +149,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     if fixed_step.too_fast(method.longest, px, py, pz):
         return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
-    reactions = np.zeros((walls.length(chain), 4))
+    reactions = scratch((walls.length(chain), 4), np.float64)
     x1, y1, z1, solved = corner.hold(method.form, method.law, None, chain, x, y, z, px, py, pz, k0, reactions)
     corner.add_impulses(reactions, h, impulse, lane)
     rx, ry, rz = corner.total(reactions)

@@ -35,15 +35,27 @@ def rise_time(c, b, a):
 @inlined
 def rise_time_by(c, b, a, discriminant):
     """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
+    time, bottom = _outer_root(c, b, a, discriminant)
+    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
+    return select(misses, math.inf, select(time > 0.0, time, 0.0))
+
+
+@inlined
+def rise_time_inside(c, b, a):
+    """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
+    time, bottom = _outer_root(c, b, a, b * b - a * c)
+    return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
+
+
+@inlined
+def _outer_root(c, b, a, discriminant):
+    """The root at which c + 2 b t + a t^2 rises, and its denominator."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
     root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
     approaching = b > 0.0
     # The form of the root that does not cancel: -c/(b + root) when b > 0, (root - b)/a when b <= 0.
-    top = select(approaching, -c, root - b)
     bottom = select(approaching, b + root, a)
-    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
-    time = top / bottom
-    return select(misses, math.inf, select(time > 0.0, time, 0.0))
+    return select(approaching, -c, root - b) / bottom, bottom
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from .._jit import inlined, select
 from ..checks import Vector, length, vector
 from . import base
-from .course import level_and_window, rise_time, rise_time_by
+from .course import level_and_window, rise_time_by, rise_time_inside
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -109,7 +109,7 @@ def _parabola(surface, dx, dy, dz, vx, vy, vz):
 def _(surface, x, y, z, vx, vy, vz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
     c, b, a = _parabola(surface, dx, dy, dz, vx, vy, vz)
-    return rise_time(surface.side * c, surface.side * b, surface.side * a), True
+    return rise_time_inside(c, b, a), True
 
 
 @base.first_hit.register(EllipsoidFromAfar)

@@ -265,7 +265,9 @@ def _for_arrays(function: Callable[..., Any], count: int) -> Callable[..., Any]:
     def in_kernels(parameters, x, y, z):
         return function(parameters, x, y, z)
 
-    overload(in_python, jit_options=_INLINE)(lambda parameters, x, y, z: in_kernels)
+    # What a user writes may make arrays.
+    options: Any = {**_INLINE, "_nrt": True}
+    overload(in_python, jit_options=options)(lambda parameters, x, y, z: in_kernels)
     return in_python
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from .._jit import select
 from ..checks import Vector, length
 from . import base
-from .course import ball_rise_time, level_and_window, rise_time
+from .course import ball_rise_time, level_and_window, rise_time_inside
 
 
 @dataclass(frozen=True, repr=False)
@@ -94,7 +94,7 @@ def _(surface, x, y, z, vx, vy, vz):
     c = dx * dx + dy * dy + dz * dz - surface.radius2
     b = dx * vx + dy * vy + dz * vz
     a = vx * vx + vy * vy + vz * vz
-    return rise_time(surface.side * c, surface.side * b, surface.side * a), True
+    return rise_time_inside(c, b, a), True
 
 
 @base.first_hit.register(SphereFromAfar)
