@@ -65,8 +65,8 @@ def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
     return seconds / count
 
 
-def impacts(n: int, repeats: int, bare: float) -> list[Row]:
-    """Nanoseconds per impact."""
+def impacts(n: int, repeats: int) -> list[Row]:
+    """Nanoseconds per impact, beside those of a bare loop in C and of one that does all that a lane of ours does."""
     cases = [
         ("Impact, sphere", SPHERE, swarm.Impact(), "4"),
         ("Impact, ellipsoid", ELLIPSOID, swarm.Impact(), "5"),
@@ -79,10 +79,23 @@ def impacts(n: int, repeats: int, bare: float) -> list[Row]:
         cases = cases[:1]
     measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
     figures = in_turn({what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()}, 3 * repeats)
-    return [
+    loops = {"bare loop in C, sphere": "impact", "loop in C with all of a lane, sphere": "lane"}
+    in_c = {what: yardstick.bare(one) + yardstick.bare(one) for what, one in loops.items()}
+    best = {what: min(values) for what, values in in_c.items() if values}
+    bare, lane = best.get(next(iter(loops))), best.get(list(loops)[1])
+    rows = [
+        Row(what, best[what], statistics.median(in_c[what]), "ns/impact", "", best[what] / bare)
+        for what in best if bare
+    ]  # fmt: skip
+    rows += [
         Row(what, *figures[what], "ns/impact", bar, figures[what][0] / bare if bare else None)
         for what, _scene, _method, bar in cases
     ]
+    if lane:
+        what = cases[0][0]
+        ratios = (figures[what][0] / lane, figures[what][1] / statistics.median(in_c[list(loops)[1]]))
+        rows.append(Row(f"  {what} over the loop in C with all of a lane", *ratios, "x", "1.3"))
+    return rows
 
 
 def multipliers(n: int, repeats: int) -> list[Row]:
@@ -331,16 +344,43 @@ except Seen:
 """
 
 
+# What no program that Numba compiles can do without: the imports, and one empty kernel out of the cache.
+_EMPTY_KERNEL = """
+import numba
+@numba.njit(cache=True)
+def kernel(x):
+    pass
+"""
+_BARE_START = """
+import time; start = time.perf_counter()
+import sys; sys.path.insert(0, r"{folder}")
+import h5py, numpy
+from empty_kernel import kernel
+kernel(numpy.zeros(1))
+print(time.perf_counter() - start)
+"""
+
+
 def start_up(repeats: int) -> list[Row]:
-    """Seconds from the start of Python's imports to the first computed frame of the main job, cold and warm."""
+    """Seconds from the start of Python's imports to the first computed frame of the main job, cold and warm.
+
+    Beside it what an empty kernel takes, of which Numba's import of SciPy is a part wherever SciPy is installed.
+    """
     with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "empty_kernel.py").write_text(_EMPTY_KERNEL)
+        bare = _BARE_START.format(folder=folder)
+        _child(bare, NUMBA_CACHE_DIR=folder)
         scene = ROOT / "examples" / "scenes" / "cavity.toml"
         code = _FIRST_FRAME.format(scene=scene, target=Path(folder) / "cavity.h5")
         cold = float(_child(code, NUMBA_CACHE_DIR=folder))
-        best, median = repeated(lambda: float(_child(code, NUMBA_CACHE_DIR=folder)), repeats)
+        starts = {"job": code, "bare": bare}
+        figures = in_turn(
+            {what: lambda one=one: float(_child(one, NUMBA_CACHE_DIR=folder)) for what, one in starts.items()}, repeats
+        )
     return [
         Row("first frame of the main job, first run", cold, cold, "s", "8"),
-        Row("first frame of the main job, later runs", best, median, "s", "0.8"),
+        Row("first frame of the main job, later runs", *figures["job"], "s", "0.8"),
+        Row("  imports of Numba and h5py, and an empty kernel out of the cache", *figures["bare"], "s"),
         Row("swarm run --help", *repeated(_help, repeats), "s", "0.3"),
     ]
 
@@ -373,9 +413,7 @@ def main(quick: bool) -> None:
     """Measure, print and, unless quick, write bench/results/bars-MACHINE.csv."""
     repeats = 2 if quick else 7
     n = 5_000 if quick else 100_000
-    bare = yardstick.bare("impact")
-    rows = [Row("bare loop in C, sphere", min(bare), statistics.median(bare), "ns/impact", "", 1.0)] if bare else []
-    rows += impacts(n, repeats, min(bare, default=0.0))
+    rows = impacts(n, repeats)
     rows += multipliers(n // 5, repeats)
     rows += two_threads(n, repeats)
     rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
@@ -385,7 +423,7 @@ def main(quick: bool) -> None:
     rows += output(20 if quick else 500, repeats)
     rows += recording(20 if quick else 500, repeats if quick else 3)
     rows += memory(100_000 if quick else 10_000_000)
-    rows += start_up(1 if quick else 3)
+    rows += start_up(1 if quick else 7)
     rows += accuracy(1e2 if quick else 1e5)
     show(rows)
     if not quick:

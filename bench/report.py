@@ -60,11 +60,12 @@ def show(rows: list[Row]) -> None:
     print(
         f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
     )
-    print(f"{'':<66}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
+    width = max((len(row.what) for row in rows), default=0) + 2
+    print(f"{'':<{width}}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
     for row in rows:
         ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
         best, median = (f"{one:.0f}" if one >= 1000.0 else f"{one:.3g}" for one in (row.best, row.median))
-        print(f"{row.what:<66}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
+        print(f"{row.what:<{width}}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
 
 
 def write(rows: list[Row], report: str) -> None:

@@ -5,6 +5,8 @@ import graphlib
 import importlib.util
 import math
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numba
@@ -219,6 +221,26 @@ def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert _jit.cache_folder().parent == tmp_path / "xdg" / "swarm"
+
+
+# --- The start -------------------------------------------------------------------------------------------
+
+
+@compiled_only
+def test_no_kernel_waits_for_scipy():
+    """Numba imports it before its first kernel, for products of matrices; a kernel that has them finds it still."""
+    code = """
+import sys, numba, numpy as np
+from swarm import observables
+assert "scipy.linalg" not in sys.modules
+numba.njit(lambda x: x + 1.0)(1.0)
+assert "scipy.linalg" not in sys.modules
+a = np.array([[1.0, 2.0], [3.0, 4.0]])
+product = numba.njit(lambda a: np.dot(a, a))
+assert (product(a) == a @ a).all()
+assert "scipy.linalg" in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 # --- Who may import whom ---------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
 from . import colours, series, viewer
+from .rows import rows
 from .shapes import shapes_of
 from .trajectory import Trajectory
 from .writer import WriteFrames, Written, check_target
@@ -170,14 +171,14 @@ class RecordingWriter:
             return
         numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
         n = len(self._some)
-        points, colour = np.empty((len(chosen), n, 3), np.float32), np.empty((len(chosen), n), np.uint32)
+        shown, colour = [], np.empty((len(chosen), n), np.uint32)
         for k, (number, moment, state, seen) in enumerate(chosen):
             position, velocity = state.position[:, self._drawn], state.velocity[:, self._drawn]
-            points[k] = position.T
+            shown.append(position)
             colour[k] = self._scale.colours(self._values(position, velocity))
             self._rows.append((number, moment, series.row_of(self._series, moment, seen, self._before)))
             self._before = moment, seen
-        columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
+        columns = rr.Points3D.columns(positions=rows(shown, np.float32).reshape(-1, 3), colors=colour.ravel())
         try:
             self._send("/scene/particles", numbers, times, columns.partition([n] * len(chosen)))
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))

@@ -22,6 +22,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import superblock
+from .rows import rows
 from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
@@ -134,11 +135,11 @@ class TrajectoryWriter:
         everything["id"] = np.arange(self._count)[self._storage.kept()]
         options = _PACKED[self._storage.compression]
         # A compressed chunk is written once: one that grows would move, and a kill would find it nowhere.
-        rows = 1 if options else _CHUNK[0]
+        deep = 1 if options else _CHUNK[0]
         options = {**options, "rdcc_nbytes": self._cache()}
         for name in PARTS:
             self._values[name] = self._element(
-                f"particles/all/{name}", (n, 3), self._storage.precision, (rows, min(n, _CHUNK[1]), 3), **options,
+                f"particles/all/{name}", (n, 3), self._storage.precision, (deep, min(n, _CHUNK[1]), 3), **options,
             )  # fmt: skip
 
     def _open(self) -> None:
@@ -182,11 +183,8 @@ class TrajectoryWriter:
                     )
                 self._begin()
             for name, dataset in self._values.items():
-                rows = np.empty((len(frames), *dataset.shape[1:]), dataset.dtype)
-                np.stack(
-                    [getattr(state, name).T for _number, _moment, state, _seen in frames], out=rows, casting="same_kind"
-                )
-                _put(dataset, first, rows)
+                parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
+                _put(dataset, first, rows(parts, dataset.dtype))
             for name, dataset in self._observables.items():
                 _put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
             self._file.flush()
