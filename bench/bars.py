@@ -415,7 +415,7 @@ def main(quick: bool) -> None:
     n = 5_000 if quick else 100_000
     rows = impacts(n, repeats)
     rows += multipliers(n // 5, repeats)
-    rows += two_threads(n, repeats)
+    rows += two_threads(n, 3 * repeats)
     rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
     rows += overhead(1_000, 50 if quick else 1_000, repeats)
     rows += overhead(10_000, 50 if quick else 1_000, repeats)

@@ -4,6 +4,7 @@ import ast
 import graphlib
 import importlib.util
 import math
+import os
 import shutil
 import subprocess
 import sys
@@ -172,6 +173,45 @@ def test_select(first):
     assert (
         compiled(select_all)(np.float64(first), np.float64(2.0)) == expected if not numba.config.DISABLE_JIT else True
     )
+
+
+# --- What kernels are made of ----------------------------------------------------------------------------
+
+
+@_jit.outlined
+def used_up(i):
+    numbers, flags = _jit.scratch((2, 3), np.float64), _jit.scratch(5, np.bool_)
+    clean = numbers.shape == (2, 3) and flags.size == 5 and numbers.sum() == 0.0 and not flags.any()
+    numbers[1, 2], flags[4] = i, True
+    return clean and numbers[1].sum() == i and not flags[:4].any()
+
+
+def used_up_often(rounds):
+    clean = True
+    for i in range(rounds):
+        clean = clean and used_up(i)
+    return clean
+
+
+def test_scratch_is_zero_each_time():
+    """Far more of it than a stack holds, if it were not given back."""
+    assert used_up_often(10)
+    assert compiled(used_up_often)(1_000_000 if not numba.config.DISABLE_JIT else 10)
+
+
+@compiled_only
+def test_kernels_count_no_references_and_are_vectors(tmp_path):
+    """The compiled text of a sphere's kernel: no call that counts, and the square root of a hit for several lanes."""
+    code = """
+import re, swarm
+from swarm import blocks
+scene = swarm.Scene([swarm.Sphere(0.5)])
+swarm.simulate(scene, swarm.fill(scene, 9, speed=1.0, seed=1), swarm.Impact(), until=1.0, threads=1)
+(kernel,) = (blocks.advance_block.inspect_llvm(signature) for signature in blocks.advance_block.signatures)
+assert not re.search(r"call[^\\n]*NRT_", kernel)
+assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
 
 
 # --- The cache -------------------------------------------------------------------------------------------
