@@ -78,23 +78,23 @@ def impacts(n: int, repeats: int) -> list[Row]:
     if n < 10_000:  # a quick run: every scene compiles kernels of its own
         cases = cases[:1]
     measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
-    figures = in_turn({what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()}, 3 * repeats)
-    loops = {"bare loop in C, sphere": "impact", "loop in C with all of a lane, sphere": "lane"}
-    in_c = {what: yardstick.bare(one) + yardstick.bare(one) for what, one in loops.items()}
-    best = {what: min(values) for what, values in in_c.items() if values}
-    bare, lane = best.get(next(iter(loops))), best.get(list(loops)[1])
-    rows = [
-        Row(what, best[what], statistics.median(in_c[what]), "ns/impact", "", best[what] / bare)
-        for what in best if bare
-    ]  # fmt: skip
-    rows += [
-        Row(what, *figures[what], "ns/impact", bar, figures[what][0] / bare if bare else None)
-        for what, _scene, _method, bar in cases
-    ]
-    if lane:
-        what = cases[0][0]
-        ratios = (figures[what][0] / lane, figures[what][1] / statistics.median(in_c[list(loops)[1]]))
-        rows.append(Row(f"  {what} over the loop in C with all of a lane", *ratios, "x", "1.3"))
+    turns: dict[str, Callable[[], float]] = {
+        what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()
+    }
+    bare, lane = "bare loop in C, sphere", "loop in C with all of a lane, sphere"
+    in_c = yardstick.bare("impact") != []
+    if in_c:
+        turns |= {bare: lambda: min(yardstick.bare("impact")), lane: lambda: min(yardstick.bare("lane"))}
+    figures = in_turn(turns, 3 * repeats)
+
+    def over(what: str, other: str) -> list[float]:
+        return [one / two for one, two in zip(figures[what], figures[other], strict=True)]
+
+    rows = [Row(what, *figures[what], "ns/impact", "", over(what, bare)[0]) for what in (bare, lane) if in_c]
+    for what, _scene, _method, bar in cases:
+        rows.append(Row(what, *figures[what], "ns/impact", bar, over(what, bare)[0] if in_c else None))
+    if in_c:
+        rows.append(Row("  Impact, sphere, over all of a lane in C", *over("Impact, sphere", lane), "x", "1.3"))
     return rows
 
 
