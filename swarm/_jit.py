@@ -19,6 +19,7 @@ import numba
 import numpy as np
 from numba import types
 from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
 from numba.np import linalg as blas
 from numba.np.arrayobj import populate_array
@@ -189,7 +190,7 @@ def spaced(stride: int) -> Callable[[Any], Any]:
                 table.shape = cgutils.pack_array(builder, [builder.extract_value(table.shape, 0), columns])
                 table.strides = cgutils.pack_array(builder, [builder.mul(columns, item), item])
                 tables = builder.insert_value(tables, table._getvalue(), k)
-        return tables
+        return impl_ret_borrowed(context, builder, signature.return_type, tables)
 
     return known
 
