@@ -116,8 +116,8 @@ static const struct {
     void (*pass)(void);
     double items;
 } yardsticks[] = {
-    {"impact", impact, LANES}, {"lane", lane, LANES}, {"verlet", verlet, LANES}, {"divide", divide, LANES}, {"root", root, LANES},
-    {"copy", copy, COPIED},
+    {"impact", impact, LANES}, {"lane", lane, LANES},   {"verlet", verlet, LANES},
+    {"divide", divide, LANES}, {"root", root, LANES},   {"copy", copy, COPIED},
 };
 
 int main(int argc, char **argv)

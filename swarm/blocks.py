@@ -189,9 +189,7 @@ def _(unknown, method, chain, gravity, multipliers, lanes, live):
     rows, surface, kappa, unsolved, turned = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved, lanes.turned
     for i in range(live):
         x, y, z, vx, vy, vz, left, surface[i] = _flight(method, chain, gravity, lanes, i)
-        rows[X, i], rows[Y, i], rows[Z, i] = x, y, z
-        rows[VX, i], rows[VY, i], rows[VZ, i] = vx, vy, vz
-        rows[LEFT, i] = left
+        _put(lanes, i, x, y, z, vx, vy, vz, left)
     solve(unknown, method, chain, gravity, multipliers, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if methods.turns(method):
@@ -235,19 +233,31 @@ def _flight(method, chain, gravity, lanes, i):
 @inlined
 def _end(method, chain, lanes, i, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
-    rows = lanes.rows
     x, y, z, vx, vy, vz, left, wall, given, hits, energy = contact
+    _put(lanes, i, x, y, z, vx, vy, vz, left)
+    _count(method, lanes, i, left, hits, energy)
+    lanes.surface[i] = wall
+    _add_impulse(chain.rest, chain, lanes.impulse, i, wall, given)
+    return not (left > 0.0), wall <= methods.HARD
+
+
+@inlined
+def _put(lanes, i, x, y, z, vx, vy, vz, left):
+    """Where a lane is now, and how much of its frame is left."""
+    rows = lanes.rows
     rows[X, i], rows[Y, i], rows[Z, i] = x, y, z
     rows[VX, i], rows[VY, i], rows[VZ, i] = vx, vy, vz
     rows[LEFT, i] = left
+
+
+@inlined
+def _count(method, lanes, i, left, hits, energy):
+    """What a contact counts, whether the lane has arrived, and the energy where contacts may lose some."""
+    rows = lanes.rows
     rows[HITS, i] += hits
     if methods.dissipates(method):
         rows[K0, i] = energy
-    lanes.surface[i] = wall
-    _add_impulse(chain.rest, chain, lanes.impulse, i, wall, given)
-    arrived = not (left > 0.0)
-    lanes.arrived[i] = arrived
-    return arrived, wall <= methods.HARD
+    lanes.arrived[i] = not (left > 0.0)
 
 
 @by_type
@@ -305,13 +315,8 @@ def _(hard, method, chain, gravity, lanes, live):
                 rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], methods.HARD - surface[i],
                 lanes.impulse, lanes.record, i,
             )  # fmt: skip
-            rows[X, i], rows[Y, i], rows[Z, i] = x, y, z
-            rows[VX, i], rows[VY, i], rows[VZ, i] = vx, vy, vz
-            rows[LEFT, i] = left
-            rows[HITS, i] += hits
-            if methods.dissipates(method):
-                rows[K0, i] = energy
-            lanes.arrived[i] = not (left > 0.0)
+            _put(lanes, i, x, y, z, vx, vy, vz, left)
+            _count(method, lanes, i, left, hits, energy)
             if rows[HITS, i] > hard.most_hits:
                 status = Status.STALLED.value
             if status > worst:

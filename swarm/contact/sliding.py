@@ -9,12 +9,13 @@ import math
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, inlined, outlined, scratch, select
+from .._jit import by_type, by_type_outlined, outlined, scratch
 from ..gravity import accelerated
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from ..surfaces import flights
 from . import reflection
+from .projection import ALLOWED, along, project
 
 _EPSILON = 2.220446049250313e-16
 # A second wall nearer than this part of the shortest flight is met in the same instant.
@@ -25,8 +26,6 @@ _BLOWS = 64
 _SWEEPS = 60
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
-# Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
-_ALLOWED = 64.0 * _EPSILON
 
 
 @outlined
@@ -224,102 +223,6 @@ def _normal(chain, i, x, y, z, ox, oy, oz, normal):
 
 
 @outlined
-def project(touched, normal, held, wx, wy, wz):
-    """The nearest vector u to w with n.u <= 0 for the touched walls; w - u = sum of held n, held >= 0.
-
-    At most three walls carry: one, then an edge of two, then a corner.
-    """
-    count = touched.size
-    held[:] = 0.0
-    near = _ALLOWED * math.sqrt(wx * wx + wy * wy + wz * wz)
-    if _allowed(touched, normal, wx, wy, wz, near):
-        return wx, wy, wz
-    for i in range(count):
-        b = _along(normal, i, wx, wy, wz)
-        if touched[i] and b > 0.0:
-            ux, uy, uz = wx - b * normal[i, 0], wy - b * normal[i, 1], wz - b * normal[i, 2]
-            if _allowed(touched, normal, ux, uy, uz, near):
-                held[i] = b
-                return ux, uy, uz
-    for i in range(count):
-        for j in range(i):
-            if touched[i] and touched[j]:
-                ux, uy, uz, p, q = _on_edge(normal, i, j, wx, wy, wz)
-                if p >= 0.0 and q >= 0.0 and _allowed(touched, normal, ux, uy, uz, near):
-                    held[i], held[j] = p, q
-                    return ux, uy, uz
-    _carried(touched, normal, held, wx, wy, wz)
-    return 0.0, 0.0, 0.0
-
-
-@inlined
-def _along(normal, i, x, y, z):
-    return normal[i, 0] * x + normal[i, 1] * y + normal[i, 2] * z
-
-
-@outlined
-def _allowed(touched, normal, x, y, z, near):
-    highest = 0.0
-    for i in range(touched.size):
-        if touched[i]:
-            highest = max(highest, _along(normal, i, x, y, z))
-    return highest <= near
-
-
-@outlined
-def _on_edge(normal, i, j, wx, wy, wz):
-    """w along the edge of two walls, and what each takes; -1 where they have no edge."""
-    ex, ey, ez, mx, my, mz, c, sine = _edge(normal, i, j)
-    if sine == 0.0:
-        return 0.0, 0.0, 0.0, -1.0, -1.0
-    f = wx * ex + wy * ey + wz * ez
-    q = (wx * mx + wy * my + wz * mz) / sine
-    return f * ex, f * ey, f * ez, _along(normal, i, wx, wy, wz) - c * q, q
-
-
-@outlined
-def _edge(normal, i, j):
-    """Of two walls: e along their edge, m = e x n_i, and n_j = c n_i + sine m; the sine is 0 where they have no edge.
-
-    e is orthogonal to n_i and to n_j -+ n_i to round-off, so to both normals also where they are all but opposite, as
-    in a cusp: n_i x n_j alone would lean out of it by the round-off over the sine.
-    """
-    ax, ay, az = normal[i]
-    c = _along(normal, j, ax, ay, az)
-    s = select(c < 0.0, -1.0, 1.0)
-    dx, dy, dz = normal[j, 0] - s * ax, normal[j, 1] - s * ay, normal[j, 2] - s * az
-    ex, ey, ez = ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx
-    length = math.sqrt(ex * ex + ey * ey + ez * ez)
-    if length == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, c, 0.0
-    ex, ey, ez = ex / length, ey / length, ez / length
-    mx, my, mz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-    return ex, ey, ez, mx, my, mz, c, mx * dx + my * dy + mz * dz
-
-
-@outlined
-def _carried(touched, normal, held, wx, wy, wz):
-    """What each wall of a corner takes of w: the first three that carry it."""
-    count = touched.size
-    for i in range(count):
-        for j in range(i):
-            for k in range(j):
-                if touched[i] and touched[j] and touched[k]:
-                    ex, ey, ez, _mx, _my, _mz, _c, _sine = _edge(normal, i, j)
-                    steepness = _along(normal, k, ex, ey, ez)
-                    if steepness == 0.0:
-                        continue
-                    # The edge of two takes nothing along itself: that part is the third wall's.
-                    r = (wx * ex + wy * ey + wz * ez) / steepness
-                    _ux, _uy, _uz, p, q = _on_edge(
-                        normal, i, j, wx - r * normal[k, 0], wy - r * normal[k, 1], wz - r * normal[k, 2]
-                    )
-                    if p >= 0.0 and q >= 0.0 and r >= 0.0:
-                        held[i], held[j], held[k] = p, q, r
-                        return
-
-
-@outlined
 def _goes_straight(chain, gravity, touched, normal, held, x, y, z, vx, vy, vz):
     """Whether the step may have any length: rest, or uniform motion along flat walls that gravity presses against."""
     gx, gy, gz = accelerated(gravity, 0.0, 0.0, 0.0, 1.0)
@@ -327,7 +230,7 @@ def _goes_straight(chain, gravity, touched, normal, held, x, y, z, vx, vy, vz):
         if touched[i]:
             _normal(chain, i, x, y, z, x, y, z, normal)
     px, py, pz = project(touched, normal, held, gx, gy, gz)
-    if (px != 0.0 or py != 0.0 or pz != 0.0) and max(abs(px), abs(py), abs(pz)) > _ALLOWED * max(
+    if (px != 0.0 or py != 0.0 or pz != 0.0) and max(abs(px), abs(py), abs(pz)) > ALLOWED * max(
         abs(gx), abs(gy), abs(gz)
     ):
         return False
@@ -335,7 +238,7 @@ def _goes_straight(chain, gravity, touched, normal, held, x, y, z, vx, vy, vz):
         return False
     speed = max(abs(vx), abs(vy), abs(vz))
     for i in range(touched.size):
-        if touched[i] and abs(_along(normal, i, vx, vy, vz)) > _ALLOWED * speed:
+        if touched[i] and abs(along(normal, i, vx, vy, vz)) > ALLOWED * speed:
             return False
     return speed == 0.0 or _flat(chain, touched, 0)
 

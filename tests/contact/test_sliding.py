@@ -7,7 +7,7 @@ import pytest
 from conftest import EPSILON, SURFACES, wall_point
 
 import swarm
-from swarm.contact import sliding
+from swarm.contact import projection, sliding
 from swarm.surfaces import chain as walls
 
 # Normals: in any direction, in nearly the same one, or nearly in one of two opposite ones, as in a cusp.
@@ -32,7 +32,7 @@ def projected(normals, w):
     """u, and what each wall takes."""
     held = np.zeros(len(normals))
     touched = np.ones(len(normals), bool)
-    return np.array(sliding.project(touched, normals.copy(), held, *map(float, w))), held
+    return np.array(projection.project(touched, normals.copy(), held, *map(float, w))), held
 
 
 def nearest(normals, w):
