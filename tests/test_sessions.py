@@ -332,7 +332,7 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
 def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
     """A run without frames in between tells how far it is all the same."""
     monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: False)
-    monkeypatch.setattr(progress, "_A_MINUTE", 0.05)
+    monkeypatch.setattr(progress, "_A_MINUTE", 0.002)
     start = swarm.fill(SPHERE, 300, speed=1.0, seed=1)
     whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1)
     told = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1, progress=True)
@@ -345,7 +345,7 @@ def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
 
 @pytest.mark.physics
 def test_the_example_is_stopped_twice_and_conserves(tmp_path):
-    told = long_run.main(particles=200, impacts=3e5, limit=0.15, folder=tmp_path)
+    told = long_run.main(particles=200, impacts=3e5, limit=0.05, folder=tmp_path)
     assert told["sessions"] == ["walltime", "walltime", "complete"]
     assert told["frames"] == long_run.FRAMES + 1
     assert told["impacts"] == pytest.approx(200 * 3e5, rel=0.1)
