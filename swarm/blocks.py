@@ -7,7 +7,7 @@ depend on which lane or block a particle is in.
 
 from typing import NamedTuple
 
-from ._jit import by_type, by_type_outlined, inlined, kept, kernel, select
+from ._jit import by_type, by_type_outlined, inlined, kernel, select
 from .gravity import Gravity, Nothing
 from .inner_solve import solve
 from .lanes import (
@@ -71,7 +71,7 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
         if halt[0] != 0:
             leave(lanes, live)
             return Status.INTERRUPTED.value, live, drawn
-        some_arrived, some_hard = _pass(methods.unknown(method), method, chain, gravity, state.multipliers, lanes, live)
+        some_arrived, some_hard = _pass(method, chain, gravity, state.multipliers, lanes, live)
         if some_hard:
             status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
@@ -81,7 +81,7 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
         if not (some_arrived or some_hard):
             continue
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
-        for k in range(_arrivals(lanes, live) - 1, -1, -1):
+        for k in range(_marked(lanes, live) - 1, -1, -1):
             lane = lanes.order[k]
             retire(method, chain, lanes, lane, state)
             done[lanes.particle[lane]] = True
@@ -96,13 +96,13 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
 
 
 @inlined
-def _arrivals(lanes, live):
-    """How many lanes reached the end of the frame; which, is in `order`.
+def _marked(lanes, live):
+    """How many lanes are marked; which, is in `order`.
 
-    Without a branch: in what order lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes
-    one by one were an eighth of the time of a frame with 75 impacts.
+    Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
+    one were an eighth of the time of a frame with 75 impacts.
     """
-    arrived, order, some, count = lanes.arrived, lanes.order, lanes.some, 0
+    marked, order, some, count = lanes.marked, lanes.order, lanes.some, 0
     eights = 0
     for k in range((live + EIGHT - 1) // EIGHT):
         some[eights] = k
@@ -111,86 +111,16 @@ def _arrivals(lanes, live):
         first = EIGHT * some[k]
         for lane in range(first, min(first + EIGHT, live)):
             order[count] = lane
-            count += arrived[lane]
+            count += marked[lane]
     return count
 
 
-@by_type
-def _seek(gravity, chain, lanes, live):
-    """The first hit of every lane.
-
-    Root and division wait for one another, and the shorter a loop is the more lanes a processor has under way. Measured
-    in a sphere, nanoseconds an impact: flight and contact in one loop 7.2, a loop for each 5.4, the first hit before
-    them in its own 5.2; the safe steps of a fall in one loop 110, a loop for each 35.
-    """
-
-
-@_seek.register(Nothing)
-def _(gravity, chain, lanes, live):
-    rows, time, wall = lanes.rows, lanes.time, lanes.surface
-    for i in range(live):
-        time[i], wall[i] = flights.first_hit(
-            chain, gravity, rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i]
-        )
-
-
-@_seek.register(Gravity)
-def _(gravity, chain, lanes, live):
-    rows, course, time, wall = lanes.rows, lanes.course, lanes.time, lanes.surface
-    for i in range(live):
-        flights.begin_fall(
-            chain, course, 0, i,
-            rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-            gravity.x, gravity.y, gravity.z,
-        )  # fmt: skip
-    for _step in range(SAFE_STEPS):
-        for i in range(live):
-            flights.step_fall(chain, course, 0, i)
-    # The few that need more, one by one: a flight in two parts would look like a short one.
-    for i in range(live):
-        time[i], wall[i] = flights.end_fall(chain, course, 0, i)
-        for _step in range(MORE_STEPS):
-            if wall[i] >= 0.0 or time[i] >= rows[LEFT, i]:
-                break
-            flights.step_fall(chain, course, 0, i)
-            time[i], wall[i] = flights.end_fall(chain, course, 0, i)
-
-
-@by_type
-def _pass(unknown, method, chain, gravity, multipliers, lanes, live):
+@inlined
+def _pass(method, chain, gravity, multipliers, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-
-
-@_pass.register(Nothing)
-def _(unknown, method, chain, gravity, multipliers, lanes, live):
-    # Nothing to solve for between flight and contact: in one loop, where a processor writes half as much. (Nanoseconds
-    # an impact of an ellipsoid: 4.3 instead of 5.1. With the first hit in it too: 7.2 in a sphere, see `_seek`.)
-    if methods.seeks(method):
-        _seek(gravity, chain, lanes, live)
-    rows = lanes.rows
-    some_arrived, some_hard = False, False
-    for i in range(live):
-        x, y, z, vx, vy, vz, left, wall = _flight(method, chain, gravity, lanes, i)
-        arrived, hard = _end(
-            method, chain, lanes, i,
-            methods.contact(
-                method, chain, gravity, x, y, z, vx, vy, vz, left, rows[K0, i], rows[K1, i], rows[K2, i], wall,
-                0.0, False, 0.0, 0.0, 0.0, 0.0,
-            ),
-        )  # fmt: skip
-        some_arrived, some_hard = some_arrived | arrived, some_hard | hard
-    return some_arrived, some_hard
-
-
-@_pass.register(object)
-def _(unknown, method, chain, gravity, multipliers, lanes, live):
-    if methods.seeks(method):
-        _seek(gravity, chain, lanes, live)
+    _fly(gravity, method, chain, lanes, live)
     rows, surface, kappa, unsolved, turned = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved, lanes.turned
-    for i in range(live):
-        x, y, z, vx, vy, vz, left, surface[i] = _flight(method, chain, gravity, lanes, i)
-        _put(lanes, i, x, y, z, vx, vy, vz, left)
-    solve(unknown, method, chain, gravity, multipliers, lanes, live)
+    solve(methods.unknown(method), method, chain, gravity, multipliers, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if methods.turns(method):
         for i in range(live):
@@ -217,17 +147,82 @@ def _(unknown, method, chain, gravity, multipliers, lanes, live):
     return some_arrived, some_hard
 
 
-@inlined
-def _flight(method, chain, gravity, lanes, i):
-    """A lane to its next contact, or to the end of the frame."""
-    rows, time, wall = lanes.rows, 0.0, 0.0
+@by_type
+def _fly(gravity, method, chain, lanes, live):
+    """Every lane to its next contact, or to the end of the frame.
+
+    A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
+    an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
+    and contact in one loop 3.0, first hit and flight 2.8 (an ellipsoid 4.4, 3.9). The safe steps of a fall in one loop
+    110, a loop for each 35.
+    """
+
+
+@_fly.register(Nothing)
+def _(gravity, method, chain, lanes, live):
+    rows = lanes.rows
+    for i in range(live):
+        time, wall = 0.0, 0.0
+        if methods.seeks(method):
+            time, wall = flights.first_hit(
+                chain, methods.steady(method, rows[K0, i], rows[K1, i]),
+                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
+            )  # fmt: skip
+        _flight(method, chain, gravity, lanes, i, time, wall)
+
+
+@_fly.register(Gravity)
+def _(gravity, method, chain, lanes, live):
     if methods.seeks(method):
-        time, wall = lanes.time[i], kept(lanes.surface[i])
-    return methods.flight(
+        _fall(chain, gravity, lanes, live)
+    for i in range(live):
+        time, wall = 0.0, 0.0
+        if methods.seeks(method):
+            time, wall = flights.end_fall(chain, lanes.course, 0, i)
+        _flight(method, chain, gravity, lanes, i, time, wall)
+
+
+@inlined
+def _fall(chain, gravity, lanes, live):
+    """The course of every lane to its first hit, by safe steps."""
+    rows, course, marked = lanes.rows, lanes.course, lanes.marked
+    for i in range(live):
+        flights.begin_fall(
+            chain, course, 0, i,
+            rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
+            gravity.x, gravity.y, gravity.z,
+        )  # fmt: skip
+    for _step in range(SAFE_STEPS):
+        for i in range(live):
+            flights.step_fall(chain, course, 0, i)
+    # The few that need more, one by one: a flight in two parts would look like a short one.
+    for i in range(live):
+        marked[i] = _needs_more(chain, lanes, i)
+    for k in range(_marked(lanes, live)):
+        lane = lanes.order[k]
+        for _step in range(MORE_STEPS):
+            flights.step_fall(chain, course, 0, lane)
+            if not _needs_more(chain, lanes, lane):
+                break
+
+
+@inlined
+def _needs_more(chain, lanes, i):
+    """Whether more safe steps may find a hit in this frame."""
+    time, wall = flights.end_fall(chain, lanes.course, 0, i)
+    return (wall < 0.0) & (time < lanes.rows[LEFT, i])
+
+
+@inlined
+def _flight(method, chain, gravity, lanes, i, time, wall):
+    """A lane to its next contact, `time` from here at `wall` if the method seeks it, or to the end of the frame."""
+    rows = lanes.rows
+    x, y, z, vx, vy, vz, left, lanes.surface[i] = methods.flight(
         method, chain, gravity,
         rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
         rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], time, wall, rows[HITS, i],
     )  # fmt: skip
+    _put(lanes, i, x, y, z, vx, vy, vz, left)
 
 
 @inlined
@@ -257,7 +252,7 @@ def _count(method, lanes, i, left, hits, energy):
     rows[HITS, i] += hits
     if methods.dissipates(method):
         rows[K0, i] = energy
-    lanes.arrived[i] = not (left > 0.0)
+    lanes.marked[i] = not (left > 0.0)
 
 
 @by_type

@@ -34,13 +34,12 @@ class Lanes(NamedTuple):
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
     course: Array  # (walls COURSE, stride) the safe steps of a fall
-    time: Array  # when the flight meets `surface`
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
-    arrived: Array  # bool, whether it has reached the end of the frame
-    eights: Array  # int64, `arrived` of eight lanes in one number: the same memory
-    some: Array  # int64, those `eights` of which one has arrived
-    order: Array  # int64, the lanes that have arrived
+    marked: Array  # bool, what one loop says to the next: of a fall that it needs more steps, then that it has arrived
+    eights: Array  # int64, `marked` of eight lanes in one number: the same memory
+    some: Array  # int64, those `eights` of which one is marked
+    order: Array  # int64, the lanes that are marked
     left_behind: Array  # (ROWS + walls, stride) what the lanes hold when a halt ends the block
 
 
@@ -79,10 +78,9 @@ def empty(walls: int) -> Lanes:
         sweeping=np.zeros(_STRIDE, np.bool_),
         record=_table(RECORDS),
         course=_table(walls * flights.COURSE),
-        time=_table(1)[0],
         turned=_table(4),
         particle=np.zeros(_STRIDE, np.int64),
-        arrived=eights.view(np.bool_),
+        marked=eights.view(np.bool_),
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(_STRIDE, np.int64),

@@ -181,6 +181,12 @@ def first_hit(surface, x, y, z, vx, vy, vz):
 
 
 @by_type
+def steady_hit(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
+    """`first_hit` where |v|^2 and 1/|v|^2 are known; at rest, where the second is infinite, inf or nan."""
+    return first_hit(surface, x, y, z, vx, vy, vz)
+
+
+@by_type
 def course(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     """The level along the parabola r + v t + G t^2/2 of a quadric: c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4.
 
@@ -197,9 +203,15 @@ def is_quartic(surface):
 
 
 @by_type
+def may_be_far(surface):
+    """Whether its `course` may be one from afar: a constant for the compiler."""
+    return True
+
+
+@by_type
 def falling_hit(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     """`first_hit` for the parabola r + v t + G t^2/2."""
-    return first_rise(*course(surface, x, y, z, vx, vy, vz, gx, gy, gz))
+    return first_rise(may_be_far(surface), *course(surface, x, y, z, vx, vy, vz, gx, gy, gz))
 
 
 @by_type

@@ -11,7 +11,7 @@ import numpy as np
 from .._jit import inlined, select
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
-SAFE_STEPS = 4
+SAFE_STEPS = 5
 MORE_STEPS = 16
 # A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
 _CLOSE = 1e-16
@@ -45,6 +45,19 @@ def rise_time_inside(c, b, a):
     """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
     time, bottom = _outer_root(c, b, a, b * b - a * c)
     return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
+
+
+@inlined
+def rise_time_steady(c, b, a, over_a):
+    """`rise_time_inside` where 1/a is known; no number where that is infinite, for a particle at rest.
+
+    Where b > 0, in a flight that does not begin at this wall, root - b cancels. It knows the wall to round-off of the
+    cavity's size all the same, and -c/(b + root) no better, c being a difference of squares. It saves the division.
+    """
+    discriminant = b * b - a * c
+    time = (math.sqrt(select(discriminant > 0.0, discriminant, 0.0)) - b) * over_a
+    # In this order what is no number remains so, and no comparison takes it for a hit.
+    return select(time < 0.0, 0.0, time)
 
 
 @inlined
@@ -118,28 +131,43 @@ def leave(c, b, a2, a3, a4, window):
 
 
 @inlined
-def safe_step(c, b, a2, a3, a4, window, t, last):
+def close(window):
+    """What reach step^2 is at most in a step that leaves nothing."""
+    window = abs(window)
+    return _CLOSE * window * window * window
+
+
+@inlined
+def safe_step(may_be_far, c, b, a2, a3, a4, window, nearly, t, last):
     """One step towards the first rise of the level c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 through 0: (t, its length).
 
     It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
     double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
     and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on, or
-    next to it with a negative window, that is from afar: no hit, but a place to begin again from.
+    next to it with a negative window, that is from afar: no hit, but a place to begin again from. `nearly` is what
+    `close` says of the window.
     """
-    there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
+    there = 0.0
+    if may_be_far:
+        there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
     reach = select(2.0 * last < window, 2.0 * last, window)
-    # The Taylor coefficients at t
-    ct = c + t * (2.0 * b + t * (a2 + t * (a3 + t * a4)))
-    bt = b + t * (a2 + t * (1.5 * a3 + t * 2.0 * a4))
-    a2t = a2 + t * (3.0 * a3 + t * 6.0 * a4)
-    a3t = a3 + t * 4.0 * a4
+    # The Taylor coefficients at t, by Horner's scheme of what Horner's scheme leaves
+    a3t = a3 + t * a4
+    a2t = a2 + t * a3t
+    twice_bt = 2.0 * b + t * a2t
+    ct = c + t * twice_bt
+    a3t = a3t + t * a4
+    a2t = a2t + t * a3t
+    bt = 0.5 * (twice_bt + t * a2t)
+    a3t = a3t + t * a4
+    a2t = a2t + t * a3t
+    a3t = a3t + t * a4
     slope = _steepest(a3t, a4, reach)
     time = rise_time(ct, bt, a2t + _rise_by(slope, reach))
     step = select(time < reach, time, reach)
     # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
     at_root = time <= reach
-    close = reach * step * step <= _CLOSE * window * window * window
-    return t + step, select(at_root & close, there, step)
+    return t + step, select(at_root & (reach * step * step <= nearly), there, step)
 
 
 @inlined
@@ -149,11 +177,11 @@ def arrived(last):
 
 
 @inlined
-def first_rise(c, b, a2, a3, a4, window):
+def first_rise(may_be_far, c, b, a2, a3, a4, window):
     """`first_hit` for that level, by safe steps."""
     t, last = leave(c, b, a2, a3, a4, window)
     for _step in range(SAFE_STEPS + MORE_STEPS):
-        t, last = safe_step(c, b, a2, a3, a4, window, t, last)
+        t, last = safe_step(may_be_far, c, b, a2, a3, a4, window, close(window), t, last)
         if arrived(last):
             break
     return t, arrived(last)

@@ -143,6 +143,16 @@ def _(surface):
     return True
 
 
+@base.may_be_far.register(EllipsoidNumbers)
+def _(surface):
+    return False
+
+
+@base.may_be_far.register(EllipsoidFromAfar)
+def _(surface):
+    return True
+
+
 # --- Contact ---------------------------------------------------------------------------------------------
 
 

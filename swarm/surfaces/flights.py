@@ -1,12 +1,20 @@
 """When a free flight meets the walls of a scene: the hits and free times of one surface, folded over the chain."""
 
 import math
+from typing import NamedTuple
 
 from .._jit import by_type, select
 from ..gravity import Gravity, Nothing
 from . import base
 from .chain import Chain, outside
-from .course import arrived, leave, safe_step
+from .course import arrived, close, leave, safe_step
+
+
+class Steady(NamedTuple):
+    """In the place of gravity: there is none, and of the particle is known what no force changes."""
+
+    speed2: float
+    over_speed2: float  # infinite for a particle at rest
 
 
 @by_type
@@ -18,6 +26,11 @@ def hit(gravity, surface, x, y, z, vx, vy, vz):
 @hit.register(Nothing)
 def _(gravity, surface, x, y, z, vx, vy, vz):
     return base.first_hit(surface, x, y, z, vx, vy, vz)
+
+
+@hit.register(Steady)
+def _(gravity, surface, x, y, z, vx, vy, vz):
+    return base.steady_hit(surface, x, y, z, vx, vy, vz, gravity.speed2, gravity.over_speed2)
 
 
 @hit.register(Gravity)
@@ -49,7 +62,7 @@ def _(chain, gravity, x, y, z, vx, vy, vz):
 
 
 # A falling flight in lanes: what the safe steps of each wall know, in this many rows a wall.
-COURSE = 8
+COURSE = 9
 
 
 @by_type
@@ -64,6 +77,7 @@ def _(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
         course[row, lane], course[row + 1, lane], course[row + 2, lane] = c, b, a2
         course[row + 3, lane], course[row + 4, lane], course[row + 5, lane] = a3, a4, window
         course[row + 6, lane], course[row + 7, lane] = leave(c, b, a2, a3, a4, window)
+        course[row + 8, lane] = close(window)
     else:
         time, found = base.falling_hit(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
         course[row + 6, lane], course[row + 7, lane] = time, select(found, 0.0, math.inf)
@@ -79,8 +93,9 @@ def step_fall(chain, course, row, lane):
 def _(chain, course, row, lane):
     if base.is_quartic(chain.first):
         course[row + 6, lane], course[row + 7, lane] = safe_step(
-            course[row, lane], course[row + 1, lane], course[row + 2, lane], course[row + 3, lane],
-            course[row + 4, lane], course[row + 5, lane], course[row + 6, lane], course[row + 7, lane],
+            base.may_be_far(chain.first), course[row, lane], course[row + 1, lane], course[row + 2, lane],
+            course[row + 3, lane], course[row + 4, lane], course[row + 5, lane], course[row + 8, lane],
+            course[row + 6, lane], course[row + 7, lane],
         )  # fmt: skip
     step_fall(chain.rest, course, row + COURSE, lane)
 

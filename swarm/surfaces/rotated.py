@@ -185,6 +185,11 @@ def _(surface):
     return base.is_quartic(surface.body)
 
 
+@base.may_be_far.register(Rotated)
+def _(surface):
+    return base.may_be_far(surface.body)
+
+
 @base.course.register(Rotated)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     x, y, z = _own(surface, x, y, z)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import select
+from .._jit import inlined, select
 from ..checks import Vector, length
 from . import base
-from .course import ball_rise_time, level_and_window, rise_time_inside
+from .course import ball_rise_time, level_and_window, rise_time_inside, rise_time_steady
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,13 +88,27 @@ def _(surface, x, y, z):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
+@inlined
+def _level(surface, dx, dy, dz, vx, vy, vz):
+    """(c, b) of |d + v t|^2 - R^2 = c + 2 b t + |v|^2 t^2."""
+    return dx * dx + dy * dy + dz * dz - surface.radius2, dx * vx + dy * vy + dz * vz
+
+
 @base.first_hit.register(SphereNumbers)
 def _(surface, x, y, z, vx, vy, vz):
-    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    c = dx * dx + dy * dy + dz * dz - surface.radius2
-    b = dx * vx + dy * vy + dz * vz
-    a = vx * vx + vy * vy + vz * vz
-    return rise_time_inside(c, b, a), True
+    c, b = _level(surface, x - surface.cx, y - surface.cy, z - surface.cz, vx, vy, vz)
+    return rise_time_inside(c, b, vx * vx + vy * vy + vz * vz), True
+
+
+@base.steady_hit.register(SphereNumbers)
+def _(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
+    c, b = _level(surface, x - surface.cx, y - surface.cy, z - surface.cz, vx, vy, vz)
+    return rise_time_steady(c, b, speed2, over_speed2), True
+
+
+@base.steady_hit.register(SphereFromAfar)
+def _(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
+    return base.first_hit(surface, x, y, z, vx, vy, vz)
 
 
 @base.first_hit.register(SphereFromAfar)
@@ -106,8 +120,7 @@ def _(surface, x, y, z, vx, vy, vz):
 @base.course.register(SphereNumbers)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    c = dx * dx + dy * dy + dz * dz - surface.radius2
-    b = dx * vx + dy * vy + dz * vz
+    c, b = _level(surface, dx, dy, dz, vx, vy, vz)
     a = vx * vx + vy * vy + vz * vz
     gg = gx * gx + gy * gy + gz * gz
     # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
@@ -121,6 +134,16 @@ def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
 
 
 @base.is_quartic.register(SphereNumbers)
+def _(surface):
+    return True
+
+
+@base.may_be_far.register(SphereNumbers)
+def _(surface):
+    return False
+
+
+@base.may_be_far.register(SphereFromAfar)
 def _(surface):
     return True
 
