@@ -251,6 +251,16 @@ def _compiled_next_of(ticket):
 
 
 @inlined
+def index(value: Any) -> Any:
+    """A number from an array as an index, which is not negative.
+
+    Of a signed one a kernel asks at each use whether it counts from the end: half of the instructions of a lane that is
+    given back, a third of one that is loaded.
+    """
+    return np.uintp(value)
+
+
+@inlined
 def kept(value: Any) -> Any:
     """A value from an array that a select may write back unchanged to its place.
 

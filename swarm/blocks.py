@@ -7,7 +7,7 @@ depend on which lane or block a particle is in.
 
 from typing import NamedTuple
 
-from ._jit import by_type, by_type_outlined, inlined, kernel, select
+from ._jit import by_type, by_type_outlined, index, inlined, kernel, select
 from .gravity import Gravity, Nothing
 from .inner_solve import solve
 from .lanes import (
@@ -82,9 +82,9 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
             continue
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
         for k in range(_marked(lanes, live) - 1, -1, -1):
-            lane = lanes.order[k]
+            lane = index(lanes.order[k])
             retire(method, chain, lanes, lane, state)
-            done[lanes.particle[lane]] = True
+            done[index(lanes.particle[lane])] = True
             following, stop, drawn = following_particle(draws, done, following, stop, drawn)
             if following < stop:
                 load(method, chain, lanes, lane, state, halted, following, span)
@@ -102,7 +102,7 @@ def _marked(lanes, live):
     Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
     one were an eighth of the time of a frame with 75 impacts.
     """
-    marked, order, some, count = lanes.marked, lanes.order, lanes.some, 0
+    marked, order, some, count = lanes.marked, lanes.order, lanes.some, index(0)
     eights = 0
     for k in range((live + EIGHT - 1) // EIGHT):
         some[eights] = k
@@ -111,8 +111,8 @@ def _marked(lanes, live):
         first = EIGHT * some[k]
         for lane in range(first, min(first + EIGHT, live)):
             order[count] = lane
-            count += marked[lane]
-    return count
+            count += index(marked[lane])
+    return int(count)
 
 
 @inlined
@@ -199,7 +199,7 @@ def _fall(chain, gravity, lanes, live):
     for i in range(live):
         marked[i] = _needs_more(chain, lanes, i)
     for k in range(_marked(lanes, live)):
-        lane = lanes.order[k]
+        lane = index(lanes.order[k])
         for _step in range(MORE_STEPS):
             flights.step_fall(chain, course, 0, lane)
             if not _needs_more(chain, lanes, lane):

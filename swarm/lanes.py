@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import Array, by_type_outlined, inlined, next_of, outlined, spaced
+from ._jit import Array, by_type_outlined, index, inlined, next_of, outlined, spaced
 from .contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from .methods import base as methods
 from .particles import Multipliers
@@ -125,6 +125,7 @@ def load(method, chain, lanes, lane, state, halted, i, span):
     particle[lane] = i
     if halted.particle.size > 0 and _pick_up(lanes, lane, halted, i):
         return
+    i = index(i)
     position, velocity = state.position, state.velocity
     for axis in range(3):
         rows[X + axis, lane] = position[axis, i]
@@ -173,7 +174,7 @@ def retire(method, chain, lanes, lane, state):
     """A lane back into its particle."""
     rows, impulse = lanes.rows, lanes.impulse
     position, velocity, impacts, total = state.position, state.velocity, state.impacts, state.impulse
-    i = lanes.particle[lane]
+    i = index(lanes.particle[lane])
     for axis in range(3):
         position[axis, i] = rows[X + axis, lane]
         velocity[axis, i] = rows[VX + axis, lane]

@@ -48,7 +48,7 @@ def _(chain, x, y, z):
 def _energy(law, chain, gravity, m, x, y, z, vx, vy, vz):
     """Kinetic, potential and contact energy per mass of one particle."""
     kinetic = 0.5 * (vx * vx + vy * vy + vz * vz)
-    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, m, x, y, z)
+    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, 1.0 / m, x, y, z)
 
 
 @kernel

@@ -222,7 +222,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     px, py, pz = displacement(gravity, vx, vy, vz, h)
     x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
     gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
-    f = 2.0 * kappa / h
+    f = 2.0 / h * kappa
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
     wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
     given = abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz)
@@ -232,7 +232,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     touching = surface >= 0.0
     step = (left > 0.0) & touching & solved
     factor, _balanced = energies.restored(
-        method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
+        method.law, chain, gravity, 2.0 * k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 1.0 / h * given
     )
     new = step & adaptive_step.is_new(method.adaptive, chain, x, y, z)
     # A step without contact: only fixed steps end here that way, just before one.
@@ -288,6 +288,6 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     corner.add_impulses(reactions, h, impulse, lane)
     given = f * math.sqrt(rx * rx + ry * ry + rz * rz)
     e, _balanced = energies.restored(
-        method.law, chain, gravity, 0.5 / k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, given / h
+        method.law, chain, gravity, 2.0 * k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 1.0 / h * given
     )
     return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, k0, Status.DONE.value

@@ -126,7 +126,7 @@ def _(longest, px, py, pz):
 def free_steps(chain, gravity, dt, x, y, z, vx, vy, vz, left):
     """Jump over the steps that surely stay free: (x, y, z, vx, vy, vz, steps left)."""
     # One too many by round-off starts a contact 1e-16 deep: harmless.
-    steps = np.floor(flights.free_time(gravity, chain, x, y, z, vx, vy, vz) / dt)
+    steps = np.floor(flights.free_time(gravity, chain, x, y, z, vx, vy, vz) * (1.0 / dt))
     steps = select(steps < left, steps, left)
     t = steps * dt
     dx, dy, dz = displacement(gravity, vx, vy, vz, t)

@@ -118,14 +118,16 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, ka
     x1, y1, z1 = select(touching, bx, x + px), select(touching, by, y + py), select(touching, bz, z + pz)
     # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
     gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
-    f = select(touching, 2.0 * kappa / h, 0.0)
+    f = select(touching, 2.0 / h * kappa, 0.0)
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
     wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
 
     # A push into another wall, or an equation that is not solved yet: the careful way.
     # k0 = h^2/(2m)
-    mass = 0.5 * h * h / k0
-    factor, balanced = energies.restored(method.law, chain, gravity, mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0)
+    over_mass = 2.0 / (h * h) * k0
+    factor, balanced = energies.restored(
+        method.law, chain, gravity, over_mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0
+    )
     solved = balanced & (not unsolved) & walls.pushes(chain, surface, kappa)
     solved = solved & (not walls.outside(chain, surface, x1, y1, z1))
     step = (left > 0.0) & select(touching, solved, surface > base.HARD)
@@ -156,7 +158,7 @@ def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, im
     wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
     wx, wy, wz = wx - 2.0 / h * rx, wy - 2.0 / h * ry, wz - 2.0 / h * rz
     new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
-    mass = 0.5 * h * h / k0
-    e, balanced = energies.restored(method.law, chain, gravity, mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0)
+    over_mass = 2.0 / (h * h) * k0
+    e, balanced = energies.restored(method.law, chain, gravity, over_mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0)
     status = Status.DONE.value if solved and balanced else Status.UNSOLVED.value
     return x1, y1, z1, wx * e, wy * e, wz * e, left - 1.0, new, k0, status
