@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, endurance, scenes, stability, throughput
+from . import accuracy, bars, compare, endurance, report, scenes, stability, throughput
 from .peers import race
 
 
@@ -40,7 +40,9 @@ def main() -> None:
         "scenes": scenes,
         "endurance": endurance,
     }
+    before = report.stolen()
     reports[arguments.command].main(quick=arguments.quick)
+    print(report.told_of_others(before))
 
 
 if __name__ == "__main__":

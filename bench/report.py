@@ -55,6 +55,22 @@ def name_of_machine() -> str:
     return "-".join("".join(c if c.isalnum() else " " for c in machine().lower()).split())
 
 
+def stolen() -> tuple[int, int]:
+    """What other guests of the machine took from this one since it started, and all of its time but that it idled."""
+    try:
+        user, nice, system, _idle, _wait, irq, soft, steal = map(int, Path("/proc/stat").read_text().split()[1:9])
+    except OSError:
+        return 0, 0
+    return steal, user + nice + system + irq + soft + steal
+
+
+def told_of_others(before: tuple[int, int]) -> str:
+    """How much of what this machine wanted to compute since then others took: the median's enemy."""
+    taken, busy = (after - then for after, then in zip(stolen(), before, strict=True))
+    share = f"{100.0 * taken / busy:.0f} %" if busy > 0 else "an unknown part"
+    return f"other guests of this machine took {share} of the time that its processors had work"
+
+
 def show(rows: list[Row]) -> None:
     """The report on the screen."""
     print(

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from bench import compare
+from bench import compare, report
 
 pytestmark = pytest.mark.physics
 
 
-def report(name):
+def printed(name):
     """What `python -m bench NAME --quick` prints."""
     root = Path(__file__).parents[1]
     done = subprocess.run(
@@ -22,7 +22,7 @@ def report(name):
 
 
 def test_throughput_quick():
-    told = report("throughput")
+    told = printed("throughput")
     for row in (
         "bare loop in C, sphere",
         "limit: a square root",
@@ -37,7 +37,7 @@ def test_throughput_quick():
 
 def test_peers_quick():
     """None of them is installed where the tests run: a sentence says so, and how to get it."""
-    told = report("peers")
+    told = printed("peers")
     for peer in ("lammps", "openmm", "warp"):
         assert f"{peer} is left out: " in told or peer in told.lower()
     assert "swarm, Penalty: alpha=1e4, dt=1e-3" in told
@@ -46,7 +46,7 @@ def test_peers_quick():
 
 @pytest.mark.long
 def test_bars_quick():
-    told = report("bars")
+    told = printed("bars")
     for row in (
         "Impact, sphere ",
         "two threads over one",
@@ -60,19 +60,19 @@ def test_bars_quick():
 
 @pytest.mark.long
 def test_scenes_quick():
-    told = report("scenes")
+    told = printed("scenes")
     assert "capped cylinder" in told
     assert "formula of the ellipsoid" in told
 
 
 def test_accuracy_quick():
-    told = report("accuracy")
+    told = printed("accuracy")
     assert "sphere: Choose Impact" in told
     assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in told
 
 
 def test_stability_quick():
-    told = report("stability")
+    told = printed("stability")
     assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in told
     assert "uzawa: State I with exponent 1: 1 of 1 converge" in told
     assert (
@@ -84,7 +84,7 @@ def test_stability_quick():
 
 
 def test_endurance_quick():
-    told = report("endurance")
+    told = printed("endurance")
     for row in ("checkpoint of 1000 particles", "memory grown", "a particle's path"):
         assert row in told
 
@@ -131,3 +131,10 @@ def test_compare_wants_a_report(tmp_path):
     path.write_text("a,b\n1,2\n")
     with pytest.raises(SystemExit, match="no report of bench"):
         compare.read(path)
+
+
+def test_what_others_took_is_told(monkeypatch):
+    monkeypatch.setattr(report, "stolen", lambda: (130, 1200))
+    assert report.told_of_others((100, 1000)).split(" of the time")[0].endswith("took 15 %")
+    monkeypatch.setattr(report, "stolen", lambda: (100, 1000))
+    assert "an unknown part" in report.told_of_others((100, 1000))
