@@ -250,14 +250,23 @@ def _compiled_next_of(ticket):
     return lambda ticket: _next_of(ticket)  # type: ignore[call-arg]
 
 
-@inlined
 def index(value: Any) -> Any:
     """A number from an array as an index, which is not negative.
 
     Of a signed one a kernel asks at each use whether it counts from the end: half of the instructions of a lane that is
-    given back, a third of one that is loaded.
+    given back, a third of one that is loaded. A function that is given both kinds is compiled twice.
     """
-    return np.uintp(value)
+    return value
+
+
+@type_callable(index)
+def _type_of_index(_context):
+    return lambda value: types.uintp
+
+
+@lower_builtin(index, types.Any)
+def _emit_index(context, builder, signature, args):
+    return context.cast(builder, *args, *signature.args, signature.return_type)
 
 
 @inlined

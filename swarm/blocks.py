@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ._jit import by_type, by_type_outlined, index, inlined, kernel, select
 from .gravity import Gravity, Nothing
-from .inner_solve import solve
+from .inner_solve import solution, solve
 from .lanes import (
     EIGHT,
     HITS,
@@ -64,7 +64,7 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
         following, stop, drawn = following_particle(draws, done, following, stop, drawn)
         if following == stop:
             break
-        load(method, chain, lanes, live, state, halted, following, span)
+        load(method, chain, lanes, index(live), state, halted, following, span)
         following += 1
         live += 1
     while live > 0:
@@ -119,28 +119,17 @@ def _marked(lanes, live):
 def _pass(method, chain, gravity, multipliers, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     _fly(gravity, method, chain, lanes, live)
-    rows, surface, kappa, unsolved, turned = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved, lanes.turned
-    solve(methods.unknown(method), method, chain, gravity, multipliers, lanes, live)
-    # The velocity after the contact, where one loop with the rest of the contact would be too long.
-    if methods.turns(method):
-        for i in range(live):
-            turned[0, i], turned[1, i], turned[2, i], turned[3, i] = methods.turn(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], rows[K1, i], surface[i], kappa[i],
-            )  # fmt: skip
+    unknown, rows = methods.unknown(method), lanes.rows
+    solve(unknown, method, chain, gravity, multipliers, lanes, live)
     some_arrived, some_hard = False, False
-    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
     for i in range(live):
-        if methods.turns(method):
-            tx, ty, tz, given = turned[0, i], turned[1, i], turned[2, i], turned[3, i]
         arrived, hard = _end(
             method, chain, lanes, i,
             methods.contact(
                 method, chain, gravity,
                 rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], surface[i], kappa[i], unsolved[i],
-                tx, ty, tz, given,
+                rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], lanes.surface[i],
+                *solution(unknown, method, lanes, i),
             ),
         )  # fmt: skip
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
@@ -199,7 +188,7 @@ def _fall(chain, gravity, lanes, live):
     for i in range(live):
         marked[i] = _needs_more(chain, lanes, i)
     for k in range(_marked(lanes, live)):
-        lane = index(lanes.order[k])
+        lane = lanes.order[k]
         for _step in range(MORE_STEPS):
             flights.step_fall(chain, course, 0, lane)
             if not _needs_more(chain, lanes, lane):

@@ -8,7 +8,7 @@ import numpy as np
 from ._jit import by_type, inlined, kept, select
 from .contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
 from .gravity import Nothing
-from .lanes import K0, LEFT, VX, VY, VZ, X, Y, Z
+from .lanes import K0, K1, LEFT, VX, VY, VZ, X, Y, Z
 from .methods import base as methods
 from .particles import Multipliers
 
@@ -31,11 +31,40 @@ def _(unknown, method, chain, gravity, multipliers, lanes, live):
     _begin_multipliers(multipliers, method, chain, gravity, lanes, live)
     _newton(method, chain, gravity, multipliers, lanes, live)
     _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
+    # The velocity after the contact, where one loop with the rest of the contact would be too long.
+    if methods.turns(method):
+        turned = lanes.turned
+        for i in range(live):
+            turned[0, i], turned[1, i], turned[2, i], turned[3, i] = methods.turn(
+                method, chain, gravity,
+                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
+                rows[LEFT, i], rows[K0, i], rows[K1, i], surface[i], kappa[i],
+            )  # fmt: skip
 
 
 @solve.register(Nothing)
 def _(unknown, method, chain, gravity, multipliers, lanes, live):
     pass
+
+
+@by_type
+def solution(unknown, method, lanes, i):
+    """What `solve` left of a lane: the unknown, whether it is unsolved, velocity and impulse where the method turns."""
+    raise NotImplementedError
+
+
+@solution.register(object)
+def _(unknown, method, lanes, i):
+    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
+    if methods.turns(method):
+        turned = lanes.turned
+        tx, ty, tz, given = turned[0, i], turned[1, i], turned[2, i], turned[3, i]
+    return lanes.kappa[i], lanes.unsolved[i], tx, ty, tz, given
+
+
+@solution.register(Nothing)
+def _(unknown, method, lanes, i):
+    return 0.0, False, 0.0, 0.0, 0.0, 0.0
 
 
 @by_type
