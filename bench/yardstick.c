@@ -1,6 +1,6 @@
 /* The machine's own pace. argv: what, passes. Prints seven times nanoseconds an item; an item is
- *   impact   one impact in a sphere: the bare algorithm, |v|^2 and its inverse given, 256 lanes, no particle ever loaded
- *            or retired, no count, no impulse, no energy correction
+ *   impact   one impact in a sphere: the bare algorithm, 256 lanes, no particle ever loaded or retired, no count, no
+ *            impulse, no energy correction
  *   lane     the same with all that a lane of the engine knows: the end of the frame, short flights, counts, impulses and
  *            energy; still no particle is ever loaded or retired
  *   verlet   one step of velocity Verlet with a penalty wall, 256 lanes
@@ -37,9 +37,10 @@ static inline double hit(int i, double radius2)
 {
     const double c = x[i] * x[i] + y[i] * y[i] + z[i] * z[i] - radius2;
     const double b = x[i] * u[i] + y[i] * v[i] + z[i] * w[i];
-    const double d = b * b - energy[i] * c;
-    const double t = (sqrt(d > 0.0 ? d : 0.0) - b) * (2.0 * half_inverse[i]);
-    return t < 0.0 ? 0.0 : t;
+    const double a = u[i] * u[i] + v[i] * v[i] + w[i] * w[i];
+    const double d = b * b - a * c, root = sqrt(d > 0.0 ? d : 0.0);
+    const double t = (b > 0.0 ? -c : root - b) / (b > 0.0 ? b + root : a);
+    return t > 0.0 ? t : 0.0;
 }
 
 static void impact(void)

@@ -96,11 +96,6 @@ def seeks(method):
 
 
 @by_type
-def steady(method, k0, k1):
-    """What a method that seeks knows of a straight flight's speed, `flights.Steady`; None where it may change."""
-
-
-@by_type
 def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
     """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
 

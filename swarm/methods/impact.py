@@ -14,7 +14,6 @@ from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
-from ..surfaces.flights import Steady
 from . import base
 
 # Walls within this part of the scene's size hold a sliding particle together.
@@ -102,30 +101,17 @@ class ImpactNumbers(NamedTuple):
 def _(method, mass, energy, vx, vy, vz):
     # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the shortest flight of this particle
     twice_energy = 2.0 * energy
+    moving = twice_energy > 0.0
+    half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
     speed2 = vx * vx + vy * vy + vz * vz + method.fall2
     moving = speed2 > 0.0
     shortest = method.shortest_flight + method.shortest_length / math.sqrt(select(moving, speed2, 1.0))
-    return twice_energy, 0.5 / twice_energy, select(moving, shortest, 0.0)
+    return twice_energy, half_inverse, select(moving, shortest, 0.0)
 
 
 @base.seeks.register(ImpactNumbers)
 def _(method):
     return True
-
-
-@base.steady.register(ImpactNumbers)
-def _(method, k0, k1):
-    return _steady(method.restitution, k0, k1)
-
-
-@by_type
-def _steady(restitution, k0, k1):
-    """Nothing, where contacts lose energy."""
-
-
-@_steady.register(type(None))
-def _(restitution, k0, k1):
-    return Steady(k0, 2.0 * k1)
 
 
 @base.flight.register(ImpactNumbers)

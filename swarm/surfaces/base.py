@@ -181,12 +181,6 @@ def first_hit(surface, x, y, z, vx, vy, vz):
 
 
 @by_type
-def steady_hit(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
-    """`first_hit` where |v|^2 and 1/|v|^2 are known; at rest, where the second is infinite, inf or nan."""
-    return first_hit(surface, x, y, z, vx, vy, vz)
-
-
-@by_type
 def course(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     """The level along the parabola r + v t + G t^2/2 of a quadric: c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4.
 

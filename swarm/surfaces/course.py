@@ -48,19 +48,6 @@ def rise_time_inside(c, b, a):
 
 
 @inlined
-def rise_time_steady(c, b, a, over_a):
-    """`rise_time_inside` where 1/a is known; no number where that is infinite, for a particle at rest.
-
-    Where b > 0, in a flight that does not begin at this wall, root - b cancels. It knows the wall to round-off of the
-    cavity's size all the same, and -c/(b + root) no better, c being a difference of squares. It saves the division.
-    """
-    discriminant = b * b - a * c
-    time = (math.sqrt(select(discriminant > 0.0, discriminant, 0.0)) - b) * over_a
-    # In this order what is no number remains so, and no comparison takes it for a hit.
-    return select(time < 0.0, 0.0, time)
-
-
-@inlined
 def _outer_root(c, b, a, discriminant):
     """The root at which c + 2 b t + a t^2 rises, and its denominator."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.

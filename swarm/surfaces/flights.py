@@ -1,20 +1,12 @@
 """When a free flight meets the walls of a scene: the hits and free times of one surface, folded over the chain."""
 
 import math
-from typing import NamedTuple
 
 from .._jit import by_type, select
 from ..gravity import Gravity, Nothing
 from . import base
 from .chain import Chain, outside
 from .course import arrived, close, leave, safe_step
-
-
-class Steady(NamedTuple):
-    """In the place of gravity: there is none, and of the particle is known what no force changes."""
-
-    speed2: float
-    over_speed2: float  # infinite for a particle at rest
 
 
 @by_type
@@ -26,11 +18,6 @@ def hit(gravity, surface, x, y, z, vx, vy, vz):
 @hit.register(Nothing)
 def _(gravity, surface, x, y, z, vx, vy, vz):
     return base.first_hit(surface, x, y, z, vx, vy, vz)
-
-
-@hit.register(Steady)
-def _(gravity, surface, x, y, z, vx, vy, vz):
-    return base.steady_hit(surface, x, y, z, vx, vy, vz, gravity.speed2, gravity.over_speed2)
 
 
 @hit.register(Gravity)

@@ -9,7 +9,7 @@ import numpy as np
 from .._jit import inlined, select
 from ..checks import Vector, length
 from . import base
-from .course import ball_rise_time, level_and_window, rise_time_inside, rise_time_steady
+from .course import ball_rise_time, level_and_window, rise_time_inside
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,17 +98,6 @@ def _level(surface, dx, dy, dz, vx, vy, vz):
 def _(surface, x, y, z, vx, vy, vz):
     c, b = _level(surface, x - surface.cx, y - surface.cy, z - surface.cz, vx, vy, vz)
     return rise_time_inside(c, b, vx * vx + vy * vy + vz * vz), True
-
-
-@base.steady_hit.register(SphereNumbers)
-def _(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
-    c, b = _level(surface, x - surface.cx, y - surface.cy, z - surface.cz, vx, vy, vz)
-    return rise_time_steady(c, b, speed2, over_speed2), True
-
-
-@base.steady_hit.register(SphereFromAfar)
-def _(surface, x, y, z, vx, vy, vz, speed2, over_speed2):
-    return base.first_hit(surface, x, y, z, vx, vy, vz)
 
 
 @base.first_hit.register(SphereFromAfar)

@@ -46,16 +46,12 @@ def first_least(hits):
 
 
 @every_chain
-@pytest.mark.parametrize("kind", ["straight", "steady", "falling"])
+@pytest.mark.parametrize("falling", [False, True])
 @given(point=vectors, velocity=directions, pull=directions)
-def test_first_hit_is_the_least_of_all(names, kind, point, velocity, pull):
+def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
     whole, single = both(names)
-    speed2 = float(velocity @ velocity)
-    gravity, one, more = {
-        "straight": (None, base.first_hit, ()),
-        "steady": (flights.Steady(speed2, 1.0 / speed2), base.steady_hit, (speed2, 1.0 / speed2)),
-        "falling": (Gravity(*pull), base.falling_hit, (pull,)),
-    }[kind]
+    gravity = Gravity(*pull) if falling else None
+    one, more = (base.falling_hit, (pull,)) if falling else (base.first_hit, ())
     hits = [call(one, numbers, point, velocity, *more) for numbers in single]
     assert chain.length(whole) == len(names)
     assert call(flights.first_hit, whole, gravity, point, velocity) == first_least(hits)
