@@ -142,9 +142,9 @@ def _fly(gravity, method, chain, lanes, live):
 
     A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
     an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
-    and contact in one loop 3.0, first hit and flight 2.8 (an ellipsoid 4.4, 3.9). The safe steps of a fall in one loop
-    110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane 2.6, but their round-off is that of every flight of a
-    particle: the angular momentum in a sphere drifted five times as fast.)
+    and contact in one loop 3.6, first hit and flight 3.3 (an ellipsoid 4.4, 3.9). The safe steps of a fall in one loop
+    110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
+    a particle: the angular momentum in a sphere drifted five times as fast.)
     """
 
 
