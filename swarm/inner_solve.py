@@ -15,7 +15,7 @@ from .particles import Multipliers
 
 @by_type
 def solve(unknown, method, chain, gravity, multipliers, lanes, live):
-    """The contact's unknown of every lane, and its multiplier where the method has one; nothing without an unknown."""
+    """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
 
 
 @solve.register(object)
