@@ -12,19 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import SceneError
 
 Vector = tuple[float, float, float]
-# Lengths whose squares and inverse squares are numbers.
-_SHORTEST, _LONGEST = 1e-100, 1e100
+# Magnitudes whose squares and inverse squares are finite.
+SMALLEST, LARGEST = 1e-100, 1e100
+# Bytes of a particle in a run (`python -m bench bars`); so few of them fit everywhere.
+_PARTICLE, _FEW = 176, 1_000_000
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
     """`value` as a finite float."""
     try:
-        if isinstance(value, (bool, str, bytes)):
+        # NumPy makes a number of the last two: without the imaginary part, and without the mask.
+        if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
             raise TypeError
         result = float(value)
-    except (TypeError, ValueError):
-        raise SceneError(f"{name} must be {expected}, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(f"{name} must be {expected}, got {value!r:.200}") from None
     if not math.isfinite(result):
         raise SceneError(f"{name} must be {expected}, got {result}")
     return result
@@ -49,8 +52,16 @@ def at_least(name: str, value: Any, bound: float) -> float:
 def length(name: str, value: Any) -> float:
     """`value` as a length [m] above zero whose square is a number too."""
     result = positive(name, value)
-    if not _SHORTEST <= result <= _LONGEST:
-        raise SceneError(f"{name} must be between {_SHORTEST:g} and {_LONGEST:g} m, got {result:g}")
+    if not SMALLEST <= result <= LARGEST:
+        raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
+    return result
+
+
+def magnitude(name: str, value: Any) -> float:
+    """`value` as a number from 0 on whose square is a number too."""
+    result = at_least(name, value, 0.0)
+    if result > LARGEST:
+        raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
     return result
 
 
@@ -62,6 +73,36 @@ def count(name: str, value: Any, least: int = 1) -> int:
     if result < least:
         raise SceneError(f"{name} must be {least} or more, got {result}")
     return result
+
+
+def memory() -> int:
+    """Bytes of memory that this machine has."""
+    import psutil
+
+    return int(psutil.virtual_memory().total)
+
+
+def in_bytes(size: float) -> str:
+    """A number of bytes as people read it.
+
+    >>> in_bytes(1.76e14)
+    '176 TB'
+    """
+    units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"]
+    while size >= 999.5 and len(units) > 1:
+        size, units = size / 1000.0, units[1:]
+    return f"{size:.3g} {units[0]}"
+
+
+def particles_fit(name: str, count: int) -> None:
+    """Raise a SceneError if so many particles do not fit this machine's memory."""
+    count = min(count, 10**300)  # of which a float can be made
+    size = _PARTICLE * count
+    if count > _FEW and size > memory():
+        raise SceneError(
+            f"{name} must be particles that fit in memory, got {count:.6g}, which take {in_bytes(size)} where there "
+            f"are {in_bytes(memory())}"
+        )
 
 
 def duration(name: str, value: str) -> float:
@@ -96,10 +137,17 @@ def vector(name: str, value: Any) -> Vector:
 
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """`value` as an array of floats."""
+    parts = value if isinstance(value, (list, tuple)) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+        raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill what is masked")
     try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{name} must be an array of numbers, got {type(value).__name__}") from None
+        given = np.asarray(value)
+        if given.dtype.kind not in "iufO":
+            raise TypeError
+        return given.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
+        raise SceneError(f"{name} must be an array of numbers, got {came}") from None
 
 
 def one_of(name: str, value: Any, choices: Iterable[str]) -> str:

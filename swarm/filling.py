@@ -27,8 +27,8 @@ def fill(
     Args:
         scene: its volume must be bounded.
         n: number of particles, 1 or more.
-        speed: |v| of every particle [m/s], >= 0, in a direction uniform on the sphere; or
-        temperature: k_B T [J], >= 0: each component of v is normal with variance temperature/mass.
+        speed: |v| of every particle [m/s], from 0 to 1e100, in a direction uniform on the sphere; or
+        temperature: k_B T [J], from 0 to 1e100: each component of v is normal with variance temperature/mass.
         mass: one number or (n,) [kg], above 0.
         seed: the same seed gives the same particles.
 
@@ -45,14 +45,15 @@ def fill(
     Particles(10)
     """
     n = checks.count("n", n)
+    checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
     if (speed is None) == (temperature is None):
         came = "neither" if speed is None else "both"
         raise SceneError(f"fill needs one of speed and temperature, got {came}")
     if speed is not None:
-        checks.at_least("speed", speed, 0.0)
+        checks.magnitude("speed", speed)
     if temperature is not None:
-        checks.at_least("temperature", temperature, 0.0)
+        checks.magnitude("temperature", temperature)
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
     points, volume = _points(scene, n, random)

@@ -85,7 +85,7 @@ def contact_history(
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
-    particle = Particles(np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64), mass)
+    particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
     method.check(scene, particle)

@@ -1,6 +1,7 @@
 """Particles: struct-of-arrays state, one row a component."""
 
 import csv
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from .errors import SceneError
 
 Floats = NDArray[np.float64]
 
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -23,10 +25,12 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
 
-    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None.
+    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Whatever is assigned
+    to them later is checked when a run takes them, and converted as it is here.
 
     Raises:
-        SceneError: wrong shapes, no particle, a value that is not finite, a mass not above 0.
+        SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass not from 1e-100 to
+            1e100.
 
     >>> len(Particles([[0.0, 0.1], [0.0, 0.0], [0.0, 0.0]], np.ones((3, 2))))
     2
@@ -35,19 +39,15 @@ class Particles:
     volume: float | None = None
 
     def __init__(self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0) -> None:
-        self.position = _rows("position", position)
-        self.velocity = _rows("velocity", velocity)
-        n = self.position.shape[1]
-        if self.velocity.shape[1] != n:
-            raise SceneError(f"velocity must have the shape of position, (3, {n}), got {self.velocity.shape}")
-        masses = checks.array("mass", mass)
-        if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
-            raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
-        self.mass: Floats = np.ascontiguousarray(np.broadcast_to(masses, (n,))).copy()
-        wrong = ~(np.isfinite(self.mass) & (self.mass > 0.0))
-        if wrong.any():
-            first = int(np.argmax(wrong))
-            raise SceneError(f"mass must be a finite number above 0, got {self.mass[first]:g} for particle {first}")
+        checked = _checked(position, velocity, mass)
+        self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
+
+    def checked(self) -> "Particles":
+        """The same particles, checked again; arrays that kernels can take as they are are shared, not copied."""
+        particles = Particles.__new__(Particles)
+        checked = _checked(self.position, self.velocity, self.mass)
+        particles.position, particles.velocity, particles.mass = map(np.ascontiguousarray, checked)
+        return particles
 
     @classmethod
     def of(cls, state: "State") -> "Particles":
@@ -137,16 +137,33 @@ def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str])
         raise SceneError(f"{path}, row {number}: expected {len(header)} cells, got {len(cells)}")
     values = []
     for name, cell in zip(header, cells, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = np.nan
+        # Python's float takes more than other programs write: 1_0, and the digits of all scripts.
+        value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
         if not np.isfinite(value):
             raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell[:40]!r}")
         if name == "mass" and value <= 0.0:
             raise SceneError(f"{path}, row {number}, column 'mass': expected a number above 0, got {cell!r}")
         values.append(value)
     return values
+
+
+def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """The three arrays as floats, in shapes that go together."""
+    rows, speeds, masses = _rows("position", position), _rows("velocity", velocity), checks.array("mass", mass)
+    n = rows.shape[1]
+    if speeds.shape[1] != n:
+        raise SceneError(f"velocity must have the shape of position, (3, {n}), got {speeds.shape}")
+    if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
+        raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
+    masses = np.broadcast_to(masses, (n,))
+    # Not finite compares as false.
+    if not (masses.min() >= checks.SMALLEST and masses.max() <= checks.LARGEST):
+        first = int(np.argmin((masses >= checks.SMALLEST) & (masses <= checks.LARGEST)))
+        raise SceneError(
+            f"mass must be a finite number above 0, from {checks.SMALLEST:g} to {checks.LARGEST:g} kg, got "
+            f"{masses[first]:g} for particle {first}"
+        )
+    return rows, speeds, masses
 
 
 def _rows(name: str, value: ArrayLike) -> Floats:
@@ -158,11 +175,12 @@ def _rows(name: str, value: ArrayLike) -> Floats:
         raise SceneError(f"{name} must have shape (3, N), rows x, y, z, got {rows.shape}{hint}")
     if rows.shape[1] == 0:
         raise SceneError(f"{name} must hold at least one particle, got shape {rows.shape}")
-    finite = np.isfinite(rows).all(axis=0)
-    if not finite.all():
-        first = int(np.argmin(finite))
+    # Not finite compares as false. Beyond the limit the kinetic energy is no number, nor what phi computes.
+    if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
+        good = (np.abs(rows) <= checks.LARGEST).all(axis=0)
+        first = int(np.argmin(good))
         raise SceneError(
-            f"{name} must be finite, got {tuple(rows[:, first].tolist())} for particle {first} "
-            f"({int((~finite).sum())} such particles)"
+            f"{name} must be finite and at most {checks.LARGEST:g}, got {tuple(rows[:, first].tolist())} for particle "
+            f"{first} ({int((~good).sum())} such particles)"
         )
-    return np.array(rows, order="C")
+    return rows

@@ -7,6 +7,8 @@ import pytest
 
 from swarm import SceneError, SwarmError, checks
 
+MASKED = "points must be an array without a mask, got a masked one; remove or fill what is masked"
+
 
 @pytest.mark.parametrize("value", [2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0)])
 def test_numbers_become_floats(value):
@@ -15,7 +17,25 @@ def test_numbers_become_floats(value):
         assert checked == 2.0
 
 
-@pytest.mark.parametrize("value", ["2", b"2", None, True, [2.0], {}, 1j, object(), math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "value",
+    [
+        "2",
+        b"2",
+        None,
+        True,
+        [2.0],
+        {},
+        1j,
+        np.complex128(1.0),
+        np.ma.masked,
+        10**400,
+        object(),
+        math.nan,
+        math.inf,
+        -math.inf,
+    ],
+)
 @pytest.mark.parametrize(
     "check", [checks.number, checks.positive, lambda name, value: checks.at_least(name, value, 0.0)]
 )
@@ -32,6 +52,12 @@ def test_what_is_not_a_finite_number(check, value):
         (lambda: checks.at_least("exponent", 0.5, 1.0), "exponent must be 1 or more, got 0.5"),
         (lambda: checks.length("radius", 1e101), "radius must be between 1e-100 and 1e+100 m, got 1e+101"),
         (lambda: checks.array("points", "abc"), "points must be an array of numbers, got str"),
+        (lambda: checks.array("points", [1.0, 2j]), "points must be an array of numbers, got list"),
+        (lambda: checks.array("points", np.array([True])), "points must be an array of numbers, got bool"),
+        (lambda: checks.array("points", [[1.0], [np.ma.masked]][1]), MASKED),
+        (lambda: checks.array("points", [np.ma.array([1.0, 2.0], mask=[0, 1])]), MASKED),
+        (lambda: checks.array("points", [10**400]), "points must be an array of numbers, got list"),
+        (lambda: checks.magnitude("speed", 1e300), "speed must be at most 1e+100, got 1e+300"),
         (lambda: checks.count("n", 0), "n must be 1 or more, got 0"),
         (lambda: checks.count("n", 2.5), "n must be a whole number, 1 or more, got 2.5"),
         (lambda: checks.count("n", True), "n must be a whole number, 1 or more, got True"),
