@@ -17,8 +17,12 @@ from numpy.typing import NDArray
 
 from ..errors import FileError, SceneError
 from ..particles import Particles
+from . import paths
 
 Arrays = dict[str, NDArray[Any]]
+# The name of an archive's first entry ends here.
+_FIRST = b"job.npy"
+_HEAD = 30 + len(_FIRST)
 _HINT = "run it with the inputs it was started with, or start afresh with --overwrite"
 
 
@@ -69,11 +73,6 @@ def _told(value: Any) -> str:
     return ", ".join(line for line in str(value).splitlines() if line)
 
 
-def path_of(trajectory: Path) -> Path:
-    """The checkpoint that goes with a trajectory."""
-    return trajectory.with_name(trajectory.name + ".checkpoint")
-
-
 def digest_of(particles: Particles) -> str:
     """Tells one start from another."""
     digest = hashlib.sha256()
@@ -88,21 +87,35 @@ def save(path: Path, job: Job, arrays: Arrays) -> None:
     Raises:
         FileError: it cannot be written.
     """
-    part = path.with_name(path.name + ".part")
+    part = paths.part_of(path)
     try:
         with open(part, "wb") as file:
             np.savez(file, allow_pickle=False, job=json.dumps(asdict(job)), **arrays)
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        if os.name == "posix":
+            _sync_folder(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise FileError(f"cannot write the checkpoint {path}: {error}; the one before it is as it was") from error
+
+
+def _sync_folder(path: Path) -> None:
+    """Let the names in a folder reach the disk; other systems open no folders."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def is_one(path: Path) -> bool:
+    """Whether a file begins as checkpoints do, even if it is not whole."""
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(_HEAD).endswith(_FIRST)
 
 
 def read(path: Path) -> tuple[Job, Arrays]:

@@ -1,12 +1,11 @@
 """One run at a time writes a trajectory: a lock file beside it, whose lock goes with the process that holds it."""
 
 import contextlib
-import fcntl
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import FileError
+from . import paths
 
 
 @contextlib.contextmanager
@@ -19,10 +18,13 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     Raises:
         FileError: another run holds it, or its file cannot be made.
     """
-    path = trajectory.with_name(trajectory.name + ".lock")
+    import filelock
+
+    path = paths.lock_of(trajectory)
+    lock = filelock.FileLock(path, blocking=False)
     try:
-        handle = _locked(path)
-    except BlockingIOError as error:
+        lock.acquire()
+    except filelock.Timeout as error:
         raise FileError(
             f"the trajectory {trajectory} is being written by another run; wait until that has ended, or choose "
             "another name"
@@ -32,19 +34,8 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(handle)
-
-
-def _locked(path: Path) -> int:
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # The run before may have removed it between these two lines.
-            if os.path.exists(path) and os.path.samestat(os.fstat(handle), os.stat(path)):
-                return handle
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)
+        # While it is held: whoever opened the file before sees that it has no name any more, and opens the next one.
+        # Where a file in use keeps its name, as on Windows, filelock removes it.
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        lock.release()

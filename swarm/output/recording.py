@@ -25,11 +25,11 @@ from ..errors import FileError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, series, viewer
+from . import colours, paths, series, viewer
 from .rows import rows
 from .shapes import shapes_of
 from .trajectory import Trajectory
-from .writer import WriteFrames, Written, check_target
+from .writer import WriteFrames, Written
 
 # Bytes of a particle (position and colour), and of what Rerun writes at most for a number of a time series: a chunk.
 _PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
@@ -86,7 +86,7 @@ class RecordingWriter:
         settings: Settings,
     ) -> None:
         if path is not None:
-            check_target(path, overwrite, "recording")
+            paths.check_target(path, overwrite, "recording")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._count, self._last = len(start), frames - 1
         # Every k-th: a slice takes a tenth of the time that a list of them takes.

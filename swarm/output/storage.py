@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from .. import checks
 from ..errors import SceneError
 
@@ -43,3 +45,7 @@ class Storage:
         if isinstance(self.frames, str):
             return slice(None) if self.frames == "all" else slice(0)
         return slice(None, None, self.frames)
+
+    def bytes_of(self, n: int) -> int:
+        """Bytes that n particles take in a frame, if they are not compressed."""
+        return len(range(n)[self.kept()]) * 6 * np.dtype(self.precision).itemsize

@@ -8,37 +8,49 @@ File Format Specification, II.A, superblock version 3.
 """
 
 import os
+from typing import BinaryIO
 
 SIZE = 48
 _VERSION, _FLAGS, _END, _CHECKSUM = 8, 11, slice(28, 36), slice(44, 48)
 _MASK = 0xFFFFFFFF
 
 
-def unmark(handle: int) -> bytes:
-    """Clear the mark of an open file; return its superblock."""
-    block = bytearray(os.pread(handle, SIZE, 0))
+def unmark(file: BinaryIO) -> bytes:
+    """Clear the mark of an open file, which is not buffered; return its superblock."""
+    block = _read(file)
     if len(block) == SIZE and block[_FLAGS] != 0:
         block[_FLAGS] = 0
-        _write(handle, block)
+        _write(file, block)
     return bytes(block)
 
 
-def mend(handle: int) -> None:
+def mend(file: BinaryIO) -> None:
     """Make what a kill left ready to be written on: no mark, and the end where the file ends.
 
     The superblock is the last that a flush writes. Its end may lie before blocks that are in use already, and HDF5
     would give their place to others.
     """
-    block = bytearray(os.pread(handle, SIZE, 0))
+    block = _read(file)
     if len(block) == SIZE and block[_VERSION] == 3:
-        end = max(os.fstat(handle).st_size, int.from_bytes(block[_END], "little"))
+        end = max(file.seek(0, os.SEEK_END), int.from_bytes(block[_END], "little"))
         block[_FLAGS], block[_END] = 0, end.to_bytes(8, "little")
-        _write(handle, block)
+        _write(file, block)
 
 
-def _write(handle: int, block: bytearray) -> None:
+def put_back(file: BinaryIO, block: bytes) -> None:
+    """Let the superblock be what it was."""
+    file.seek(0)
+    file.write(block)
+
+
+def _read(file: BinaryIO) -> bytearray:
+    file.seek(0)
+    return bytearray(file.read(SIZE))
+
+
+def _write(file: BinaryIO, block: bytearray) -> None:
     block[_CHECKSUM] = checksum(bytes(block[: _CHECKSUM.start])).to_bytes(4, "little")
-    os.pwrite(handle, block, 0)
+    put_back(file, bytes(block))
 
 
 def checksum(data: bytes) -> int:

@@ -2,7 +2,8 @@
 
 particles/all/{position,velocity}/{step,time,value}, value (frames, N, 3); particles/all/{mass,id} (N,);
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
-number that were run. All elements share one step and one time dataset by hard links. writer.py writes them.
+number that were run, and parameters/start, a digest of them at the start. All elements share one step and one time
+dataset by hard links. writer.py writes them.
 """
 
 from pathlib import Path
@@ -114,6 +115,12 @@ class Trajectory:
     def descriptions(self) -> dict[str, str]:
         """What makes a run another one, as texts: scene, method and storage."""
         return {name: str(self._file[f"parameters/{name}"].asstr()[()]) for name in ("scene", "method", "storage")}
+
+    @property
+    def start(self) -> str:
+        """A digest of the particles at the start: "" in a file of a version that stored none."""
+        stored = self._file.get("parameters/start")
+        return "" if stored is None else str(stored.asstr()[()])
 
     @property
     def scene(self) -> Scene:

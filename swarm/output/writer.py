@@ -16,12 +16,12 @@ import numpy as np
 import tomli_w
 
 from .. import tables
-from ..errors import FileError, SceneError
+from ..errors import FileError
 from ..methods import Method
 from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
-from . import superblock
+from . import paths, superblock
 from .rows import rows
 from .storage import Storage
 
@@ -49,7 +49,7 @@ class TrajectoryWriter:
 
     Frame k is row k, so a run that goes on from a checkpoint leaves no gap and no duplicate. Several frames at once
     cost little more than one: what takes time is the fifteen datasets and the flush. A file has its name when its first
-    frame is whole; before, it ends in ".part".
+    frame is whole: until then what is there is left alone, with its checkpoint.
     """
 
     def __init__(
@@ -60,31 +60,35 @@ class TrajectoryWriter:
         method: Method,
         particles: Particles,
         scene_text: str | None,
+        start: str,
         following: bool = False,
     ) -> None:
         self._path, self._storage, self._scene, self._method = path, storage, scene, method
         self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
-        self._following = following
-        self._part = path if following else path.with_name(path.name + ".part")
+        self._start, self._following = start, following
+        self._part = path if following else paths.part_of(path)
 
     def __enter__(self) -> WriteFrames:
-        mode = "r+" if self._following else "w"
+        self._size, self._block = 0, b""
         try:
             if not self._following:
                 self._part.touch()
-            self._handle = os.open(self._part, os.O_RDWR)
-            if self._following:
-                superblock.mend(self._handle)
-            # HDF5's locks would shut readers out.
-            self._file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+            self._open_file("r+" if self._following else "w")
         except OSError as error:
             raise FileError(f"cannot write the trajectory {self._path}: {error}") from error
-        self._size, self._block = 0, b""
         if self._following:
             self._open()
         else:
             self._create()
         return self._write
+
+    def _open_file(self, mode: str) -> None:
+        self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by __exit__
+        if mode == "r+":
+            superblock.mend(self._handle)
+        # HDF5's locks would shut readers out.
+        self._file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        self._descriptor = self._file.id.get_vfd_handle()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -96,7 +100,7 @@ class TrajectoryWriter:
             if error is None:
                 raise FileError(f"cannot close the trajectory {self._path}: {_reason(problem)}") from problem
         finally:
-            os.close(self._handle)
+            self._handle.close()
         if self._part != self._path:
             # Without a frame it is no trajectory.
             self._part.unlink(missing_ok=True)
@@ -104,7 +108,7 @@ class TrajectoryWriter:
     def sync(self) -> None:
         """Let all that was written reach the disk."""
         try:
-            os.fsync(self._handle)
+            os.fsync(self._handle.fileno())
         except OSError as error:
             raise FileError(f"cannot write the trajectory {self._path}: {error}") from error
 
@@ -118,7 +122,7 @@ class TrajectoryWriter:
         parameters = file.create_group("parameters")
         for name, text in descriptions(self._scene, self._method, self._storage).items():
             parameters[name] = text
-        parameters["particles"] = self._count
+        parameters["particles"], parameters["start"] = self._count, self._start
         if self._text is not None:
             parameters["scene_file"] = self._text
         self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
@@ -198,21 +202,32 @@ class TrajectoryWriter:
             raise
         except (OSError, RuntimeError) as error:
             self._abandon()
-            os.pwrite(self._handle, self._block, 0)
+            if not self._handle.closed:
+                superblock.put_back(self._handle, self._block)
             raise FileError(f"cannot write frame {frames[0][0]} to {self._path}: {_reason(error)}") from error
 
     def _flush(self) -> None:
         self._file.flush()
         self._block = superblock.unmark(self._handle)
-        self._size = os.fstat(self._handle).st_size
+        self._size = os.fstat(self._handle.fileno()).st_size
 
     def _take_name(self) -> None:
-        os.replace(self._part, self._path)
-        self._part = self._path
+        """Be the trajectory, in place of what was there; its checkpoint is none of this run."""
+        try:
+            os.replace(self._part, self._path)
+            self._part = self._path
+        except PermissionError:  # Windows renames no file that is open
+            self._file.close()
+            self._handle.close()
+            os.replace(self._part, self._path)
+            self._part = self._path
+            self._open_file("r+")
+            self._open()
+        paths.checkpoint_of(self._path).unlink(missing_ok=True)
 
     def _require_file(self) -> None:
         """Raise a FileError if somebody took the file away, or a part of it: HDF5 would write on into the void."""
-        mine = os.fstat(self._handle)
+        mine = os.fstat(self._handle.fileno())
         try:
             there = os.stat(self._part)
         except FileNotFoundError:
@@ -227,8 +242,14 @@ class TrajectoryWriter:
 
     def _abandon(self) -> None:
         """Let nothing more reach the file: what HDF5 still holds of a frame that failed would spoil those before it."""
+        try:
+            # HDF5 is not asked: of a file that it could not close it takes the process down with it.
+            if not os.path.samestat(os.fstat(self._descriptor), os.fstat(self._handle.fileno())):
+                return  # abandoned already
+        except (OSError, ValueError):
+            return  # closed
         void = os.open(os.devnull, os.O_RDWR)
-        os.dup2(void, self._file.id.get_vfd_handle())
+        os.dup2(void, self._descriptor)
         os.close(void)
 
 
@@ -257,13 +278,3 @@ def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, st
         "method": tomli_w.dumps(tables.table_of(method)),
         "storage": tomli_w.dumps(vars(storage)),
     }
-
-
-def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
-    """Raise a SceneError if `path` cannot become a new file."""
-    if not path.parent.is_dir():
-        raise SceneError(f"{what}: the folder {path.parent} does not exist; create it first")
-    if path.is_dir():
-        raise SceneError(f"{what}: expected a file name, got the folder {path}")
-    if path.exists() and not overwrite:
-        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it with --overwrite")

@@ -1,0 +1,76 @@
+"""Where a run writes: what its files are called, and which paths cannot become files."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError
+
+# Files that are gone when a run has ended have names that nobody else gives a file.
+_OURS = "swarm-"
+
+
+def path_of(name: str, value: Any) -> Path:
+    """The argument `name` as the path of a file; a symbolic link is the file it leads to.
+
+    Raises:
+        SceneError: it is no path, or an empty one.
+    """
+    if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
+        raise SceneError(f"{name} must be the path of a file, got {value!r}")
+    if not os.fspath(value) or "\0" in os.fspath(value):
+        raise SceneError(f"{name} must be the path of a file, got {os.fspath(value)!r}")
+    path = Path(value)
+    return path.resolve() if path.is_symlink() else path
+
+
+def checkpoint_of(trajectory: Path) -> Path:
+    """The checkpoint that goes with a trajectory."""
+    return trajectory.with_name(trajectory.name + ".checkpoint")
+
+
+def lock_of(trajectory: Path) -> Path:
+    """The file whose lock a run holds while it writes a trajectory."""
+    return trajectory.with_name(f".{trajectory.name}.{_OURS}lock")
+
+
+def part_of(path: Path) -> Path:
+    """What a file is called until it is whole."""
+    return path.with_name(f".{path.name}.{_OURS}part{path.suffix}")
+
+
+def identity(path: Path) -> tuple[int, int] | None:
+    """Tells one file from another that takes its name; None where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
+    """Raise a SceneError if `path` cannot become a new file."""
+    if not path.parent.is_dir():
+        raise SceneError(f"{what}: the folder {path.parent} does not exist; create it first")
+    if path.is_dir():
+        raise SceneError(f"{what}: expected a file name, got the folder {path}")
+    if path.exists() and not path.is_file():
+        raise SceneError(f"{what}: expected a file name, got {path}, which is a device or a pipe")
+    if path.exists() and not overwrite:
+        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it with --overwrite")
+
+
+def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:
+    """Raise a SceneError if an output is an input, or two outputs are one file; by what each of them is."""
+    seen = [(what, path) for what, path in inputs.items() if path is not None]
+    for what, path in ((what, path) for what, path in outputs.items() if path is not None):
+        for other, there in seen:
+            if _same(path, there):
+                raise SceneError(f"{what}: {path} is the {other} too; choose another name for one of them")
+        seen.append((what, path))
+
+
+def _same(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other)
+    return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
