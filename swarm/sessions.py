@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import math
+import os
 import time
 from pathlib import Path
 from types import TracebackType
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from . import checks
 from .errors import CompleteError, SceneError, WallTimeError
 from .methods.base import Method
+from .output import paths
 from .particles import Particles
 from .run import Run
 from .scene import Scene
@@ -45,11 +47,11 @@ class Session:
         self._told_to_stop = False
         self._trajectory, self._path = trajectory, None
         if trajectory is not None:
-            from .output.checkpoint import path_of  # h5py is not needed for it, but by whoever writes a trajectory
-
-            self._path = path_of(trajectory)
+            self._path = paths.checkpoint_of(trajectory)
         elif self._saves or resume:
             raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
+        # A digest of the particles at the start, for the trajectory.
+        self.start = ""
         self._job: Job | None = None
         self._arrays: Arrays | None = None
         self._held = contextlib.ExitStack()
@@ -80,20 +82,43 @@ class Session:
         """
         if self._trajectory is None or self._path is None:
             return
-        from .output.checkpoint import Job, digest_of
+        from .output import checkpoint
         from .output.lock import only_writer
-        from .output.writer import check_target, descriptions
+        from .output.writer import descriptions
 
-        check_target(self._trajectory, overwrite or self._resumes)
+        paths.check_target(self._trajectory, overwrite or self._resumes)
         self._held.enter_context(only_writer(self._trajectory))
-        if self._saves or self._resumes:
-            start = digest_of(particles)
-            texts: dict[str, Any] = {**descriptions(scene, method, storage)}
-            self._job = Job(VERSION, **texts, particles=len(particles), start=start)
-        if self._resumes:
+        if not self._resumes and os.path.lexists(self._path) and not checkpoint.is_one(self._path):
+            raise SceneError(
+                f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
+                "replace; move it away, or choose another name for the trajectory"
+            )
+        self.start = checkpoint.digest_of(particles)
+        texts: dict[str, Any] = {**descriptions(scene, method, storage)}
+        self._job = checkpoint.Job(VERSION, **texts, particles=len(particles), start=self.start)
+        if not self._resumes:
+            return
+        if self._path.exists():
             self._take_up(self._trajectory, until)
-        if self._arrays is None:
-            self._path.unlink(missing_ok=True)
+        elif self._trajectory.exists() and not overwrite:
+            self._refuse_to_begin_again(self._trajectory, until)
+
+    def _refuse_to_begin_again(self, trajectory: Path, until: float) -> None:
+        """Say what the trajectory of a run without checkpoint is."""
+        from .output.trajectory import load
+
+        assert self._job is not None
+        with load(trajectory) as before:
+            texts: dict[str, Any] = before.descriptions
+            there = dataclasses.replace(self._job, **texts, particles=before.count, start=before.start)
+            frames, last = len(before), before.times[-1:]
+        there.require_same(self._job, trajectory)
+        if frames and last[0] >= until:
+            raise CompleteError(f"{trajectory} is complete: its last frame is at {last[0]:g} s")
+        raise SceneError(
+            f"{self._path} must be there to resume from, got none: the run would begin again at 0 s and replace the "
+            f"{frames} frames of {trajectory}; to do so, overwrite it with --overwrite"
+        )
 
     def _take_up(self, trajectory: Path, until: float) -> None:
         from .output import checkpoint
@@ -101,14 +126,6 @@ class Session:
 
         assert self._job is not None
         assert self._path is not None
-        if not self._path.exists():
-            if trajectory.exists():
-                with load(trajectory) as before:
-                    texts: dict[str, Any] = before.descriptions
-                    dataclasses.replace(self._job, **texts, particles=before.count).require_same(self._job, trajectory)
-                    if len(before) and before.times[-1] >= until:
-                        raise CompleteError(f"{trajectory} is complete: its last frame is at {before.times[-1]:g} s")
-            return
         saved, arrays = checkpoint.read(self._path)
         saved.require_same(self._job, self._path)
         if not trajectory.exists():
@@ -187,5 +204,5 @@ class Session:
 
     def finish(self) -> None:
         """All frames are written: nothing is left to go on with."""
-        if self._path is not None:
+        if self._path is not None and (self._saves or self._arrays is not None):
             self._path.unlink(missing_ok=True)

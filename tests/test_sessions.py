@@ -16,7 +16,7 @@ from conftest import METHODS, rarely
 import swarm
 from examples import long_run
 from swarm import progress
-from swarm.output import checkpoint
+from swarm.output import checkpoint, paths
 from swarm.progress import lines
 from swarm.run import Run
 
@@ -109,7 +109,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
     path, whole = tmp_path / "run.h5", tmp_path / "whole.h5"
     stopped_at(path, 2, lambda: signal.raise_signal(number), **storage)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    saved, _arrays = checkpoint.read(checkpoint.path_of(path))
+    saved, _arrays = checkpoint.read(paths.checkpoint_of(path))
     assert (saved.frame, saved.time, saved.following) == (2, 1.0, None)
     with swarm.load(path) as half:
         assert len(half) == 3
@@ -117,7 +117,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
     resumed = run(path, resume=True, progress=lambda frame: numbers.append(frame.number), **storage)
     expected = run(whole, **storage)
     assert numbers == [3, 4]
-    assert not checkpoint.path_of(path).exists()
+    assert not paths.checkpoint_of(path).exists()
     assert np.array_equal(resumed.particles.position, expected.particles.position)
     with swarm.load(path) as one, swarm.load(whole) as other:
         assert len(one) == len(other) == 5
@@ -139,7 +139,7 @@ def test_the_wall_time_ends_a_run_in_the_middle_of_a_frame(tmp_path):
             break
         except swarm.WallTimeError:
             sessions, limit = sessions + 1, 1.3 * limit
-            within += checkpoint.read(checkpoint.path_of(path))[0].following is not None
+            within += checkpoint.read(paths.checkpoint_of(path))[0].following is not None
     assert sessions >= 2
     assert within >= 1
     expected = run(whole, until=6e6, every=2e6)
@@ -175,33 +175,67 @@ def test_a_longer_run_goes_on_from_a_shorter_one(tmp_path):
 def test_another_run_is_refused_with_both_values(tmp_path, change, words):
     path = tmp_path / "run.h5"
     stopped_at(path, 2)
-    before = [file.read_bytes() for file in (path, checkpoint.path_of(path))]
+    before = [file.read_bytes() for file in (path, paths.checkpoint_of(path))]
     with pytest.raises(swarm.SceneError) as caught:
         run(path, **{"resume": True, **change})
     for word in words:
         assert word in str(caught.value)
     if "every" not in change:
-        assert [file.read_bytes() for file in (path, checkpoint.path_of(path))] == before
+        assert [file.read_bytes() for file in (path, paths.checkpoint_of(path))] == before
     assert len(run(path, resume=True).observables["time"]) == 5
 
 
-def test_a_run_without_checkpoint_begins_again_and_another_one_is_left_alone(tmp_path):
+def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):
+    """The frames that are there are kept, whichever start they are of, until somebody says --overwrite."""
     path = tmp_path / "run.h5"
     stopped_at(path, 2)
-    checkpoint.path_of(path).unlink()
-    with pytest.raises(swarm.SceneError, match="number of particles is 20, got 30"):
-        run(path, resume=True, n=30)
+    paths.checkpoint_of(path).unlink()
+    frames = path.read_bytes()
+    for change, words in (
+        ({"n": 30}, "number of particles is 20, got 30"),
+        ({"seed": 2}, r"run\.h5 is of another run: its particles at the start .* have the digest"),
+        ({}, r"run\.h5\.checkpoint must be there .*begin again at 0 s and replace the 3 frames of .*--overwrite"),
+    ):
+        with pytest.raises(swarm.SceneError, match=words) as caught:
+            run(path, resume=True, **change)
+        assert not isinstance(caught.value, swarm.CompleteError)
+        assert path.read_bytes() == frames
     numbers = []
-    run(path, resume=True, progress=lambda frame: numbers.append(frame.number))
+    run(path, resume=True, overwrite=True, progress=lambda frame: numbers.append(frame.number))
     assert numbers == [0, 1, 2, 3, 4]
     with pytest.raises(swarm.CompleteError, match="is complete: its last frame is at 2 s"):
         run(path, resume=True)
+    with pytest.raises(swarm.SceneError, match="is of another run") as caught:
+        run(path, resume=True, seed=2)
+    assert not isinstance(caught.value, swarm.CompleteError)
+
+
+def test_to_resume_what_never_began_is_to_begin(tmp_path):
+    numbers = []
+    run(tmp_path / "run.h5", resume=True, progress=lambda frame: numbers.append(frame.number))
+    assert numbers == [0, 1, 2, 3, 4]
+
+
+def test_a_run_that_fails_at_its_first_frame_leaves_the_old_one_and_its_checkpoint(tmp_path, monkeypatch):
+    path = tmp_path / "run.h5"
+    stopped_at(path, 2)
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+
+    def fail(run, seen, moment):
+        raise swarm.RunError("at once")
+
+    monkeypatch.setattr(Run, "require_admissible", fail)
+    with pytest.raises(swarm.RunError, match="at once"):
+        run(path, overwrite=True, seed=2)
+    monkeypatch.undo()
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+    assert len(run(path, resume=True).observables["time"]) == 5
 
 
 def test_what_is_missing_or_damaged_is_said(tmp_path):
     path = tmp_path / "run.h5"
     stopped_at(path, 2)
-    saved = checkpoint.path_of(path)
+    saved = paths.checkpoint_of(path)
     whole, frames = saved.read_bytes(), path.read_bytes()
     position = checkpoint.read(saved)[1]["position"].tobytes()
     for spoiled in (whole[: len(whole) // 2], whole.replace(position, position[1:] + b"?"), b"", b"text"):
@@ -228,7 +262,7 @@ def test_a_new_run_forgets_the_old_checkpoint(tmp_path):
     path = tmp_path / "run.h5"
     stopped_at(path, 2)
     run(path, overwrite=True, n=5)
-    assert not checkpoint.path_of(path).exists()
+    assert not paths.checkpoint_of(path).exists()
 
 
 @pytest.mark.parametrize("keywords", [{"resume": True}, {"overwrite": True}])
@@ -236,7 +270,7 @@ def test_no_second_run_writes_the_same_trajectory(tmp_path, keywords):
     """While it runs it is refused and nothing is touched; the file is as if nobody had tried. What a kill left of the
     lock locks nobody out."""
     path = tmp_path / "run.h5"
-    (tmp_path / "run.h5.lock").touch()
+    paths.lock_of(path).touch()
 
     def meddle(frame):
         with pytest.raises(swarm.FileError, match=r"run\.h5 is being written by another run; wait until"):
@@ -274,7 +308,6 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monke
 
 def test_without_being_asked_for_there_is_no_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint, "save", lambda *arguments: pytest.fail("saved"))
-    monkeypatch.setattr(checkpoint, "digest_of", lambda *arguments: pytest.fail("digested"))
     run(tmp_path / "run.h5")
 
 
