@@ -1,6 +1,14 @@
 """`python -m swarm` is the command `swarm`."""
 
-from .cli import main
+from . import interrupt
+
+
+def main() -> None:
+    """Run the command line."""
+    with interrupt.at_once():
+        from .cli import main as command
+    command()
+
 
 if __name__ == "__main__":
     main()

@@ -1,6 +1,7 @@
 """The commands. No physics, and no heavy import before it is needed: --help must be fast."""
 
 import itertools
+import json
 import shlex
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from . import interrupt
 from .errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .version import VERSION
 
@@ -57,32 +59,44 @@ def run(
     live: Annotated[bool, typer.Option("--live", help="Show it in a Rerun viewer while it runs.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint, if there is one.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the last checkpoint of a run that was stopped.")
+    ] = False,
     walltime: Annotated[
         str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The summary as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="How it ended as JSON, however it ends.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
-    from . import scene_file as files
-    from .checks import duration
-    from .output.storage import Storage
-    from .output.writer import check_target
+    # What an exception does in the midst of an import nobody knows; nothing is open yet.
+    with interrupt.at_once():
+        from . import scene_file as files
+        from .checks import duration
+        from .output import paths
+        from .output.storage import Storage
+        from .simulation import simulate
+        from .summary import numbers
 
-    job = files.read(scene_file)
-    target = output or Path(job.run.trajectory or scene_file.with_suffix(".h5").name)
-    limit = None if walltime is None else duration("--walltime", walltime)
-    # Before particles are made and kernels compiled.
-    Storage(job.run.frames, job.run.precision, job.run.compression)
-    check_target(target, overwrite or resume)
-    shown = recording or (None if resume or not job.run.recording else Path(job.run.recording))
-    if shown is not None:
-        check_target(shown, overwrite, "recording")
+    def told(status: str, **more: Any) -> None:
+        if as_json:
+            print(json.dumps({"status": status, **more}, indent=2))
 
-    from .simulation import simulate
-
-    particles = job.particles()
     try:
+        with interrupt.at_once():
+            job = files.read(scene_file)
+            stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
+            target = paths.path_of("trajectory", output or stored)
+            limit = None if walltime is None else duration("--walltime", walltime)
+            named = recording or (None if resume else job.run.recording)
+            shown = None if named is None else paths.path_of("recording", named)
+            # Before particles are made and kernels compiled.
+            Storage(job.run.frames, job.run.precision, job.run.compression)
+            outputs = {"trajectory": target, "checkpoint": paths.checkpoint_of(target), "recording": shown}
+            paths.check_distinct(outputs, {"scene file": scene_file, "file of the particles": job.start_file()})
+            paths.check_target(target, overwrite or resume)
+            if shown is not None:
+                paths.check_target(shown, overwrite, "recording")
+            before, particles = paths.identity(target), job.particles()
         result = simulate(
             job.scene,
             particles,
@@ -106,28 +120,40 @@ def run(
             resume=resume,
             walltime=limit,
         )
-    except KeyboardInterrupt:
-        _stopped("interrupted", target, as_json)
-        raise typer.Exit(_INTERRUPTED) from None
-    except WallTimeError:
-        _stopped("walltime", target, as_json)
+    except (KeyboardInterrupt, WallTimeError) as stop:
+        status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
+        # A second signal ends what follows: the files are closed.
+        with interrupt.at_once():
+            began = resume or paths.identity(target) != before
+            told(status, **(numbers(target) if began else {"frames": 0}), resume=_stopped(status, target, began))
+        raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
+    except CompleteError as error:
+        print(error, file=sys.stderr)
+        told("complete", **numbers(target))
         return
-    except CompleteError as told:
-        print(told, file=sys.stderr)
-        return
-    if as_json:
-        _json("complete", target, wall_time=result.wall_time)
-    elif not quiet:
+    except SwarmError as error:
+        told("failed", error=str(error))
+        raise
+    told("complete", **numbers(target), wall_time=result.wall_time)
+    if not (quiet or as_json):
         _summary(result, particles.volume)
 
 
-def _stopped(why: str, target: Path, as_json: bool) -> None:
-    """Say how to go on with a run that was stopped."""
+def _stopped(status: str, target: Path, began: bool) -> str | None:
+    """Say how to go on with a run that was stopped: the command, or None where there is nothing to go on from."""
+    from .output import paths
+
+    reason = "interrupted" if status == "interrupted" else "the wall time is over"
+    if not began:
+        print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
+        return None
+    held = f"{reason}: {target} holds the frames that were finished"
+    if not paths.checkpoint_of(target).exists():
+        print(f"{held}; there was no time for a checkpoint to go on from", file=sys.stderr)
+        return None
     command = shlex.join(["swarm", *_words_again(sys.argv[1:]), "--resume"])
-    reason = "interrupted" if why == "interrupted" else "the wall time is over"
-    print(f"{reason}: {target} holds the frames that were finished; go on with\n  {command}", file=sys.stderr)
-    if as_json:
-        _json(why, target, resume=command)
+    print(f"{held}; go on with\n  {command}", file=sys.stderr)
+    return command
 
 
 def _words_again(words: list[str]) -> list[str]:
@@ -138,14 +164,6 @@ def _words_again(words: list[str]) -> list[str]:
         if name not in ("--overwrite", "--resume", "--live", "--record") and before != "--record":
             again.append(word)
     return again
-
-
-def _json(status: str, target: Path, **more: Any) -> None:
-    import json
-
-    from .summary import numbers
-
-    print(json.dumps({**numbers(status, target), **more}, indent=2))
 
 
 @app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")
@@ -219,9 +237,11 @@ def record(
 
     with needed_by("a recording", "record"):
         from .output import recording
+    from .output import paths
     from .output.trajectory import load
 
-    target = output or file.with_suffix(".rrd")
+    target = paths.path_of("recording", output or file.with_suffix(".rrd"))
+    paths.check_distinct({"recording": target}, {"trajectory": file})
     with load(file) as trajectory:
         recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
     print(f"written to {target} ({target.stat().st_size / 1e6:.1f} MB)")
@@ -250,7 +270,7 @@ def view(
         from .output import sheet
 
     target = output or file.with_suffix(".png")
-    _check_picture(target)
+    _check_picture(target, file)
     by = sheet.draw(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
     print(f"written to {target}; drawn by {by}")
 
@@ -270,16 +290,17 @@ def plot(
     from .output.trajectory import load
 
     target = output or file.with_suffix(".png")
-    _check_picture(target)
+    _check_picture(target, file)
     with load(file) as trajectory:
         plots.draw(trajectory, target)
     print(f"written to {target}")
 
 
-def _check_picture(target: Path) -> None:
+def _check_picture(target: Path, source: Path) -> None:
     """A picture is made again in no time: an old one is replaced."""
-    from .output.writer import check_target
+    from .output.paths import check_distinct, check_target
 
+    check_distinct({"picture": target}, {"file that it is drawn from": source})
     check_target(target, overwrite=True, what="picture")
     if target.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise SceneError(f"picture: expected a file name that ends in .png, .pdf or .svg, got {target}")
@@ -345,3 +366,5 @@ def main() -> None:
     except SwarmError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(_BAD_INPUT if isinstance(error, SceneError) else _FAILED)
+    finally:
+        interrupt.leave_at_once()

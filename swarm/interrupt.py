@@ -1,13 +1,46 @@
 """SIGINT and SIGTERM while a run is under way."""
 
 import contextlib
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
+# As a shell's for a process that SIGINT ended.
+_EXIT = 130
 _DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+
+
+@contextlib.contextmanager
+def at_once() -> Iterator[None]:
+    """Let a SIGINT end the process without another word than that, exit code 130.
+
+    For imports and the last words of a command: an exception in the midst of an import may be lost, or become another
+    one and a traceback.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield  # the caller handles it himself, or ignores it
+        return
+
+    leave_at_once()
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def leave_at_once() -> None:
+    """Let a SIGINT end the process from now on: there is nothing left to lose."""
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        os.write(sys.stderr.fileno(), b"interrupted\n")
+        os._exit(_EXIT)
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, leave)
 
 
 @contextlib.contextmanager

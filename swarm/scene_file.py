@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from . import tables
-from .checks import closest, count, listed
+from .checks import closest, count, listed, particles_fit
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
@@ -59,6 +59,10 @@ class Job:
     source: ParticlesTable
     path: Path
 
+    def start_file(self) -> Path | None:
+        """The file that the particles come from, if they do."""
+        return None if self.source.source is None else self.path.parent / self.source.source
+
     def particles(self) -> Particles:
         """The particles at the start, filled or read.
 
@@ -74,6 +78,7 @@ class Job:
         table = self.source
         if table.source is None:
             assert table.count is not None
+            particles_fit("count", table.count)
             return fill(
                 self.scene,
                 table.count,
@@ -82,7 +87,8 @@ class Job:
                 mass=1.0 if table.mass is None else table.mass,
                 seed=table.seed or 0,
             )
-        file = self.path.parent / table.source
+        file = self.start_file()
+        assert file is not None
         if file.suffix.lower() == ".csv":
             return Particles.from_csv(file)
         from .output.trajectory import load  # h5py only where it is used
@@ -99,9 +105,12 @@ def read(path: str | Path) -> Job:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        # As editors on Windows save it: with a mark of the byte order.
+        text = path.read_text(encoding="utf-8-sig")
         document = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except RecursionError:
+        raise SceneError(f"cannot read the scene file {path}: its arrays or tables are nested too deeply") from None
+    except (OSError, ValueError) as error:  # among the second: not UTF-8, not TOML, a number of too many digits
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
     try:
         return _job(document, text, path)

@@ -6,19 +6,13 @@ from typing import Any
 from .observables import drift
 
 
-def numbers(status: str, trajectory: Path) -> dict[str, Any]:
-    """A run's summary from its trajectory: what JSON can hold.
-
-    Args:
-        status: "complete", "interrupted" or "walltime".
-        trajectory: the file.
-    """
+def numbers(trajectory: Path) -> dict[str, Any]:
+    """A run's summary from its trajectory, which holds a frame: what JSON can hold."""
     from .output.trajectory import load
 
     with load(trajectory) as written:
         seen, particles = written.observables, written.count
     return {
-        "status": status,
         "trajectory": str(trajectory),
         "particles": particles,
         "frames": len(seen["time"]),
