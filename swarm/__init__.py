@@ -11,12 +11,13 @@ from .version import VERSION
 if TYPE_CHECKING:
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
+    from .frames import Frame
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .scene import Scene
-    from .simulation import Frame, Result, simulate
+    from .simulation import Result, simulate
     from .surfaces import (
         Box,
         Capsule,
@@ -38,12 +39,13 @@ __version__ = VERSION
 _HOMES = {
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
+    "frames": ("Frame",),
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
-    "simulation": ("Frame", "Result", "simulate"),
+    "simulation": ("Result", "simulate"),
     "surfaces": (
         "Box",
         "Capsule",

@@ -5,20 +5,22 @@ functions that is chosen by the type of its first argument: at compile time insi
 plain Python, from the same definitions.
 """
 
+import contextlib
 import functools
 import hashlib
 import importlib
 import importlib.util
+import logging
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
 from numba.np import linalg as blas
@@ -87,12 +89,36 @@ _CACHE = cache_folder()
 _CONFIG: Any = numba.config
 
 
+_LOG = logging.getLogger("swarm")
+_kernels: list[Any] = []
+_COMPILING = "compiling a kernel for this kind of scene ({}), once: the next run finds it"
+
+
+@contextlib.contextmanager
+def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
+    """Tell the logger and `tell`, by a sentence, of every kernel that is compiled in this context."""
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, compiled: Any) -> None:
+            if compiled.data["dispatcher"] in _kernels:
+                sentence = _COMPILING.format(compiled.data["dispatcher"].__name__)
+                _LOG.info(sentence)
+                tell(sentence)
+
+        def on_end(self, compiled: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
+
+
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
     previous = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(_CACHE)
     try:
         compiled: F = numba.njit(cache=True, **_FLAGS)(function)
+        _kernels.append(compiled)
         return compiled
     finally:
         _CONFIG.CACHE_DIR = previous

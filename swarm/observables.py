@@ -113,14 +113,22 @@ def observe(law, chain, gravity, state, drawn, size, partial):
 
 
 @kernel
-def count_escaped(chain, gravity, far, state):
-    """Particles that no wall will stop: farther away than `far`, or in a straight flight that meets none."""
+def count_escaped(chain, gravity, far, faces, state):
+    """Particles that are on their way out of an open scene, and will not come back.
+
+    Those farther from the origin than `far`; those in a straight flight that meets no wall; and those beyond one of the
+    open `faces`, rows (n, offset), that fly on in its direction n: walls beside that face go on without end, and would
+    stop them, but not from going.
+    """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(position.shape[1]):
         x, y, z = position[0, i], position[1, i], position[2, i]
-        count += _escapes(gravity, chain, x, y, z, velocity[0, i], velocity[1, i], velocity[2, i]) or (
-            x * x + y * y + z * z > far * far
-        )
+        vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
+        out = x * x + y * y + z * z > far * far
+        for k in range(faces.shape[0]):
+            nx, ny, nz = faces[k, 0], faces[k, 1], faces[k, 2]
+            out |= (nx * x + ny * y + nz * z > faces[k, 3]) & (nx * vx + ny * vy + nz * vz > 0.0)
+        count += out or _escapes(gravity, chain, x, y, z, vx, vy, vz)
     return count
 
 

@@ -28,18 +28,21 @@ class Display:
         within: is called with the time that the particles have reached on average on the way to the next frame, and
             the time of the end.
         every: seconds of wall time from one such call to the next.
+        compiling: is called with a sentence whenever a kernel is compiled.
     """
 
     frame: Callable[[Any], None]
     within: Callable[[float, float], None] = _nothing
     every: float = math.inf
+    compiling: Callable[[str], None] = _nothing
 
 
 @contextlib.contextmanager
 def display(progress: bool | Callable[[Any], None]) -> Iterator[Display]:
     """Nothing, the caller's own function, or a bar or lines on standard error."""
     if callable(progress):
-        yield Display(progress)
+        # What it does with the observables is no matter of the run's.
+        yield Display(lambda frame: progress(frame.apart()))
     elif not progress:
         yield Display(_nothing)
     elif sys.stderr.isatty():
@@ -61,7 +64,7 @@ def _bar() -> Iterator[Display]:
     )
     recent = _Recent()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=1.0, line="compiling (the next run will not)")
+        task = bar.add_task("", total=1.0, line="")
 
         def frame(done: Any) -> None:
             line = recent.frame(done)
@@ -71,7 +74,10 @@ def _bar() -> Iterator[Display]:
         def within(moment: float, until: float) -> None:
             bar.update(task, completed=moment / until, line=recent.within(moment, until))
 
-        yield Display(frame, within, _A_MOMENT)
+        def compiling(sentence: str) -> None:
+            bar.update(task, line=sentence, refresh=True)
+
+        yield Display(frame, within, _A_MOMENT, compiling)
 
 
 def lines(interval: float) -> Display:
@@ -93,7 +99,10 @@ def lines(interval: float) -> Display:
     def within(moment: float, until: float) -> None:
         tell(moment / until, recent.within(moment, until))
 
-    return Display(frame, within, interval)
+    def compiling(sentence: str) -> None:
+        print(sentence, file=sys.stderr, flush=True)
+
+    return Display(frame, within, interval, compiling)
 
 
 class _Recent:

@@ -48,6 +48,7 @@ class Run:
             _no_sweeps(n) if method.has_multipliers() else None,
         )
         self._far = _FAR * scene.extent() if scene.is_open() else math.inf
+        self._faces = scene.open_faces()
         self._too_fast = functools.partial(method.too_fast, scene)
         self._failure, self._owners, self._scene = method.failure, scene.owners(), scene
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
@@ -55,7 +56,7 @@ class Run:
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
         # Whole chunks, so that a thread observes what it has advanced.
-        self._size = observables.CHUNK * max(1, round((block_size or 0) / observables.CHUNK))
+        self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._draws = math.ceil(n / self._size)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
@@ -188,7 +189,7 @@ class Run:
         escaped = 0
         if self._far < math.inf:
             with np.errstate(divide="ignore", invalid="ignore"):
-                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self.state))
+                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self._faces, self.state))
         return {**seen, "escaped": escaped}
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:

@@ -16,6 +16,8 @@ from .surfaces import base
 from .surfaces.base import Box, Surface
 from .surfaces.chain import Chain, chain_of
 
+# Walls that kernels can be compiled for: of 24 with `contact_step` it takes three minutes, of 28 it fails.
+MOST_WALLS = 24
 # The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
 _STARTS = 512
 _MOVES = 30
@@ -24,6 +26,8 @@ _NEAREST = 32
 _STEPS = 100
 # Each move aims this far, relative to the gap: a little past the surface, so that thin volumes are hit.
 _PAST = 1.05
+# Points whose gaps are found at once.
+_BATCH = 4096
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6
 
@@ -37,7 +41,7 @@ class Scene:
         gravity: None, or three numbers (gx, gy, gz) [m/s^2].
 
     Raises:
-        SceneError: no surface, or surfaces that leave no volume.
+        SceneError: no surface, more than 24 walls, or surfaces that leave no volume.
 
     >>> import swarm
     >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
@@ -56,6 +60,13 @@ class Scene:
                 raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
         pull = None if gravity is None else checks.vector("gravity", gravity)
         object.__setattr__(self, "surfaces", surfaces)
+        walls = len(self.owners())
+        if walls > MOST_WALLS:
+            raise SceneError(
+                f"surfaces must have at most {MOST_WALLS} walls in all, got {walls} of {len(surfaces)} surfaces: each "
+                "wall is compiled into the kernels, and of more the compiler runs out of its stack; leave some out (a "
+                "box has 3 walls, a capped cylinder 2, most others 1)"
+            )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
         if not self._has_volume():
             raise SceneError(
@@ -107,9 +118,27 @@ class Scene:
         slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
         return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
+    def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
+        """Which of the points (3, N) are farther outside than this distance [m], or where phi is no number."""
+        found = []
+        # Few at once, so that what NumPy has computed is still in the processor's cache.
+        for begin in range(0, points.shape[1], _BATCH):
+            batch = points[:, begin : begin + _BATCH]
+            suspects = np.flatnonzero(~(self.gaps(batch) <= 0.0).all(axis=0))
+            if suspects.size:
+                near = (self.distances_outside(batch[:, suspects]) <= distance).all(axis=0)
+                found.append(begin + suspects[~near])
+        return np.concatenate(found) if found else np.empty(0, np.intp)
+
     def is_open(self) -> bool:
         """Whether a particle may fly to infinity."""
         return not np.isfinite(self.bounds()).all()
+
+    def open_faces(self) -> NDArray[np.float64]:
+        """Faces without a wall that gravity pulls nothing back through, rows (n, offset): beyond is n.r > offset."""
+        faces = [(*n, offset) for surface in self.surfaces for n, offset in surface.open_faces()]
+        rows = np.array(faces).reshape(-1, 4)
+        return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]
 
     def bounds(self) -> Box:
         """A box (lower, upper) around the admissible volume; infinite where that is open."""

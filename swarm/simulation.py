@@ -1,10 +1,10 @@
-"""From a scene to frames: checks, the loop over frames, and what hears of them."""
+"""From a scene to frames: checks, the loop over frames, and who is told of them."""
 
 import contextlib
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import checks, interrupt
+from ._jit import kernels_compiled
 from .errors import SceneError
+from .frames import Frame, FrameTimes
 from .methods.base import Method
+from .output import paths
 from .output.storage import Storage
 from .particles import Multipliers, Particles
 from .run import Run
@@ -26,21 +29,8 @@ if TYPE_CHECKING:
     from .progress import Display
 
 _LOG = logging.getLogger("swarm")
-# Frames nearer to `until` than this part of `every` are `until`.
-_SAME_TIME = 1e-9
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
-
-
-@dataclass(frozen=True)
-class Frame:
-    """What is known when a frame is done: for progress displays."""
-
-    number: int
-    time: float
-    until: float
-    observables: dict[str, Any]
-    written: int = 0  # frames that the trajectory holds for sure
 
 
 @dataclass(frozen=True)
@@ -112,7 +102,7 @@ def simulate(
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
         progress: True for a progress bar, or a function that is called with every `Frame`.
-        overwrite: replace an existing trajectory and recording.
+        overwrite: replace an existing recording, and an existing trajectory as soon as the first frame is whole.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes on at once. Results do not depend on it.
         frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
@@ -120,7 +110,8 @@ def simulate(
         compression: of the frames, "none", "gzip" or "lzf".
         checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none is made. It lies beside
             the trajectory, as TRAJECTORY.checkpoint, until the run is complete.
-        resume: go on from that checkpoint, if there is one, with the same bits as if the run had never stopped.
+        resume: go on from that checkpoint, with the same bits as if the run had never stopped; begin where there is
+            neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops.
 
     Returns:
@@ -139,13 +130,17 @@ def simulate(
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    target = None if trajectory is None else Path(trajectory)
+    target = None if trajectory is None else paths.path_of("trajectory", trajectory)
+    recorded = None if recording is None else paths.path_of("recording", recording)
+    paths.check_distinct(
+        {"trajectory": target, "checkpoint": target and paths.checkpoint_of(target), "recording": recorded}, {}
+    )
     session = Session(target, checkpoint, resume, walltime)
-    times = _frame_times(until, every)
+    times = FrameTimes(until, every)
     threads = _threads(threads)
     if block_size is not None:
         checks.count("block_size", block_size)
-    _check(scene, particles, method, until, every)
+    particles = _checked(scene, particles, method, times)
 
     if scene.is_open():
         _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
@@ -154,38 +149,44 @@ def simulate(
 
     storage = Storage(frames, precision, compression)
     shown = {"particles": record_particles, "color": record_color, "megabytes": record_megabytes, "live": live}
-    recorder = _recording(recording, overwrite, resume, scene, method, particles, _frame_times(until, every), shown)
-    with session:
-        session.prepare(scene, method, storage, particles, until, overwrite)
+    recorder = _recording(recorded, overwrite, resume, scene, method, particles, times, shown)
+    runs: list[Run] = []
+
+    def stop() -> None:
+        session.stop()
+        for run in runs:
+            run.halt()
+
+    with session, interrupt.taken_by(stop), display(progress) as show, kernels_compiled(show.compiling):
+        session.prepare(scene, method, storage, particles, times.until, overwrite)
+        numbers = storage.bytes_of(len(particles))
+        times.require_room(session.first, target, numbers, len(scene.surfaces), storage.compression != "none")
 
         run = Run(scene, particles, method, threads, block_size)
+        runs.append(run)
         session.restore(run)
         history: list[dict[str, Any]] = []
         writer = _output(
-            _trajectory(target, storage, scene, method, particles, scene_text, session.first),
+            _trajectory(target, storage, scene, method, particles, scene_text, session),
             storage.kept(),
             recorder,
             len(particles),
         )
         writing = writer or contextlib.nullcontext(lambda *frame: None)
 
-        def stop() -> None:
-            session.stop()
-            run.halt()
-
-        with run, interrupt.taken_by(stop), writing as write, display(progress) as show:
+        with run, writing as write:
             for number, before, moment in times:
                 session.require_same_time(number, moment)
                 if number < session.first:
                     continue
-                _reach(run, session, writer, method, show, number, before, moment, until)
+                _reach(run, session, writer, method, show, number, before, moment, times.until)
                 seen = {"time": moment, **run.seen()}
                 run.require_admissible(seen, moment)
                 if target is None:
                     history.append(seen)
                 write(number, moment, run.state, seen)
-                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
-                if moment < until:
+                show.frame(Frame(number, moment, times.until, seen, writer.written if writer else 0))
+                if moment < times.until:
                     session.look(run, writer, number, moment, None)
         session.finish()
         return Result(
@@ -225,51 +226,35 @@ def _read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
         return written.observables
 
 
-def _frame_times(until: float, every: float | None) -> Iterator[tuple[int, float, float]]:
-    """0, every, 2 every, ..., until: number, the time before, the time."""
-    end = checks.number("until", until)
-    if end <= 0.0:
-        raise SceneError(f"until must be after the start, 0 s, got {end:g}")
-    gap = end if every is None else checks.positive("every", every)
-    if gap > end:
-        raise SceneError(f"every must be at most until = {end:g}, got {gap:g}")
-
-    def times() -> Iterator[tuple[int, float, float]]:
-        number, before = 0, 0.0
-        while number * gap < end - _SAME_TIME * gap:
-            yield number, before, number * gap
-            before = number * gap
-            number += 1
-        yield number, before, end
-
-    return times()
-
-
 def _threads(threads: int | None) -> int:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return cores if threads is None else checks.count("threads", threads)
 
 
-def _check(scene: Scene, particles: Particles, method: Method, until: float, every: float | None) -> None:
+def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTimes) -> Particles:
+    """The particles as they will run, all arguments being right."""
     for name, value, kind in (("scene", scene, Scene), ("particles", particles, Particles), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
     # The arrays of Particles may have been changed since it checked them.
-    particles = Particles(particles.position, particles.velocity, particles.mass)
+    particles = particles.checked()
     method.check(scene, particles)
-    method.span("until", until)
-    method.span("every", until if every is None else every)
-    distances = scene.distances_outside(particles.position)
-    outside = distances.max(axis=0) > _ON_THE_WALL * _magnitude(scene, particles)
-    if outside.any():
-        first = int(np.argmax(outside))
-        wall = int(distances[:, first].argmax())
-        phi = float(scene.surfaces[wall].phi(particles.position[:, first : first + 1])[0])
+    assert times.every is not None
+    method.span("until", times.until)
+    method.span("every", times.every)
+    outside = scene.outside(particles.position, _ON_THE_WALL * _magnitude(scene, particles))
+    if outside.size:
+        first = int(outside[0])
+        point = particles.position[:, first : first + 1]
+        distances = scene.distances_outside(point)[:, 0]
+        wall = int(np.argmax(np.where(np.isnan(distances), np.inf, distances)))
+        phi = float(scene.surfaces[wall].phi(point)[0])
         raise SceneError(
-            f"particles must start inside their walls, got {int(outside.sum())} of {len(particles)} outside; the first "
-            f"is particle {first} at {tuple(particles.position[:, first].tolist())}, where phi = {phi:.6g} of "
-            f"surfaces[{wall}] ({type(scene.surfaces[wall]).__name__})"
+            f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first "
+            f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
+            f"({type(scene.surfaces[wall]).__name__})"
         )
+    return particles
 
 
 def _magnitude(scene: Scene, particles: Particles) -> float:
@@ -284,23 +269,23 @@ def _trajectory(
     method: Method,
     particles: Particles,
     scene_text: str | None,
-    first: int,
+    session: Session,
 ) -> "Writer | None":
     if path is None:
         return None
     from .output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    return TrajectoryWriter(path, storage, scene, method, particles, scene_text, first > 0)
+    return TrajectoryWriter(path, storage, scene, method, particles, scene_text, session.start, session.first > 0)
 
 
 def _recording(
-    path: str | os.PathLike[str] | None,
+    path: Path | None,
     overwrite: bool,
     resume: bool,
     scene: Scene,
     method: Method,
     particles: Particles,
-    times: Iterator[Any],
+    times: FrameTimes,
     shown: dict[str, Any],
 ) -> "Writer | None":
     """What records for Rerun, if anything is to be."""
@@ -316,8 +301,7 @@ def _recording(
     with needed_by("a recording", "record"):
         from .output.recording import RecordingWriter, Settings  # rerun takes half a second
 
-    target, frames = None if path is None else Path(path), sum(1 for _time in times)
-    return RecordingWriter(target, overwrite, scene, method, particles, frames, Settings(**shown))
+    return RecordingWriter(path, overwrite, scene, method, particles, times.count, Settings(**shown))
 
 
 def _output(trajectory: "Writer | None", kept: slice, recording: "Writer | None", n: int) -> "Beside | None":

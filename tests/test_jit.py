@@ -267,6 +267,26 @@ def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
 
 
 @compiled_only
+def one_more(x):
+    return x + 1.0
+
+
+@compiled_only
+def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(_jit, "_CACHE", tmp_path)
+    told = []
+    with caplog.at_level("INFO", "swarm"), _jit.kernels_compiled(told.append):
+        first = _jit.kernel(one_more)
+        assert first(1.0) == first(1.0) == 2.0
+        numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
+    sentence = "compiling a kernel for this kind of scene (one_more), once: the next run finds it"
+    assert told == caplog.messages == [sentence]
+    first(1)  # nobody listens
+    with _jit.kernels_compiled(told.append):
+        assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
+    assert told == [sentence]
+
+
 def test_no_kernel_waits_for_scipy():
     """Numba imports it before its first kernel, for products of matrices; a kernel that has them finds it still."""
     code = """
@@ -303,7 +323,8 @@ LAYERS = [
     ["scene", "particles"],
     ["contact"],
     ["surfaces"],
-    ["gravity", "checks"],
+    ["frames", "gravity"],
+    ["checks"],
     ["status", "_jit", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}

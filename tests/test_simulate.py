@@ -7,6 +7,7 @@ import pytest
 import swarm
 from swarm import blocks
 from swarm.run import Run
+from swarm.surfaces import rotation
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -207,6 +208,85 @@ def test_numbers_spoiled_after_construction_are_refused(name):
     getattr(particles, name)[..., 3] = np.nan
     with pytest.raises(swarm.SceneError, match=rf"{name} must be .* particle 3"):
         swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "assigned", "as_run"),
+    [
+        ("velocity", np.array([[2], [0], [0]]), [[2.0], [0.0], [0.0]]),
+        ("velocity", np.array([[0.1], [0.7], [0.0]], np.float32), np.array([[0.1], [0.7], [0.0]], np.float32)),
+        ("velocity", [[0.1], [0.7], [0.0]], [[0.1], [0.7], [0.0]]),
+        ("velocity", np.asfortranarray([[0.1], [0.7], [0.0]]), [[0.1], [0.7], [0.0]]),
+        ("position", [0.1, 0.2, 0.0], [[0.1], [0.2], [0.0]]),
+        ("mass", 3, [3.0]),
+        ("mass", np.float32(0.1), [np.float32(0.1)]),
+    ],
+)
+def test_what_is_assigned_to_particles_runs_as_what_it_says(name, assigned, as_run):
+    """Arrays of whole numbers would take the kernel's velocities without their fractions."""
+    arrays = {"position": np.array([[0.1], [0.2], [0.0]]), "velocity": np.array([[0.3], [0.4], [0.5]]), "mass": [1.0]}
+    expected = swarm.Particles(**{**arrays, name: np.asarray(as_run, np.float64)})
+    particles = swarm.Particles(**arrays)
+    setattr(particles, name, assigned)
+    whole, other = (swarm.simulate(SPHERE, one, swarm.Impact(), until=5.0, threads=1) for one in (expected, particles))
+    assert np.array_equal(whole.particles.position, other.particles.position)
+    assert np.array_equal(whole.particles.velocity, other.particles.velocity)
+    assert other.particles.velocity.dtype == np.float64
+    assert other.observables["kinetic_energy"].tolist() == whole.observables["kinetic_energy"].tolist()
+    assert getattr(particles, name) is assigned
+
+
+@pytest.mark.parametrize(
+    ("name", "assigned", "words"),
+    [
+        ("velocity", np.ones((3, 5)) * 1j, "velocity must be an array of numbers, got complex128"),
+        ("position", np.ma.masked_less(np.zeros((3, 5)), 1.0), "position must be an array without a mask"),
+        ("velocity", "fast", "velocity must be an array of numbers, got str"),
+        ("velocity", np.zeros((3, 4)), r"velocity must have the shape of position, \(3, 5\), got \(3, 4\)"),
+        ("velocity", np.full((3, 5), 1e300), r"velocity must be finite and at most 1e\+100"),
+        ("mass", 0, "mass must be a finite number above 0"),
+    ],
+)
+def test_what_particles_would_not_take_is_refused(name, assigned, words):
+    particles = swarm.fill(SPHERE, 5, speed=1.0)
+    setattr(particles, name, assigned)
+    with pytest.raises(swarm.SceneError, match=words):
+        swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
+
+
+def test_a_phi_that_is_no_number_is_outside():
+    wall = swarm.Formula("x**2 + y**2 + z**2 - 0.25 + log(z + 0.4)/1e3", bounds=((-0.6, -0.6, -0.39), (0.6, 0.6, 0.6)))
+    start = swarm.Particles([[0.0], [0.0], [-0.41]], np.ones((3, 1)))
+    with pytest.raises(swarm.SceneError, match=r"1 of 1 outside; .* where phi = nan of surfaces\[0\]"):
+        swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(), until=1.0)
+
+
+def test_a_huge_block_is_all_particles():
+    assert np.array_equal(_run(block_size=10**30).particles.position, _run().particles.position)
+
+
+@pytest.mark.parametrize("side", ["+z", "-x"])
+@pytest.mark.parametrize("gravity", [None, "out", "back", "across"])
+def test_who_is_beyond_an_open_face_has_escaped(side, gravity):
+    """The walls beside it go on without end, and stop nobody from going; gravity may."""
+    turn = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
+    box = swarm.Box((0.5, 0.4, 0.3), center=(0.1, 0.2, 0.3), open=[side], rotation=turn)
+    axes = rotation.matrix(rotation.quaternion("turn", turn))
+    normal = axes[:, "xyz".index(side[1])] * (1.0 if side[0] == "+" else -1.0)
+    pulls = {None: None, "out": 0.5 * normal, "back": -50.0 * normal, "across": np.cross(normal, (0.3, 0.2, 0.1))}
+    scene = swarm.Scene([box], pulls[gravity])
+    start = np.array(box.center)[:, None] + axes @ np.random.default_rng(1).uniform(-0.29, 0.29, (3, 200))
+    velocity = np.random.default_rng(2).normal(size=(3, 200))
+    result = swarm.simulate(scene, swarm.Particles(start, velocity), swarm.Impact(), until=1.0, every=0.25, threads=1)
+    half = box.half_widths["xyz".index(side[1])]
+    beyond = normal @ (result.particles.position - np.array(box.center)[:, None]) > half
+    leaving = normal @ result.particles.velocity > 0.0
+    escaped = result.observables["escaped"]
+    if gravity == "back":
+        assert escaped.tolist() == [0] * 5
+    else:
+        assert escaped[-1] == (beyond & leaving).sum() == beyond.sum() > 50
+        assert (np.diff(escaped) >= 0).all()
 
 
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):

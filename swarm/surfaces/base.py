@@ -84,6 +84,10 @@ class Surface:
         """Half-spaces n.r <= offset that hold the admissible side, where they say more than `bounds`."""
         return []
 
+    def open_faces(self) -> list[HalfSpace]:
+        """Where the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
+        return []
+
     def is_solid(self) -> bool:
         """Whether particles are kept out of it rather than in it."""
         return getattr(self, "side", "inside") == "outside"
@@ -95,13 +99,16 @@ class Surface:
     def phi(self, points: ArrayLike) -> NDArray[np.float64]:
         """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,)."""
         rows = _rows(points)
-        return np.asarray(np.maximum.reduce([phi(wall, *rows) for wall in self.walls()]))
+        # Where a formula has no value it is NaN, which is outside.
+        with np.errstate(all="ignore"):
+            return np.asarray(np.maximum.reduce([phi(wall, *rows) for wall in self.walls()]))
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
         rows = _rows(points)
-        parts = [np.array(np.broadcast_arrays(*gradient(wall, *rows), rows[0])[:3]) for wall in self.walls()]
-        largest = np.argmax([phi(wall, *rows) for wall in self.walls()], axis=0)
+        with np.errstate(all="ignore"):
+            parts = [np.array(np.broadcast_arrays(*gradient(wall, *rows), rows[0])[:3]) for wall in self.walls()]
+            largest = np.argmax([phi(wall, *rows) for wall in self.walls()], axis=0)
         return np.asarray(np.choose(largest, parts))
 
 

@@ -63,6 +63,15 @@ class Box(base.Surface):
             return tuple(parts)
         return (body(parts, math.hypot(*self.center)),)
 
+    def open_faces(self) -> list[base.HalfSpace]:
+        axes = rotations.matrix(self.rotation).T
+        planes = []
+        for face in self.open:
+            i = "xyz".index(face[1])
+            x, y, z = (axes[i] if face[0] == "+" else -axes[i]).tolist()
+            planes.append(((x, y, z), _face((x, y, z), self.half_widths[i], self.center).offset))
+        return planes
+
     def size(self) -> float:
         return min(self.half_widths)
 

@@ -1,0 +1,104 @@
+"""The frames of a run: when they are, how much they take, and what is told of each."""
+
+import copy
+import logging
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from . import checks
+from .errors import SceneError
+
+_LOG = logging.getLogger("swarm")
+# Frames nearer to `until` than this part of `every` are `until`.
+_SAME_TIME = 1e-9
+# More frames than any run has, but a number.
+_MOST = 1e300
+# Bytes of a frame's observables: numbers in a file, Python's objects for them in memory; and of one surface more.
+_NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 8
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What is known when a frame is done: for progress displays."""
+
+    number: int
+    time: float
+    until: float
+    observables: dict[str, Any]
+    written: int = 0  # frames that the trajectory holds for sure
+
+    def apart(self) -> "Frame":
+        """The same with observables of its own: who is given it may change them."""
+        return replace(self, observables=copy.deepcopy(self.observables))
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """0, every, 2 every, ..., until: an iterator over number, the time before, and the time [s].
+
+    Args:
+        until: the end, above 0.
+        every: time between frames, at most `until`; None: only the first and the last.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> [time for _number, _before, time in FrameTimes(1.0, 0.4)]
+    [0.0, 0.4, 0.8, 1.0]
+    """
+
+    until: float
+    every: float | None = None
+
+    def __post_init__(self) -> None:
+        end = checks.number("until", self.until)
+        if end <= 0.0:
+            raise SceneError(f"until must be after the start, 0 s, got {end:g}")
+        gap = end if self.every is None else checks.positive("every", self.every)
+        if gap > end:
+            raise SceneError(f"every must be at most until = {end:g}, got {gap:g}")
+        object.__setattr__(self, "until", end)
+        object.__setattr__(self, "every", gap)
+
+    @property
+    def count(self) -> int:
+        """How many there are: more than `len` may return, if `every` is tiny."""
+        assert self.every is not None
+        return 1 + max(1, math.ceil(min(self.until / self.every, _MOST) - _SAME_TIME))
+
+    def __iter__(self) -> Iterator[tuple[int, float, float]]:
+        assert self.every is not None
+        before = 0.0
+        for number in range(self.count - 1):
+            yield number, before, number * self.every
+            before = number * self.every
+        yield self.count - 1, before, self.until
+
+    def require_room(self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool) -> None:
+        """Raise a SceneError if the frames from `first` on fit neither the disk nor, without a file, the memory.
+
+        Args:
+            first: number of the first frame that is to be kept.
+            target: the trajectory, or None.
+            numbers: bytes of the particles in a frame.
+            surfaces: how many there are.
+            packed: whether the file is compressed; it is not known then how small it becomes.
+        """
+        frames = self.count - first
+        if target is None:
+            size, room, where = frames * (_OBJECTS + _SURFACE * surfaces), checks.memory(), "this machine's memory"
+        else:
+            size = frames * (numbers + _NUMBERS + _SURFACE * surfaces)
+            there = target.stat().st_size if target.exists() else 0
+            room, where = shutil.disk_usage(target.parent).free + there, f"what is free in {target.parent.resolve()}"
+        told = f"{frames} frames, {'at most ' * packed}{checks.in_bytes(size)}"
+        if size > room and not packed:
+            raise SceneError(
+                f"every must leave frames that fit, got {self.every:g} s until {self.until:g} s: {told}, and {where} "
+                f"is {checks.in_bytes(room)}; make every longer"
+            )
+        _LOG.info("the run has %s", told)
