@@ -1,20 +1,20 @@
 """A long run that is stopped and resumed twice on its way: what it conserves, and what it takes.
 
 `python -m examples.long_run` gives 5 000 particles in an ellipsoid 10^6 impacts each, 5 10^9 in all, in three
-processes: the first two stop at their limit of wall time, whatever they are at, and the next goes on from the
-checkpoint.
+processes: the first two are told to stop (SIGTERM) at frames 50 and 300, and the next goes on from the checkpoint.
 `--particles` and `--impacts` make it shorter.
 """
 
 import argparse
 import json
+import signal
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 import swarm
 
@@ -22,31 +22,8 @@ SEMI_AXES = (0.3, 0.3, 0.6)
 SPEED = 0.5
 # Impacts a second of a particle in this cavity at this speed: a fourth of its surface over its volume, times the speed.
 RATE = 1.0682
-FRAMES = 500
-
-
-def scene_file(particles: int, impacts: float) -> str:
-    """The scene, with frames of every fiftieth particle."""
-    until = impacts / RATE
-    return f"""
-[particles]
-count = {particles}
-speed = {SPEED}
-seed = 1
-
-[[surface]]
-kind = "ellipsoid"
-semi_axes = {list(SEMI_AXES)}
-
-[method]
-kind = "impact"
-
-[run]
-until = {until!r}
-every = {until / FRAMES!r}
-frames = {max(1, particles // 100)}
-checkpoint = 5.0
-"""
+FRAMES, STOPS = 500, (50, 300)
+TRAJECTORY = "long.h5"
 
 
 def joachimsthal(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -56,48 +33,58 @@ def joachimsthal(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     return across**2 - (a * velocity**2).sum(axis=0) * ((a * position**2).sum(axis=0) - 1.0)
 
 
-def session(folder: Path, *limit: str) -> tuple[dict, list[int]]:
-    """One process of the run: its summary, and its memory [kB] twice a second."""
-    command = [sys.executable, "-m", "swarm", "run", "long.toml", "--resume", "--json", *limit]
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        memory = []
-        while process.poll() is None:
-            time.sleep(0.5)
-            try:
-                status = Path(f"/proc/{process.pid}/status").read_text()
-            except OSError:
-                break
-            memory += [int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS")]
-        told = json.load(process.stdout)
-    if process.returncode != 0:
-        raise SystemExit(f"the run failed with exit code {process.returncode}")
-    return told, memory
+def session(folder: Path, particles: int, impacts: float, stop: int | None) -> dict:
+    """The run from where it is to frame `stop`, or to its end: how it ended, and this process's memory on the way."""
+    scene = swarm.Scene([swarm.Ellipsoid(SEMI_AXES)])
+    until = impacts / RATE
+    memory = {}
+
+    def watch(frame: swarm.Frame) -> None:
+        memory[frame.number] = psutil.Process().memory_info().rss / 2**20
+        if frame.number == stop:
+            signal.raise_signal(signal.SIGTERM)
+
+    told = {"status": "stopped", "wall time [s]": None}
+    try:
+        result = swarm.simulate(
+            scene, swarm.fill(scene, particles, speed=SPEED, seed=1), swarm.Impact(), until=until, every=until / FRAMES,
+            trajectory=folder / TRAJECTORY, frames=max(1, particles // 100), checkpoint=5.0, resume=True, progress=watch,
+        )  # fmt: skip
+        told = {"status": "complete", "wall time [s]": result.wall_time}
+    except KeyboardInterrupt:
+        pass
+    numbers = sorted(memory)
+    quarter = numbers[len(numbers) // 4]
+    return {**told, "frames": numbers[-1] + 1, "memory [MB]": [memory[quarter], memory[numbers[-1]]]}
 
 
-def main(particles: int = 5_000, impacts: float = 1e6, limit: float = 15.0, folder: Path | None = None) -> dict:
-    """Run, stop and resume it twice; the report's figures."""
+def main(particles: int = 5_000, impacts: float = 1e6, folder: Path | None = None) -> dict:
+    """Run, stop and resume it twice, each time in another process; the report's figures."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = folder or Path(temporary)
-        (folder / "long.toml").write_text(scene_file(particles, impacts))
-        sessions = [session(folder, "--walltime", f"{limit}s") for _ in range(2)]
-        sessions.append(session(folder))
-        with swarm.load(folder / "long.h5") as trajectory:
+        size = ["--particles", str(particles), "--impacts", str(impacts)]
+        sessions = []
+        for stop in (*STOPS, None):
+            command = [sys.executable, __file__, *size, "--session", str(folder), *(["--stop", str(stop)] * bool(stop))]
+            sessions.append(json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout))
+        with swarm.load(folder / TRAJECTORY) as trajectory:
             seen, first, last = trajectory.observables, trajectory.frame(0), trajectory.frame(-1)
             frames = len(trajectory)
         before, after = (joachimsthal(one.position, one.velocity) for one in (first, last))
+        quarter, end = sessions[-1]["memory [MB]"]
         return {
             "particles": particles,
             "impacts": int(seen["impacts"][-1]),
             "frames": frames,
-            "sessions": [told["status"] for told, _memory in sessions],
-            "frames at the stops": [told["frames"] for told, _memory in sessions],
-            "wall time [s]": sessions[-1][0]["wall_time"],
+            "sessions": [told["status"] for told in sessions],
+            "frames at the stops": [told["frames"] for told in sessions],
+            "wall time [s]": sessions[-1]["wall time [s]"],
             "energy error, worst particle": float(seen["energy_error"].max()),
             "Joachimsthal's integral, worst relative change": float(np.abs(after / before - 1.0).max()),
             "largest penetration [m]": float(seen["max_penetration"].max()),
-            "file [MB]": (folder / "long.h5").stat().st_size / 1e6,
-            "memory of the last session after a fourth of it [MB]": sessions[-1][1][len(sessions[-1][1]) // 4] / 1024,
-            "and at its end [MB]": sessions[-1][1][-1] / 1024,
+            "file [MB]": (folder / TRAJECTORY).stat().st_size / 1e6,
+            "memory of the last session after a fourth of it [MB]": quarter,
+            "and at its end [MB]": end,
         }
 
 
@@ -105,7 +92,11 @@ if __name__ == "__main__":
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--particles", type=int, default=5_000)
     arguments.add_argument("--impacts", type=float, default=1e6, help="of each particle")
-    arguments.add_argument("--limit", type=float, default=15.0, help="wall time of the first two sessions [s]")
+    arguments.add_argument("--session", type=Path, metavar="FOLDER", help="one of the processes: go on there")
+    arguments.add_argument("--stop", type=int, metavar="FRAME", help="where it is told to stop")
     options = arguments.parse_args()
-    for what, value in main(options.particles, options.impacts, options.limit).items():
-        print(f"{what:<56}{value:.3g}" if isinstance(value, float) else f"{what:<56}{value}")
+    if options.session:
+        print(json.dumps(session(options.session, options.particles, options.impacts, options.stop)))
+    else:
+        for what, value in main(options.particles, options.impacts).items():
+            print(f"{what:<56}{value:.3g}" if isinstance(value, float) else f"{what:<56}{value}")
