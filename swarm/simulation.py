@@ -259,7 +259,7 @@ def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTim
 
 def _magnitude(scene: Scene, particles: Particles) -> float:
     """The size whose round-off a position on a wall has."""
-    return max(float(np.abs(particles.position).max()), scene.finite_size())
+    return max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
 
 
 def _trajectory(
