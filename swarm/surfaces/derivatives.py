@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import SceneError
-from . import base
-from .expression import COORDINATES, parse
+from . import base, corners
+from .expression import COORDINATES, Piece, parse
 from .form import Form
 from .generated import function_of
 from .interval import Interval, bounds_of
@@ -32,7 +32,8 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
     """The formula and its derivatives, as expressions and as functions."""
     import sympy
 
-    phi = parse(text, names)
+    pieces: list[Piece] = []
+    phi = parse(text, names, pieces)
     x, y, z = axes = tuple(map(sympy.Symbol, COORDINATES))
     gradient = [sympy.diff(phi, axis) for axis in axes]
     _check_length(gradient)
@@ -43,7 +44,13 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
         function_of(name, rows) for name, rows in (("phi", [phi]), ("gradient", gradient), ("hessian", hessian))
     )
     return Derived(
-        phi, tuple(gradient), tuple(hessian), tuple(sympy.Symbol(f"p{i}") for i in range(len(names))), axes, *functions
+        phi,
+        tuple(gradient),
+        tuple(hessian),
+        tuple(pieces),
+        tuple(sympy.Symbol(f"p{i}") for i in range(len(names))),
+        axes,
+        *functions,
     )
 
 
@@ -61,6 +68,7 @@ class Derived(NamedTuple):
     expression: Any
     slopes: tuple[Any, ...]
     seconds: tuple[Any, ...]
+    pieces: tuple[Piece, ...]
     symbols: tuple[Any, ...]
     axes: tuple[Any, ...]
     phi: Any
@@ -72,8 +80,10 @@ class Derived(NamedTuple):
         import sympy
 
         numbers = {symbol: sympy.Rational(value) for symbol, value in zip(self.symbols, values, strict=True)}
+        pieces = tuple(one._replace(argument=one.argument.subs(numbers)) for one in self.pieces)
+        corners.check_constants(pieces)
         slopes, seconds = (tuple(one.subs(numbers) for one in rows) for rows in (self.slopes, self.seconds))
-        return self._replace(expression=self.expression.subs(numbers), slopes=slopes, seconds=seconds)
+        return self._replace(expression=self.expression.subs(numbers), slopes=slopes, seconds=seconds, pieces=pieces)
 
     def in_cells(self, cells: dict[Any, Interval]) -> Interval:
         """Bounds of phi."""
@@ -123,24 +133,33 @@ class Derived(NamedTuple):
                 least = least - half * np.maximum(np.abs(change.low), np.abs(change.high)) * (1.0 + 1e-12)
         return bool((least > 0.0).all())
 
-    def bend(self, form: Form) -> Bend:
-        """Bounds of side H over the box of a form, a solid's with its margin.
+    def _varies(self) -> bool:
+        return any(one.free_symbols for one in self.seconds)
 
-        Raises:
-            SceneError: H is not bounded there, or there is no box and H is no constant.
-        """
-        side = base.side_sign(form.side)
-        if not any(one.free_symbols for one in self.seconds):
-            entries = side * np.array([float(one) for one in self.seconds])
-            return Bend.of_entries(entries[:, None], entries[:, None])
-        if form.box is None:
+    def check_box(self, form: Form) -> None:
+        """Raise if there is no box to find the bend in, and H is no constant."""
+        if form.box is None and self._varies():
             raise SceneError(
                 "bounds must be given: none were found that hold all of phi <= 0; or give curvature, a number that the "
                 "second derivative of phi in any direction never exceeds"
             )
-        low, high = np.array(form.box)
-        room = 0.5 * form.outer_margin() * (high - low).min()
-        lower, _upper, cells = self.cells((low - room, high + room), (_CELLS, _CELLS, _CELLS))
+
+    def check_smooth(self, form: Form) -> None:
+        """Raise if phi may have a corner or a pole where particles go; second derivatives may not show it."""
+        side = base.side_sign(form.side)
+        corners.check(self.pieces, self.expression, self.axes, side, form.domain(), form.reach())
+
+    def bend(self, form: Form) -> Bend:
+        """Bounds of side H over the box of a form, a solid's with its margin.
+
+        Raises:
+            SceneError: H is not bounded there.
+        """
+        side = base.side_sign(form.side)
+        if not self._varies():
+            entries = side * np.array([float(one) for one in self.seconds])
+            return Bend.of_entries(entries[:, None], entries[:, None])
+        lower, _upper, cells = self.cells(form.domain(), (_CELLS, _CELLS, _CELLS))
         phi = self.in_cells(cells)
         # Flights are in the admissible part only, so its cells are enough.
         admissible = ~((phi.low if side > 0.0 else -phi.high) + 0.0 * lower[0] > 0.0)

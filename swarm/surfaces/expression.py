@@ -9,7 +9,7 @@ import math
 import operator
 import warnings
 from collections.abc import Callable, Iterable
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from ..checks import closest
 from ..errors import SceneError
@@ -26,6 +26,7 @@ _LARGEST = 1e150
 # Exact fractions longer than this are rounded, so that powers of powers stay short.
 _BITS = 1000
 
+_WANTED = {"sqrt": "above 0", "log": "above 0", "tan": "no pole"}
 _NOT_SMOOTH = ("abs", "min", "max", "floor", "ceil", "round", "sign", "fabs")
 _PLAIN_WORDS: dict[type, str] = {
     ast.Attribute: "an attribute",
@@ -52,8 +53,19 @@ _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
 }
 
 
-def parse(text: Any, parameters: Iterable[str] = ()) -> Any:
+class Piece(NamedTuple):
+    """A root, power, quotient, log or tan of a formula, which is smooth only where its argument is `wanted`."""
+
+    argument: Any
+    wanted: str  # "above 0", "not 0" or "no pole"
+    place: str
+
+
+def parse(text: Any, parameters: Iterable[str] = (), pieces: list[Piece] | None = None) -> Any:
     """The SymPy expression of a formula in x, y, z and `parameters`, whose symbols are p0, p1, ... in their order.
+
+    SymPy simplifies as it builds, so that sqrt(x**2)**2 becomes x**2. What is smooth only in places is appended to
+    `pieces` as it is read, inner ones first, whether or not anything of it is left.
 
     Raises:
         SceneError: the text is not a formula of numbers, these names, + - * / ** and the functions of the list.
@@ -73,7 +85,7 @@ def parse(text: Any, parameters: Iterable[str] = ()) -> Any:
     lead = len(line) - len(line.lstrip())
     names = {name: sympy.Symbol(name) for name in COORDINATES}
     names |= {name: sympy.Symbol(f"p{i}") for i, name in enumerate(parameters)}
-    reader = _Reader(line.strip(), lead, names, sympy)
+    reader = _Reader(line.strip(), lead, names, sympy, [] if pieces is None else pieces)
     expression = reader.read(reader.tree().body, 0)
     if not expression.free_symbols & {names[name] for name in COORDINATES}:
         raise SceneError(f"phi must depend on x, y or z, got {text.strip()!r}")
@@ -83,8 +95,8 @@ def parse(text: Any, parameters: Iterable[str] = ()) -> Any:
 class _Reader:
     """The tree of one text, node by node."""
 
-    def __init__(self, text: str, lead: int, names: dict[str, Any], sympy: Any) -> None:
-        self._text, self._lead, self._names, self._sympy = text, lead, names, sympy
+    def __init__(self, text: str, lead: int, names: dict[str, Any], sympy: Any, pieces: list[Piece]) -> None:
+        self._text, self._lead, self._names, self._sympy, self._pieces = text, lead, names, sympy, pieces
         self._nodes = 0
 
     def tree(self) -> ast.Expression:
@@ -135,6 +147,8 @@ class _Reader:
             return self._power(node, left, right)
         if isinstance(node.op, ast.Div) and right == 0:
             self._refuse(node, "phi divides by 0")
+        if isinstance(node.op, ast.Div):
+            self._note(node, right, "not 0")
         return self._checked(node, _OPERATORS[type(node.op)](left, right))
 
     def _number(self, node: ast.Constant) -> Any:
@@ -161,6 +175,8 @@ class _Reader:
         if abs(exponent) > _LARGEST_EXPONENT:
             self._refuse(node.right, f"phi must have exponents up to {_LARGEST_EXPONENT:g}")
         if not base.is_number:
+            if not exponent.is_Integer or exponent < 0:
+                self._note(node, base, "not 0" if exponent.is_Integer else "above 0")
             return base**exponent
         if base == 0 and exponent < 0:
             self._refuse(node, "phi divides by 0")
@@ -180,6 +196,8 @@ class _Reader:
         argument = self.read(node.args[0], depth + 1)
         if argument.is_number:
             return self._computed(node, lambda: FUNCTIONS[node.func.id](float(argument)))  # type: ignore[attr-defined]
+        if node.func.id in _WANTED:
+            self._note(node, argument, _WANTED[node.func.id])
         return getattr(self._sympy, node.func.id)(argument)
 
     def _computed(self, node: ast.expr, value: Callable[[], Any]) -> Any:
@@ -208,8 +226,15 @@ class _Reader:
     def _is_small(value: Any) -> bool:
         return bool(value == 0) or bool(1 / _LARGEST <= abs(value) <= _LARGEST)
 
+    def _note(self, node: ast.expr, argument: Any, wanted: str) -> None:
+        if not argument.is_number:
+            self._pieces.append(Piece(argument, wanted, self._place(node)))
+
     def _refuse(self, node: ast.expr, why: str, hint: str = "") -> NoReturn:
+        raise SceneError(f"{why}, got {self._place(node)}{hint}")
+
+    def _place(self, node: ast.expr) -> str:
         piece = ast.get_source_segment(self._text, node) or ""
         column = len(self._text.encode()[: node.col_offset].decode(errors="replace")) + 1 + self._lead
         shown = piece if len(piece) <= 40 else piece[:37] + "..."
-        raise SceneError(f"{why}, got {shown!r} at column {column}{hint}")
+        return f"{shown!r} at column {column}"

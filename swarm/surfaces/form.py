@@ -25,6 +25,7 @@ MARGIN = 0.25
 _ONTO, _MOVES = 256, 60
 # A gradient this small, relative to |phi|/size in the bounds, is none; one this far from differences of phi is wrong.
 _FLAT, _WRONG = 1e-8, 1e-4
+_EPSILON = 2.220446049250313e-16
 
 Floats = NDArray[np.float64]
 _STRAIGHT = Bend.of_magnitude(0.0)
@@ -61,6 +62,14 @@ class Form:
         if self.box is None:
             return self.size if math.isfinite(self.size) else 1.0
         return max(base.farthest(corner) for corner in self.box)
+
+    def domain(self) -> base.Box | None:
+        """The box, a solid's with the margin in which its bend must be known."""
+        if self.box is None:
+            return None
+        low, high = np.array(self.box)
+        room = 0.5 * self.outer_margin() * (high - low).min()
+        return tuple((low - room).tolist()), tuple((high + room).tolist())
 
     @functools.cached_property
     def encloses(self) -> bool:
@@ -130,6 +139,16 @@ class Form:
             i = int(np.argmax(flat))
             raise SceneError(
                 f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {_shown(near[:, i])}"
+            )
+
+    def check_bend(self) -> None:
+        """Raise if safe steps away from the wall may be as short as the round-off of a position."""
+        largest, most = np.abs(self.value(self.points(_SAMPLES))).max(), self.bend.most
+        if _EPSILON * most * self.size**2 > largest:
+            limit = 2.0 * largest / (_EPSILON * self.size**2)
+            raise SceneError(
+                f"phi must not bend more sharply than round-off resolves: with a size of {self.size:.3g} its second "
+                f"derivative must be below {limit:.3g}, got up to {2.0 * most:.3g}; where less is known, give curvature"
             )
 
     def _onto(self, points: Floats) -> Floats:

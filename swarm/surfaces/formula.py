@@ -40,7 +40,8 @@ class Formula(base.Surface):
 
     Raises:
         SceneError: the formula holds anything else, an argument is out of its range, or phi is not finite, has no
-            surface in the bounds, or no gradient on it.
+            surface in the bounds, no gradient on it, or a corner or a pole where particles may be. Any root, fractional
+            or negative power, log or quotient counts whose argument may be 0 there, even if it cancels out.
 
     >>> Formula("x**2/0.25 + y**2/0.25 + z**4 - 1").phi([[1.0], [0.0], [0.0]])
     array([3.])
@@ -105,8 +106,16 @@ class Formula(base.Surface):
         if box is not None:
             form.check()
         if self.curvature is None:
-            return form.bent(exact.bend(form))
-        return form.bent(Bend.of_magnitude(self.curvature))
+            exact.check_box(form)
+        exact.check_smooth(form)
+        form = form.bent(exact.bend(form) if self.curvature is None else Bend.of_magnitude(self.curvature))
+        if box is not None:
+            form.check_bend()
+        return form
+
+    def __hash__(self) -> int:
+        parameters = None if self.parameters is None else frozenset(self.parameters.items())
+        return hash((*(parameters if f.name == "parameters" else getattr(self, f.name) for f in fields(self)),))
 
     @property
     def _form(self) -> Form:

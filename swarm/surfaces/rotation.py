@@ -11,6 +11,8 @@ from ..checks import Vector, number, vector
 from ..errors import SceneError
 
 Quaternion = tuple[float, float, float, float]
+# By this much the length of what `unit` or a table of axis and angle gives may differ from 1.
+_ROUND_OFF = 4.0 * 2.220446049250313e-16
 
 
 def quaternion(name: str, value: Any) -> Quaternion | None:
@@ -40,7 +42,7 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
 
 
 def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
-    """`value` as that many numbers scaled to length 1, whatever their magnitude."""
+    """`value` as that many numbers scaled to length 1, whatever their magnitude; kept if that is their length."""
     parts: tuple[float, ...] = ()
     if count == 3:
         parts = vector(name, value)
@@ -59,6 +61,9 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
     # Scaled first: the square of a part itself may not be a number.
     scaled = [part / largest for part in parts]
     length = math.hypot(*scaled)
+    if abs(math.hypot(*parts) - 1.0) <= _ROUND_OFF:
+        # What was scaled before keeps its bits: a surface from its own repr or table is the same one.
+        return parts
     return tuple(part / length for part in scaled)
 
 

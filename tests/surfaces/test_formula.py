@@ -214,7 +214,10 @@ def scene_of_cylinder():
         ("x**3 - 50", {"bounds": ((-1, -1, -1), (1, 1, 1))}, ["0 somewhere in the bounds", "below 0"]),
         ("log(x) + y**2", {"bounds": ((-1, -1, -1), (1, 1, 1))}, ["phi must be a finite number", "nan"]),
         ("(x**2 + y**2 + z**2 - 1)**3", {}, ["a gradient on its surface"]),
-        ("sqrt(x**2 + y**2) + z**2 - 1", {}, ["curvature must be given", "not bounded"]),
+        ("sqrt(x**2 + y**2) + z**2 - 1", {}, ["smooth", "'sqrt(x**2 + y**2)' at column 1", "near (0, 0, "]),
+        ("(sqrt(x**2 + y**2) - 0.31)**2 + z**2 - 0.09", {}, ["curvature must be given", "not bounded"]),
+        ("x**2 + y**2 + z**2/p - 1", {"parameters": {"p": 0.0}}, ["smooth", "'z**2/p' at column 15", "divide by 0"]),
+        ("sqrt(x**2 + 1e-140) + y**2 + z**2 - 1", {}, ["second derivative must be below", "give curvature"]),
         (GYROID, {}, ["bounds must be given", "curvature"]),
         (PILL, {"bounds": (1, 2)}, ["bounds[0]", "three numbers"]),
         (PILL, {"bounds": ((0, 0, 0), (1, 0, 1))}, ["a lower and an upper corner"]),
@@ -233,6 +236,108 @@ def test_errors_name_the_argument(text, keywords, parts):
     with pytest.raises(swarm.SceneError) as caught:
         swarm.Formula(text, **keywords)
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+WALLS = " + y**2 + z**2 - 1"
+BOUNDS = ((-1.1, -1.1, -1.1), (1.1, 1.1, 1.1))
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("sqrt(x**2)", "'sqrt(x**2)' at column 1,"),
+        ("(x**2)**0.5", "'(x**2)**0.5' at column 1,"),
+        ("exp(log(x**2)/2)", "'log(x**2)' at column 5,"),
+        ("(x**4)**(1/4)", "'(x**4)**(1/4)' at column 1,"),
+        ("sqrt((x - y)**2)", "'sqrt((x - y)**2)' at column 1,"),
+        ("sqrt(x**2 - 2*x*y + y**2)", "'sqrt(x**2 - 2*x*y + y**2)' at column 1,"),
+        ("sqrt(sqrt(x**4))", "'sqrt(x**4)' at column 6,"),
+        ("sqrt(x**2)**2", "'sqrt(x**2)' at column 1,"),
+        ("sqrt(x**2)*sqrt(x**2)", "'sqrt(x**2)' at column 1,"),
+        ("x**2 + 0*sqrt(x**2)", "'sqrt(x**2)' at column 10,"),
+        ("x**2 + sqrt(x**2) - sqrt(x**2)", "'sqrt(x**2)' at column 8,"),
+        ("x*sqrt(x**2)/x", "'sqrt(x**2)' at column 3,"),
+        ("sqrt(1 - cos(x)**2)", "'sqrt(1 - cos(x)**2)' at column 1,"),
+        ("cosh(sqrt(x**2)) - 1", "'sqrt(x**2)' at column 6,"),
+        # The power's derivative is written as 5 (x**2)**(5/4)/(2 x), which is 0/0 there.
+        ("(x**2)**1.25", "'(x**2)**1.25' at column 1,"),
+        ("x**2/x*x", "'x**2/x' at column 1,"),
+        ("x**3*x**-1", "'x**-1' at column 6,"),
+        ("x**2 - 1e-6/x**2", "'1e-6/x**2' at column 8,"),
+        ("x**2 + sqrt(x**2 + 0)", "'sqrt(x**2 + 0)' at column 8,"),
+    ],
+)
+def test_a_corner_or_a_pole_is_an_error_that_shows_where(text, place):
+    with pytest.raises(swarm.SceneError) as caught:
+        swarm.Formula(text + WALLS, bounds=BOUNDS)
+    message = str(caught.value)
+    assert message.startswith("phi must be smooth wherever particles go, got " + place), message
+    assert "give bounds" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "keywords", "place"),
+    [
+        ("sqrt(x**2)" + WALLS, {}, "near (0, "),
+        ("sqrt(x**2)" + WALLS, {"bounds": BOUNDS, "curvature": 2.0}, "near (0, 0, 0)"),
+        ("sqrt(x**2 + p)" + WALLS, {"parameters": {"p": 0.0}}, "'sqrt(x**2 + p)'"),
+        ("sqrt((x - p)**2)" + WALLS, {"parameters": {"p": 0.123}}, "near (0.1"),
+        ("x**2 + 0.001*tan(3*x)" + WALLS, {"bounds": BOUNDS, "curvature": 2.0}, "'tan(3*x)' at column 14"),
+        ("sqrt(x + 1.1)" + WALLS, {"bounds": BOUNDS, "curvature": 2.0}, "'sqrt(x + 1.1)'"),
+        ("sqrt(x**2 + y**2) - 0.5", {"curvature": 2.0}, "'sqrt(x**2 + y**2)'"),
+        ("sqrt(x**2)" + WALLS, {"side": "outside"}, "'sqrt(x**2)'"),
+        ("sqrt(x**2) + y**2 - 1", {}, "'sqrt(x**2)'"),
+    ],
+)
+def test_a_corner_is_found_with_any_arguments(text, keywords, place):
+    with pytest.raises(swarm.SceneError, match="phi must be smooth wherever particles go") as caught:
+        swarm.Formula(text, **keywords)
+    assert place in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "keywords"),
+    [
+        ("sqrt(x**2 + y**2 + 0.01) + z**2 - 1", {}),
+        ("sqrt(x*x + 1e-4)" + WALLS, {}),
+        # A coordinate occurs twice: bounds of the slopes are needed.
+        ("sqrt(x**2 - 2*x*y + y**2 + 0.01)" + WALLS, {"bounds": BOUNDS, "curvature": 20.0}),
+        # Singular on the axis, which is no admissible place.
+        ("(sqrt(x**2 + y**2) - 0.7)**2 + z**2 - 0.09", {}),
+        ("(sqrt(x**2 + y**2) - 0.35)**2 + z**2 - 0.09", {"curvature": 14.0}),
+        ("1/(1.2 - x) + 1/(1.2 + x) + y**2 + z**2 - 2", {"bounds": BOUNDS}),
+        ("sqrt(x**2 + y**2 + 1) - z - 1.5", {"curvature": 1.0}),
+    ],
+)
+def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
+    surface = swarm.Formula(text, **keywords)
+    start = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 2000))
+    start = start[:, surface.phi(start) < -0.05][:, :5]
+    for point, velocity in zip(start.T, start.T[::-1] + 0.1, strict=True):
+        (numbers,) = surface.walls()
+        for _ in range(5):
+            time, found = call(base.first_hit, numbers, point, velocity)
+            if time == math.inf:
+                break
+            along = point[:, None] + velocity[:, None] * time * np.linspace(0.0, 1.0, 50)
+            assert (surface.phi(along) < 1e-12).all()
+            if not found:
+                point = along[:, -1]
+                continue
+            point = call(base.settle, numbers, along[:, -1])
+            normal = np.array(call(base.unit_normal, numbers, np.array(point)))
+            point, velocity = np.array(point), velocity - 2.0 * (normal @ velocity) * normal
+
+
+def test_a_formula_with_parameters_has_a_hash():
+    text = "x**2/a**2 + y**2/b**2 + z**2 - 1"
+    one, same, other = (
+        swarm.Formula(text, parameters=values)
+        for values in ({"a": 0.5, "b": 1.0}, {"b": 1, "a": 0.5}, {"a": 0.5, "b": 2.0})
+    )
+    assert one == same != other
+    assert hash(one) == hash(same)
+    assert len({one, same, other}) == 2
 
 
 def test_its_table_and_back():

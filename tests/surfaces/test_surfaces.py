@@ -1,10 +1,12 @@
 """What every surface must be, whatever its formula: each fact runs over the table of conftest.py."""
 
 import math
+import tomllib
 
 import mpmath as mp
 import numpy as np
 import pytest
+import tomli_w
 from conftest import (
     EPSILON,
     QUADRICS,
@@ -25,6 +27,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import swarm
+from swarm import tables
 from swarm.surfaces import ALL_SURFACES, base
 
 unit = st.floats(0.0, 1.0, allow_subnormal=False)
@@ -494,3 +497,63 @@ def test_bounds_hold_the_admissible_side(name):
     assert ((admissible >= low) & (admissible <= high)).all()
     assert np.isfinite(high - low).all() == (side > 0.0 and name != "plane")
     assert np.isfinite(surface.size()) == (name != "plane")
+
+
+# --- The same surface again ------------------------------------------------------------------------------
+
+TURNED = {
+    "plane": lambda n, **turn: swarm.Plane(n, 0.3, **turn),
+    "slab": lambda n, **turn: swarm.Slab(n, 0.3, n, **turn),
+    "cylinder": lambda n, **turn: swarm.Cylinder(0.3, n, 0.7, **turn),
+    "cone": lambda n, **turn: swarm.Cone(0.3, n, **turn),
+    "paraboloid": lambda n, **turn: swarm.Paraboloid(0.3, n, **turn),
+    "capsule": lambda n, **turn: swarm.Capsule(0.3, 0.4, n, side="outside", **turn),
+    "box": lambda n, **turn: swarm.Box((0.3, 0.4, 0.5), n, restitution=0.5, **turn),
+    "quadric": lambda n, **turn: swarm.Quadric(np.diag((1.0, 2.0, -1.0)), n, -0.25, **turn),
+    "formula": lambda n, **turn: swarm.Formula(
+        "(x/a)**2 + y**2 + z**4 - b", parameters={"a": 0.5, "b": 1.5}, bounds=((-2,) * 3, (2,) * 3), center=n, **turn
+    ),
+    "sphere": lambda n, **turn: swarm.Sphere(0.3, n, **turn),
+    "ellipsoid": lambda n, **turn: swarm.Ellipsoid((0.3, 0.4, 0.5), n, **turn),
+    "torus": lambda n, **turn: swarm.Torus(0.7, 0.3, n, **turn),
+}
+
+
+def is_made_again(surface):
+    table = tomllib.loads(tomli_w.dumps({"surface": [tables.table_of(surface)]}))
+    (read,) = tables.scene_of(table["surface"], None).surfaces
+    for again in (eval(repr(surface), vars(swarm)), read):
+        assert again == surface
+        assert hash(again) == hash(surface)
+        assert [wall[1:] for wall in again.walls()] == [wall[1:] for wall in surface.walls()]
+
+
+@every_surface
+def test_a_surface_is_made_again_by_its_repr_and_by_its_table(name):
+    is_made_again(SURFACES[name]())
+
+
+@pytest.mark.parametrize("name", TURNED)
+@given(direction=directions, axis=directions, angle=st.floats(-7.0, 7.0))
+def test_a_turned_surface_is_made_again(name, direction, axis, angle):
+    direction, axis = (tuple(part.tolist()) for part in (direction, axis))
+    is_made_again(TURNED[name](direction, rotation={"axis": axis, "angle": angle}))
+    is_made_again(TURNED[name](direction, rotation=(angle, *axis)))
+    is_made_again(TURNED[name](direction))
+
+
+def test_every_kind_is_made_again():
+    assert set(TURNED) == set(ALL_SURFACES)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-3, 3.0, 1e300])
+@given(direction=directions)
+def test_a_normal_of_any_length_is_scaled_to_1_once(size, direction):
+    """By the largest part first, then by the length of what is left."""
+    given_ = tuple((size * direction).tolist())
+    largest = max(map(abs, given_))
+    scaled = [part / largest for part in given_]
+    expected = tuple(part / math.hypot(*scaled) for part in scaled)
+    normal = swarm.Plane(given_).normal
+    assert normal == expected
+    assert swarm.Plane(normal).normal == normal
