@@ -5,6 +5,7 @@ of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid
 rigid or with linear springs, has a closed form.
 """
 
+import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -244,4 +245,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

@@ -36,7 +36,7 @@ def joachimsthal(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
 def session(folder: Path, particles: int, impacts: float, stop: int | None) -> dict:
     """The run from where it is to frame `stop`, or to its end: how it ended, and this process's memory on the way."""
     scene = swarm.Scene([swarm.Ellipsoid(SEMI_AXES)])
-    until = impacts / RATE
+    start, until = swarm.fill(scene, particles, speed=SPEED, seed=1), impacts / RATE
     memory = {}
 
     def watch(frame: swarm.Frame) -> None:
@@ -47,8 +47,8 @@ def session(folder: Path, particles: int, impacts: float, stop: int | None) -> d
     told = {"status": "stopped", "wall time [s]": None}
     try:
         result = swarm.simulate(
-            scene, swarm.fill(scene, particles, speed=SPEED, seed=1), swarm.Impact(), until=until, every=until / FRAMES,
-            trajectory=folder / TRAJECTORY, frames=max(1, particles // 100), checkpoint=5.0, resume=True, progress=watch,
+            scene, start, swarm.Impact(), until=until, every=until / FRAMES, trajectory=folder / TRAJECTORY,
+            frames=max(1, particles // 100), checkpoint=5.0, resume=True, progress=watch,
         )  # fmt: skip
         told = {"status": "complete", "wall time [s]": result.wall_time}
     except KeyboardInterrupt:

@@ -160,8 +160,8 @@ def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple
     if not (masses.min() >= checks.SMALLEST and masses.max() <= checks.LARGEST):
         first = int(np.argmin((masses >= checks.SMALLEST) & (masses <= checks.LARGEST)))
         raise SceneError(
-            f"mass must be a finite number above 0, from {checks.SMALLEST:g} to {checks.LARGEST:g} kg, got "
-            f"{masses[first]:g} for particle {first}"
+            f"mass must be a finite number above 0, got {masses[first]:g} for particle {first}; it may be from "
+            f"{checks.SMALLEST:g} to {checks.LARGEST:g} kg"
         )
     return rows, speeds, masses
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -16,8 +17,14 @@ import swarm
 pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 
-def command(*args, cwd):
-    return subprocess.run([sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=300)
+def command(*args, cwd, **more):
+    done = subprocess.run(
+        [sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=300, **more
+    )
+    # Whether it compiles depends on what ran before.
+    lines = done.stderr.splitlines(keepends=True)
+    done.stderr = "".join(line for line in lines if not line.startswith("compiling a kernel"))
+    return done
 
 
 @pytest.fixture
@@ -74,6 +81,44 @@ def test_results_do_not_depend_on_threads(folder):
 @pytest.mark.parametrize(
     ("old", "new", "args", "message"),
     [
+        (
+            "count = 10",
+            "count = 1_000_000_000_000",
+            [],
+            "count must be particles that fit in memory, got 1e+12, which take 176 TB",
+        ),
+        (
+            "count = 10",
+            f"count = {10**19}",
+            [],
+            "count must be particles that fit in memory, got 1e+19, which take 1.76e+03 EB",
+        ),
+        ("count = 10", f"count = {10**400}", [], "count"),
+        ("count = 10", f"count = {'9' * 5000}", [], "cannot read the scene file scene.toml"),
+        ("speed = 0.5", "speed = 1e300", [], "[particles]: speed must be at most 1e+100, got 1e+300"),
+        (
+            "every = 0.5",
+            "every = 1e-12",
+            [],
+            "every must leave frames that fit, got 1e-12 s until 1 s: 1000000000001 frames",
+        ),
+        ("every = 0.5", 'every = 0.5\nrecording = ""', [], "recording must be the path of a file, got ''"),
+        ("every = 0.5", 'every = 0.5\ntrajectory = ""', [], "trajectory must be the path of a file, got ''"),
+        (
+            "[particles]",
+            f"deep = {'[' * 3000}{']' * 3000}\n[particles]",
+            [],
+            "scene.toml: its arrays or tables are nested too deeply",
+        ),
+        ("", "", ["-o", "scene.toml", "--overwrite"], "trajectory: scene.toml is the scene file too"),
+        ("", "", ["--record", "./scene.toml", "--overwrite"], "recording: scene.toml is the scene file too"),
+        ("", "", ["-o", "a.h5", "--record", "a.h5"], "recording: a.h5 is the trajectory too"),
+        (
+            "",
+            "",
+            ["-o", "/dev/null", "--overwrite"],
+            "trajectory: expected a file name, got /dev/null, which is a device",
+        ),
         ("radius = 0.5", "radius = -1.0", [], "surface[0].radius must be above 0, got -1"),
         ("until = 1.0", "until = -1.0", [], "until must be after the start, 0 s, got -1"),
         ("every = 0.5", "every = 2.0", [], "every must be at most until = 1, got 2"),
@@ -88,6 +133,134 @@ def test_bad_input_is_exit_code_2_and_touches_no_file(folder, old, new, args, me
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert [path.name for path in folder.iterdir()] == ["scene.toml"]
+
+
+def test_the_file_of_the_start_is_no_output(folder):
+    (folder / "start.csv").write_text("x,y,z,vx,vy,vz\n0,0,0,1,0,0\n")
+    text = re.sub(r"(?s)\[particles\].*?\n\n", '[particles]\nfrom = "start.csv"\n\n', GOOD, count=1)
+    (folder / "scene.toml").write_text(text)
+    done = command("run", "scene.toml", "-o", "start.csv", "--overwrite", cwd=folder)
+    assert (done.returncode, "start.csv is the file of the particles too" in done.stderr) == (2, True), done.stderr
+    assert command("run", "scene.toml", "-o", "a.h5", cwd=folder).returncode == 0
+    done = command("record", "a.h5", "-o", "a.h5", "--overwrite", cwd=folder)
+    assert (done.returncode, "recording: a.h5 is the trajectory too" in done.stderr) == (2, True)
+    with swarm.load(folder / "a.h5") as trajectory:
+        assert len(trajectory) == 3
+
+
+def test_a_scene_file_with_a_byte_order_mark(folder):
+    (folder / "scene.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert command("run", "scene.toml", cwd=folder).returncode == 0
+    with swarm.load(folder / "scene.h5") as trajectory:
+        assert trajectory.scene_text == GOOD
+
+
+def test_json_is_printed_at_every_end(folder):
+    def told(*words, **more):
+        done = command("run", "scene.toml", "--json", *words, cwd=folder, **more)
+        return done.returncode, json.loads(done.stdout)
+
+    code, first = told()
+    assert (code, first["status"], first["frames"], first["particles"]) == (0, "complete", 3, 10)
+    code, again = told("--resume")
+    del first["wall_time"]
+    assert (code, again) == (0, first)
+    code, refused = told()
+    assert (code, refused["status"], "--overwrite" in refused["error"]) == (2, "failed", True)
+    (folder / "other.toml").write_text(GOOD.replace("[run]", "[run"))
+    done = command("run", "other.toml", "--json", cwd=folder)
+    assert (done.returncode, json.loads(done.stdout)["status"]) == (2, "failed")
+    # A limit of the size of files stands in for a full disk.
+    full = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
+    code, failed = told("-o", "failed.h5", preexec_fn=full)
+    assert (code, failed["status"]) == (1, "failed")
+    assert failed["error"].startswith("cannot write frame 0 to failed.h5: ")
+
+
+@pytest.mark.parametrize("options", [["--overwrite"], []])
+def test_json_of_a_run_that_is_interrupted(folder, options):
+    """By a signal at the first and at a later frame; of what was there before nothing is said."""
+    if options:
+        assert command("run", "scene.toml", cwd=folder).returncode == 0
+    code = """
+import signal, sys
+from swarm import cli, frames, simulation
+def frame(number, *more, real=simulation.Frame):
+    if number == {at}:
+        signal.raise_signal(signal.SIGINT)
+    return real(number, *more)
+simulation.Frame = frame
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv[0] = "swarm"
+cli.main()
+"""
+    words = ["run", "scene.toml", "--json", *options]
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(at=1), *words], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    told = json.loads(done.stdout)
+    assert (done.returncode, told["status"], told["frames"]) == (130, "interrupted", 2)
+    assert told["resume"] == "swarm run scene.toml --json --resume"
+    assert "go on with\n  swarm run scene.toml --json --resume" in done.stderr
+    done = command(*told["resume"].split()[1:], cwd=folder)
+    assert (done.returncode, json.loads(done.stdout)["frames"]) == (0, 3)
+
+
+INTERRUPTED = """
+import importlib.abc, signal, sys
+class Finder(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == {name!r}:
+            sys.meta_path.remove(self)
+            signal.raise_signal(signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Finder())
+from swarm.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["typer", "numpy", "numba", "msgspec", "swarm.simulation"])
+def test_an_interrupt_in_an_import_is_one_word(folder, name):
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED.format(name=name), "run", "scene.toml"],
+        cwd=folder, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+    assert [path.name for path in folder.iterdir()] == ["scene.toml"]
+
+
+def test_a_second_interrupt_ends_at_once_without_a_traceback(folder):
+    """The first ends the run at its frame; the second comes while the last words are said."""
+    code = INTERRUPTED.format(name="nothing").replace(
+        "from swarm.__main__",
+        """
+from swarm import cli, simulation
+real = simulation.Frame
+def frame(*about):
+    signal.raise_signal(signal.SIGINT)
+    return real(*about)
+simulation.Frame = frame
+cli._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
+from swarm.__main__""",
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("compiling")]
+    assert (done.returncode, lines) == (130, ["interrupted"])
+
+
+def test_what_compiles_is_said(folder):
+    """The first run of a kind of scene says so; the second finds its kernels."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+    for expected in (True, False):
+        done = subprocess.run(
+            [sys.executable, "-m", "swarm", "run", "scene.toml", "--overwrite"],
+            cwd=folder, capture_output=True, text=True, timeout=300, env=environment,
+        )  # fmt: skip
+        assert done.returncode == 0
+        assert ("compiling a kernel for this kind of scene (advance_block), once" in done.stderr) == expected
 
 
 def test_existing_output_asks_for_overwrite(folder):

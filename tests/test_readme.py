@@ -1,12 +1,17 @@
-"""README: its first screen is examples/quickstart.py, which runs; its commands and files exist."""
+"""README: its first screen is examples/quickstart.py; its Python, scene file and commands run; its files exist."""
 
+import itertools
 import re
-import runpy
+import shutil
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
-import swarm
+from swarm import scene_file
+from swarm.scene_file import RunTable
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -17,15 +22,6 @@ def test_first_screen_is_the_example():
     assert block is not None
     example = (ROOT / "examples" / "quickstart.py").read_text().split('"""\n\n', 1)[1]
     assert block.group(1) == example
-
-
-@pytest.mark.physics
-def test_the_example_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    names = runpy.run_path(str(ROOT / "examples" / "quickstart.py"))
-    assert names["result"].particles.position.shape == (3, 10_000)
-    assert names["result"].observables["energy_error"].max() <= 1e-14
-    assert "impacts" in capsys.readouterr().out
 
 
 def test_files_named_in_the_readme_exist():
@@ -44,15 +40,78 @@ def test_ci_runs_the_readme_test_command():
 
 
 @pytest.mark.physics
-def test_the_other_blocks_run_after_the_first(capsys):
-    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-    names = {"swarm": swarm, "scene": scene}
-    for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1:]:
+def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL):
         exec(block, names)
-    seen = names["settling"].observables
+    result, settling = names["result"], names["settling"]
+    assert result.particles.position.shape == (3, 10_000)
+    assert result.observables["energy_error"].max() <= 1e-14
+    seen = settling.observables
     assert seen["energy_error"].max() <= 1e-14
     assert seen["max_penetration"].max() <= 1e-14
     assert seen["dissipated_energy"][-1] > 0.0
     assert names["history"].converged
     assert len(names["history"]) == 13
-    assert "True" in capsys.readouterr().out
+    universe = names["universe"]
+    assert universe.trajectory.n_frames == 101
+    assert universe.trajectory[-1].positions[7] == pytest.approx(result.particles.position[:, 7], rel=1e-6)
+    told = capsys.readouterr().out
+    assert "impacts" in told
+    assert "True" in told
+
+
+# What the words of a command stand for.
+NAMES = {"SCENE.toml": "scene.toml", "RUN.h5": "scene.h5", "OUT.h5": "out.h5", "OUT.rrd": "out.rrd", "N": "2"}
+SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
+
+
+def commands():
+    """Every command of swarm in README, without its options in brackets and, where it has some, with them all."""
+    spans = re.findall(r"`(swarm [a-z]+ [^`\n]*\.[^`\n]*)`", README) + re.findall(r"&& (swarm [^\n]*)\n", README)
+    for span in spans:
+        for words in dict.fromkeys((re.sub(r" *\[.*?\]", "", span), re.sub(r"[\[\]]", "", span))):
+            yield [NAMES.get(word, word) for word in words.split()[1:]]
+
+
+def settings():
+    """Every `key = value` of [run] in README."""
+    return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", README) if line.split()[0] in RunTable.__annotations__]
+
+
+@pytest.mark.physics
+def test_the_commands_run_in_their_order(tmp_path):
+    shutil.copytree(ROOT / "examples" / "scenes", tmp_path / "examples" / "scenes")
+    (tmp_path / "scene.toml").write_text(SCENE)
+    found = list(commands())
+    assert {words[0] for words in found} == {"run", "record", "view", "plot", "info"}
+    assert len(found) >= 12
+    for words in found:
+        outputs = [after for word, after in itertools.pairwise(words) if word in ("-o", "--record")]
+        if words[0] == "run" and "--resume" not in words and "-o" not in words:
+            outputs.append(Path(words[1]).stem + ".h5")
+        for output in outputs:
+            (tmp_path / output).unlink(missing_ok=True)
+        done = subprocess.run([sys.executable, "-m", "swarm", *words], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, (words, done.stderr)
+        assert all((tmp_path / output).stat().st_size for output in outputs)
+
+
+@pytest.mark.parametrize("line", settings())
+def test_the_settings_of_a_run_are_taken(tmp_path, line):
+    (tmp_path / "scene.toml").write_text(SCENE.replace("[run]\n", f"[run]\n{line}\n"))
+    key, value = tomllib.loads(line).popitem()
+    assert getattr(scene_file.read(tmp_path / "scene.toml").run, key) == value
+
+
+def test_the_settings_are_found():
+    assert {line.split()[0] for line in settings()} >= {"frames", "precision", "compression", "checkpoint", "recording"}
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("module", sorted({*re.findall(r"python -m ((?:bench|examples)[\w. ]*\w)", README)}))
+def test_the_modules_that_take_minutes_can_be_called(module):
+    done = subprocess.run([sys.executable, "-m", *module.split(), "--help"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "usage" in done.stdout

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import SURFACES, scene_of
 
-from swarm import Ellipsoid, Plane, Scene, SceneError, Sphere
+from swarm import Box, Ellipsoid, Plane, Scene, SceneError, Sphere
 from swarm.gravity import Gravity
 from swarm.surfaces import base
 
@@ -141,3 +141,10 @@ def test_bounds_by_hand(surfaces, low, high):
 )
 def test_size_by_hand(surfaces, size):
     assert Scene(surfaces).size() == pytest.approx(size)
+
+
+def test_more_walls_than_can_be_compiled_are_refused():
+    balls = [Sphere(0.01, (x, y, 0.0), side="outside") for x in (-0.2, 0.0, 0.2) for y in np.linspace(-0.3, 0.3, 7)]
+    assert len(Scene([Box((0.5, 0.5, 0.5)), *balls]).owners()) == 24
+    with pytest.raises(SceneError, match=r"at most 24 walls in all, got 45 of 43 surfaces: each wall is compiled"):
+        Scene([Box((0.5, 0.5, 0.5)), *balls, *balls])
