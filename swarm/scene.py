@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from .errors import SceneError
 from .gravity import Gravity
-from .surfaces import base
+from .surfaces import base, required
 from .surfaces.base import Box, Surface
 from .surfaces.chain import Chain, chain_of
 
@@ -54,6 +54,7 @@ class Scene:
         for i, surface in enumerate(surfaces):
             if not isinstance(surface, Surface):
                 raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
+        required.require_description(surfaces)
         pull = None if gravity is None else checks.vector("gravity", gravity)
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)

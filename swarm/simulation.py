@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import checks, interrupt
 from .errors import SceneError
-from .methods.base import Method
+from .methods.base import Method, check_surfaces
 from .output.storage import Storage
 from .particles import Multipliers, Particles
 from .run import Run
@@ -256,6 +256,7 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
     # The arrays of Particles may have been changed since it checked them.
     particles = Particles(particles.position, particles.velocity, particles.mass)
+    check_surfaces(method, scene)
     method.check(scene, particles)
     method.span("until", until)
     method.span("every", until if every is None else every)

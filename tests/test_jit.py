@@ -304,7 +304,8 @@ LAYERS = [
     ["contact"],
     ["surfaces"],
     ["gravity", "checks"],
-    ["status", "_jit", "errors", "version", "interrupt"],
+    ["_jit"],
+    ["status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 
