@@ -20,6 +20,7 @@ from .particles import Multipliers, Particles
 from .run import Run
 from .scene import Scene
 from .sessions import Session
+from .surfaces.own import require_compiled
 
 if TYPE_CHECKING:
     from .output.beside import Beside, Writer
@@ -257,6 +258,7 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
     # The arrays of Particles may have been changed since it checked them.
     particles = Particles(particles.position, particles.velocity, particles.mass)
     check_surfaces(method, scene)
+    require_compiled(scene.surfaces)
     method.check(scene, particles)
     method.span("until", until)
     method.span("every", until if every is None else every)
