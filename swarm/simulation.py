@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks, interrupt
+from . import checks, interrupt, workload
 from .errors import SceneError
 from .methods.base import Method, check_surfaces
 from .output.storage import Storage
@@ -273,6 +273,8 @@ def _check(scene: Scene, particles: Particles, method: Method, until: float, eve
             f"is particle {first} at {tuple(particles.position[:, first].tolist())}, where phi = {phi:.6g} of "
             f"surfaces[{wall}] ({type(scene.surfaces[wall]).__name__})"
         )
+
+    workload.check(scene, particles, method, float(until), float(until if every is None else every))
 
 
 def _magnitude(scene: Scene, particles: Particles) -> float:

@@ -296,7 +296,7 @@ LAYERS = [
     ["sessions", "summary"],
     ["output", "progress", "run"],
     ["tables", "filling"],
-    ["observables", "blocks", "history"],
+    ["observables", "blocks", "history", "workload"],
     ["inner_solve"],
     ["lanes"],
     ["methods"],

@@ -129,6 +129,9 @@ class AugmentedLagrangian(base.Method):
     def too_fast(self, scene: Scene) -> str:
         return fixed_step.too_fast_failure(scene, self.dt)
 
+    def time_of_impact(self) -> float | None:
+        return self.dt if self.adaptive else None
+
     def span(self, name: str, duration: float) -> float:
         return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)
 

@@ -40,6 +40,10 @@ class Method:
         """The NamedTuple of numbers that kernels take in place of this description."""
         raise NotImplementedError
 
+    def time_of_impact(self) -> float | None:
+        """How long an impact takes besides the flight to it [s]; None where a frame costs steps, not impacts."""
+        return None
+
     def span(self, name: str, duration: float) -> float:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
         return duration

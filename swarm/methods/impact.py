@@ -74,6 +74,9 @@ class Impact(base.Method):
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
         return *flights.of_flights(scene.gravity is not None), *SLIDING_NEEDS, *chord
 
+    def time_of_impact(self) -> float:
+        return self.contact_step
+
     def is_rigid(self) -> bool:
         return True
 
