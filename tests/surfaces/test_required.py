@@ -10,7 +10,7 @@ from conftest import METHODS, SURFACES, call
 
 import swarm
 from swarm import blocks, observables
-from swarm.methods.base import check_surfaces
+from swarm.methods import base as methods
 from swarm.surfaces import base, rotation, smooth
 from swarm.surfaces.solid import body
 
@@ -168,7 +168,7 @@ def shipped():
 @pytest.mark.parametrize("name", METHODS)
 def test_every_shipped_surface_gives_what_every_method_needs(shipped, name, gravity):
     for surface in shipped:
-        check_surfaces(METHODS[name], swarm.Scene([surface], gravity))
+        methods.check_surfaces(METHODS[name], swarm.Scene([surface], gravity))
 
 
 # --- No default means "never" ----------------------------------------------------------------------------
@@ -183,8 +183,8 @@ def test_no_falling_hit_is_refused_under_gravity():
 
 def test_without_gravity_it_is_not_asked():
     scene = swarm.Scene([ball_like(*LEVEL, base.first_hit)()])
-    check_surfaces(swarm.Impact(), scene)
-    check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
+    methods.check_surfaces(swarm.Impact(), scene)
+    methods.check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
 
 
 def test_steps_that_know_no_safe_time_are_all_taken():
@@ -255,12 +255,12 @@ NEED_HESSIAN = [name for name in METHODS if name not in ("impact", "verlet")]
 def test_what_each_method_needs(name, gravity):
     given = [f for f in COMPLETE if f is not smooth.hessian]
     without, whole = (swarm.Scene([ball_like(*some)()], gravity) for some in (given, COMPLETE))
-    check_surfaces(METHODS[name], whole)
+    methods.check_surfaces(METHODS[name], whole)
     if name in NEED_HESSIAN:
         with pytest.raises(swarm.SceneError, match=r"smooth\.hessian"):
-            check_surfaces(METHODS[name], without)
+            methods.check_surfaces(METHODS[name], without)
     else:
-        check_surfaces(METHODS[name], without)
+        methods.check_surfaces(METHODS[name], without)
 
 
 def test_no_hessian_and_no_farthest_push_are_named_together():
@@ -298,7 +298,7 @@ def test_the_parts_of_wrapped_walls_are_asked():
 
         scene = swarm.Scene([Wrapped("outside")], PULL)
         with pytest.raises(swarm.SceneError, match=r"MineNumbers without base\.falling_hit"):
-            check_surfaces(swarm.Impact(), scene)
+            methods.check_surfaces(swarm.Impact(), scene)
 
 
 def test_a_history_asks_too():
