@@ -10,11 +10,13 @@ import functools
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import logging
 import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import UnionType
 from typing import Any, TypeVar
 
 import numba
@@ -150,7 +152,11 @@ def by_type(function: Callable[..., Any]) -> Any:
 
     Register a definition with `@name.register(Class)`, where Class is a NamedTuple of numbers, or
     `type(None)` for "the scene has none". Registered functions carry no annotations and the same argument
-    names, because Numba compares signatures.
+    names, because Numba compares signatures. `@name.implies(other)` registers a definition of `other` for every class
+    that `name` is registered for, unless that has one.
+
+    Raises:
+        SceneError: a definition is registered whose arguments have other names.
     """
     return _dispatched(function, _INLINE)
 
@@ -161,7 +167,35 @@ def by_type_outlined(function: Callable[..., Any]) -> Any:
 
 
 def _dispatched(function: Callable[..., Any], options: Any) -> Any:
-    generic = functools.singledispatch(function)
+    generic: Any = functools.singledispatch(function)
+    known, names, implied = generic.register, _arguments(function), list[tuple[Any, Callable[..., Any]]]()
+
+    def register(kind: Any, definition: Any = None) -> Any:
+        if definition is None and isinstance(kind, (type, UnionType)):
+            return functools.partial(register, kind)
+        made = kind if definition is None else definition
+        if _arguments(made) != names:
+            from .errors import SceneError  # only here: the cache folder is asked of this file alone
+
+            raise SceneError(
+                f"a definition of {function.__module__}.{function.__name__} must be a function of "
+                f"({', '.join(names)}), got {getattr(made, '__name__', made)}({', '.join(_arguments(made))}) for "
+                f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
+            )
+        known(kind, definition)
+        for other, derived in implied:
+            if kind is not object and other.dispatch(kind) is other.dispatch(object):
+                other.register(kind, derived)
+        return made
+
+    def implies(other: Any) -> Any:
+        def add(definition: Any) -> Any:
+            implied.append((other, definition))
+            return definition
+
+        return add
+
+    generic.register, generic.implies = register, implies
 
     @functools.wraps(function)
     def chosen(*args: Any) -> Any:
@@ -169,6 +203,10 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
 
     overload(generic, jit_options=options)(chosen)
     return generic
+
+
+def _arguments(function: Any) -> list[str]:
+    return list(inspect.signature(function).parameters)
 
 
 def select(condition: Any, first: Any, second: Any) -> Any:

@@ -11,6 +11,7 @@ from .contact.regularisation import regularisation
 from .errors import RunError, SceneError
 from .gravity import accelerated, displacement
 from .methods import AugmentedLagrangian, Impact, Method, Penalty
+from .methods.base import check_surfaces
 from .particles import Particles
 from .scene import Scene
 from .status import Status
@@ -88,6 +89,7 @@ def contact_history(
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
+    check_surfaces(method, scene)
     method.check(scene, particle)
     # Plain Python runs the functions that kernels are made of; with NumPy's numbers 1/0 is an infinity there too.
     start = [*particle.position[:, 0], *particle.velocity[:, 0]]

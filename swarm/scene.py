@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from .errors import SceneError
 from .gravity import Gravity
-from .surfaces import base
+from .surfaces import base, required
 from .surfaces.base import Box, Surface
 from .surfaces.chain import Chain, chain_of
 
@@ -30,6 +30,12 @@ _PAST = 1.05
 _BATCH = 4096
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6
+# What is cut off there is looked at again this far out, with the round-off of a vertex that is there.
+_FARTHEST, _ROUND_OFF = 1e15, 1e-14
+# Determinants of three normals: below the first they meet in a flat corner, below the second in none.
+_FLAT, _PARALLEL = 1e-12, 1e-15
+# Triples of planes that are intersected at once.
+_TRIPLES = 4096
 
 
 @dataclass(frozen=True, init=False)
@@ -58,6 +64,7 @@ class Scene:
         for i, surface in enumerate(surfaces):
             if not isinstance(surface, Surface):
                 raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
+        required.require_description(surfaces)
         pull = None if gravity is None else checks.vector("gravity", gravity)
         object.__setattr__(self, "surfaces", surfaces)
         walls = len(self.owners())
@@ -194,22 +201,41 @@ def _side(surface: Surface) -> float:
 def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
     """Bounds of the half-spaces' intersection with a box, from its vertices."""
     finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(offset) for _normal, offset in planes]
-    far = _FAR * (max(finite, default=0.0) or 1.0)
+    scale = max(finite, default=0.0) or 1.0
+    new_low, new_high, is_open, is_flat = _closed_bounds(planes, low, high, _FAR * scale, _FLAT, 1e-9)
+    if not (is_open or is_flat):
+        return new_low, new_high
+    far_low, far_high, is_open, _is_flat = _closed_bounds(planes, low, high, _FARTHEST * scale, 0.0, _ROUND_OFF)
+    if is_open:
+        return new_low, new_high
+    # Closed, but flat and far away, as a cone of half angle near pi/2: the bounds are as rough as vertices there.
+    rough = _ROUND_OFF * max(np.abs(far_low).max(), np.abs(far_high).max()) / scale * (far_high - far_low)
+    return np.maximum(low, far_low - rough), np.minimum(high, far_high + rough)
+
+
+def _closed_bounds(
+    planes: list[base.HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
+) -> tuple[Any, Any, bool, bool]:
+    """Bounds from the vertices within a far box; whether it cuts the volume off, and whether a vertex was too flat."""
     box_low, box_high = np.maximum(low, -far), np.minimum(high, far)
     normals = np.vstack([[normal for normal, _offset in planes], np.eye(3), -np.eye(3)])
     offsets = np.concatenate([[offset for _normal, offset in planes], box_high, -box_low])
-    vertices = []
-    for triple in itertools.combinations(range(len(offsets)), 3):
-        matrix = normals[list(triple)]
-        if abs(np.linalg.det(matrix)) > 1e-12:
-            vertex = np.linalg.solve(matrix, offsets[list(triple)])
-            if (normals @ vertex <= offsets + 1e-9 * (np.abs(offsets) + np.abs(vertex).max())).all():
-                vertices.append(vertex)
-    if not vertices:
-        return np.zeros(3), np.zeros(3)
-    found_low, found_high = np.min(vertices, axis=0), np.max(vertices, axis=0)
+    is_flat = False
+    found_low, found_high = np.full(3, math.inf), np.full(3, -math.inf)
+    triples = itertools.combinations(range(len(offsets)), 3)
+    while some := list(itertools.islice(triples, _TRIPLES)):
+        index = np.array(some)
+        flat = np.abs(np.linalg.det(normals[index]))
+        is_flat = is_flat or bool(((flat <= flattest) & (flat > _PARALLEL)).any())
+        index = index[flat > flattest]
+        vertices = np.linalg.solve(normals[index], offsets[index][:, :, None])[:, :, 0]
+        room = tolerance * (np.abs(offsets) + np.abs(vertices).max(axis=1, initial=0.0)[:, None])
+        vertices = vertices[(vertices @ normals.T <= offsets + room).all(axis=1)]
+        found_low = np.minimum(found_low, vertices.min(axis=0, initial=math.inf))
+        found_high = np.maximum(found_high, vertices.max(axis=0, initial=-math.inf))
+    if not (found_low <= found_high).all():
+        return np.zeros(3), np.zeros(3), False, is_flat
     new_low, new_high = np.maximum(low, found_low), np.minimum(high, found_high)
-    # A vertex on the far box means that the volume is open that way.
-    new_low[found_low <= -0.5 * far] = low[found_low <= -0.5 * far]
-    new_high[found_high >= 0.5 * far] = high[found_high >= 0.5 * far]
-    return new_low, new_high
+    open_low, open_high = found_low <= -0.5 * far, found_high >= 0.5 * far
+    new_low, new_high = np.where(open_low, low, new_low), np.where(open_high, high, new_high)
+    return new_low, new_high, bool(open_low.any() or open_high.any()), is_flat

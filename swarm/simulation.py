@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks, interrupt
+from . import checks, interrupt, workload
 from ._jit import kernels_compiled
 from .errors import SceneError
 from .frames import Frame, FrameTimes
-from .methods.base import Method
+from .methods.base import Method, check_surfaces
 from .output import paths
 from .output.storage import Storage
 from .particles import Multipliers, Particles
 from .run import Run
 from .scene import Scene
 from .sessions import Session
+from .surfaces.own import require_compiled
 
 if TYPE_CHECKING:
     from .output.beside import Beside, Writer
@@ -238,6 +239,8 @@ def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTim
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
     # The arrays of Particles may have been changed since it checked them.
     particles = particles.checked()
+    check_surfaces(method, scene)
+    require_compiled(scene.surfaces)
     method.check(scene, particles)
     assert times.every is not None
     method.span("until", times.until)
@@ -254,6 +257,7 @@ def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTim
             f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
             f"({type(scene.surfaces[wall]).__name__})"
         )
+    workload.check(scene, particles, method, times.until, times.every)
     return particles
 
 

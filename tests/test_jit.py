@@ -316,7 +316,7 @@ LAYERS = [
     ["sessions", "summary"],
     ["output", "progress", "run"],
     ["tables", "filling"],
-    ["observables", "blocks", "history"],
+    ["observables", "blocks", "history", "workload"],
     ["inner_solve"],
     ["lanes"],
     ["methods"],
@@ -325,7 +325,8 @@ LAYERS = [
     ["surfaces"],
     ["frames", "gravity"],
     ["checks"],
-    ["status", "_jit", "errors", "version", "interrupt"],
+    ["_jit"],
+    ["status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 

@@ -1,12 +1,13 @@
 """Scenes: which volumes they accept, their bounds and size."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from conftest import SURFACES, scene_of
 
-from swarm import Box, Ellipsoid, Plane, Scene, SceneError, Sphere
+from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill
 from swarm.gravity import Gravity
 from swarm.surfaces import base
 
@@ -148,3 +149,44 @@ def test_more_walls_than_can_be_compiled_are_refused():
     assert len(Scene([Box((0.5, 0.5, 0.5)), *balls]).owners()) == 24
     with pytest.raises(SceneError, match=r"at most 24 walls in all, got 45 of 43 surfaces: each wall is compiled"):
         Scene([Box((0.5, 0.5, 0.5)), *balls, *balls])
+
+
+# --- Far corners -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 2.0, 3.0)], ids=["along z", "oblique"])
+@pytest.mark.parametrize("short_of_flat", [1e-3, 2e-6, 1e-6, 5e-7, 1e-7, 1e-9, 1e-12])
+def test_a_flat_cone_that_a_plane_closes_is_not_open(axis, short_of_flat):
+    """Its rim is 1/tan(short_of_flat) away: bounds that hold it, not much larger, and the plane's and the apex'."""
+    cone = Cone(0.5 * math.pi - short_of_flat, axis=axis)
+    normal = np.array(axis) / np.linalg.norm(axis)
+    scene = Scene([cone, Plane(tuple(normal), 1.0)])
+    assert not scene.is_open()
+    rim = math.tan(cone.half_angle) * np.sqrt(1.0 - normal**2)
+    low, high = np.array(scene.bounds())
+    wide = rim > 1.0
+    assert (high >= (rim + np.maximum(normal, 0.0)) * (1.0 - 1e-9))[wide].all()
+    assert (low <= -(rim - np.maximum(-normal, 0.0)) * (1.0 - 1e-9))[wide].all()
+    assert (high - low <= 2.4 * (rim + 1.0)).all()
+    if axis == (0.0, 0.0, 1.0):
+        assert (low[2], high[2]) == pytest.approx((0.0, 1.0), abs=0.02)
+        particles = fill(scene, 100, speed=1.0)
+        assert (particles.position[2] > 0.0).all()
+    # Without the plane, or with it on the other side, it is open.
+    assert Scene([cone]).is_open()
+    assert Scene([cone, Plane(tuple(-normal), -1.0)]).is_open()
+
+
+def test_a_cone_that_is_a_plane_to_round_off_is_refused():
+    with pytest.raises(SceneError, match=r"half_angle must be at most pi/2 - 1e-12 rad, got .*use Plane"):
+        Cone(0.5 * math.pi - 1e-13)
+
+
+def test_many_planes_have_the_bounds_of_their_corners():
+    """More triples of planes than are intersected at once, against one corner after the other."""
+    normals = np.random.default_rng(2).normal(size=(30, 3))
+    normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
+    corners = [np.linalg.solve(normals[list(three)], np.ones(3)) for three in itertools.combinations(range(30), 3)]
+    corners = np.array([corner for corner in corners if (normals @ corner <= 1.0 + 1e-9).all()])
+    bounds = Scene([Plane(tuple(normal), 1.0) for normal in normals]).bounds()
+    assert bounds == (pytest.approx(corners.min(axis=0)), pytest.approx(corners.max(axis=0)))

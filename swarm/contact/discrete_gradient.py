@@ -11,7 +11,7 @@ Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .._jit import by_type, by_type_outlined, inlined, outlined
 from ..surfaces import base as surfaces
@@ -40,6 +40,11 @@ class MeanValue(NamedTuple):
 def form_of(gradient: str) -> Composite | MeanValue:
     """The form of a method's argument `gradient`."""
     return MeanValue() if gradient == "mean-value" else Composite()
+
+
+def reaction_needs(gradient: str) -> tuple[Any, ...]:
+    """What a step with that argument asks of every wall."""
+    return (*impulse.NEEDS, surfaces.resolve) if gradient == "mean-value" else impulse.NEEDS
 
 
 @by_type

@@ -8,6 +8,9 @@ from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import regularisation as law_of
 
+# What the force asks of every wall.
+NEEDS = (surfaces.inner, surfaces.gap_of, surfaces.gap_slope, surfaces.inner_gradient)
+
 
 @inlined
 def strength(law, surface, q):

@@ -15,6 +15,7 @@ from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
 from . import regularisation as law_of
 from .discrete_gradient import illinois, narrowed, reaction
+from .force import NEEDS as FORCE_NEEDS
 from .force import strength
 
 # The derivative of F is a difference quotient over this part of kappa: right to about the same part, so that a step of
@@ -25,6 +26,8 @@ _TOLERANCE = 1e-8
 SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 _EPSILON = 2.220446049250313e-16
+# What the equation asks of every wall.
+NEEDS = (*FORCE_NEEDS, surfaces.resolve, surfaces.farthest_push)
 
 
 class AtEnd(NamedTuple):

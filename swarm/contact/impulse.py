@@ -30,6 +30,11 @@ _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
 # A point whose coordinates would be on the surface within this part of themselves is on it.
 _ON_SURFACE = 8.0 * _EPSILON
+# What the equation asks of every wall, and its energy; multipliers ask for `gap_scale` too.
+NEEDS = (
+    surfaces.inner, surfaces.gap_of, surfaces.gap_slope, surfaces.gradient, surfaces.inner_gradient, surfaces.push,
+    surfaces.rise, surfaces.farthest_push,
+)  # fmt: skip
 
 
 @inlined

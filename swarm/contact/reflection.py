@@ -9,6 +9,7 @@ import math
 
 from .._jit import by_type, by_type_outlined, inlined, outlined, select
 from ..gravity import Gravity, Nothing, accelerated, potential
+from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from ..surfaces import flights
 
@@ -16,6 +17,8 @@ from ..surfaces import flights
 _TOLERANCE = 1e-7
 # |v|^2 is restored where it is off by no more than this part: a particle that all but stands still has no digits of it.
 _NEAR = 0.1
+# What a chord asks of every wall.
+CHORD_NEEDS = (surfaces.chord_guess, surfaces.chord_improve, surfaces.chord_normal, surfaces.first_hit, surfaces.settle)
 
 
 # --- The energy that a contact leaves --------------------------------------------------------------------

@@ -26,6 +26,8 @@ _BLOWS = 64
 _SWEEPS = 60
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
+# What these ask of every wall; exact reflections ask no more.
+NEEDS = (surfaces.first_hit, surfaces.unit_normal, surfaces.inner_gradient, surfaces.distance, surfaces.settle)
 
 
 @outlined

@@ -12,12 +12,15 @@ from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
-from ..contact.discrete_gradient import form_of
+from ..contact.discrete_gradient import form_of, reaction_needs
+from ..contact.reflection import CHORD_NEEDS
+from ..contact.sliding import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
+from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import adaptive_step, base, fixed_step
 
@@ -105,6 +108,11 @@ class AugmentedLagrangian(base.Method):
         else:
             fixed_step.check_solids(scene, particles, self.dt)
 
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        # The reaction, the chord that starts the loop, and the exact impacts that may replace a contact
+        contact = *reaction_needs(self.gradient), surfaces.gap_scale, *CHORD_NEEDS, *SLIDING_NEEDS
+        return *fixed_step.of_steps(scene), *contact
+
     def numbers(self, scene: Scene) -> "AugmentedLagrangianNumbers":
         return AugmentedLagrangianNumbers(
             self.dt,
@@ -120,6 +128,9 @@ class AugmentedLagrangian(base.Method):
 
     def too_fast(self, scene: Scene) -> str:
         return fixed_step.too_fast_failure(scene, self.dt)
+
+    def time_of_impact(self) -> float | None:
+        return self.dt if self.adaptive else None
 
     def span(self, name: str, duration: float) -> float:
         return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)

@@ -14,6 +14,8 @@ from .._jit import by_type, by_type_outlined
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces import base as surfaces
+from ..surfaces import required
 
 # A wall this low in place of a surface index asks for `hard_pass`: HARD - wall is the surface.
 HARD = -2.0
@@ -30,9 +32,17 @@ class Method:
     def check(self, scene: Scene, particles: Particles) -> None:
         """Raise a `SceneError` if this method cannot run this scene with these particles."""
 
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        """The functions of surfaces/base.py that its kernels ask of every wall."""
+        return ()
+
     def numbers(self, scene: Scene) -> Any:
         """The NamedTuple of numbers that kernels take in place of this description."""
         raise NotImplementedError
+
+    def time_of_impact(self) -> float | None:
+        """How long an impact takes besides the flight to it [s]; None where a frame costs steps, not impacts."""
+        return None
 
     def span(self, name: str, duration: float) -> float:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
@@ -61,6 +71,14 @@ class Method:
     def law(self) -> Any:
         """The regularisation whose stored energy counts as contact energy, or None for rigid walls."""
         return None
+
+
+def check_surfaces(method: Method, scene: Scene) -> None:
+    """Raise a `SceneError` if a surface does not give what the method, or what is observed, asks of it."""
+    purpose = type(method).__name__ + (" without gravity" if scene.gravity is None else " under gravity")
+    # `escaped` asks where flights without gravity end.
+    seen = (surfaces.first_hit,) if scene.is_open() and scene.gravity is None else ()
+    required.require(scene.surfaces, purpose, (*method.needs(scene), surfaces.distance, *seen))
 
 
 def check_elastic(name: str, scene: Scene) -> None:

@@ -111,6 +111,12 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
     return float(steps)
 
 
+def of_steps(scene: Scene) -> tuple[Any, ...]:
+    """What whole steps ask of every wall."""
+    asked: tuple[Any, ...] = flights.of_steps(scene.gravity is not None)
+    return asked
+
+
 @by_type
 def too_fast(longest, px, py, pz):
     """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""

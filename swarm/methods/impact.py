@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 from .. import checks
 from .._jit import by_type, kept, select
-from ..contact.reflection import chord_end, chord_step, chord_turn, exact
+from ..contact.reflection import CHORD_NEEDS, chord_end, chord_step, chord_turn, exact
+from ..contact.sliding import NEEDS as SLIDING_NEEDS
 from ..contact.sliding import impact
 from ..errors import SceneError
 from ..gravity import accelerated, displacement
@@ -14,6 +15,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls
+from ..surfaces import flights
 from . import base
 
 # Walls within this part of the scene's size hold a sliding particle together.
@@ -67,6 +69,13 @@ class Impact(base.Method):
                 f"contact_step must be 0 where a surface has a restitution below 1, got {self.contact_step:g}: "
                 "the contact step conserves the energy"
             )
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
+        return *flights.of_flights(scene.gravity is not None), *SLIDING_NEEDS, *chord
+
+    def time_of_impact(self) -> float:
+        return self.contact_step
 
     def is_rigid(self) -> bool:
         return True

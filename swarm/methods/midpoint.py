@@ -1,9 +1,9 @@
 """Midpoint: implicit steps with soft walls. It does not conserve the energy: a baseline for the charts."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ..contact import corner
+from ..contact import corner, implicit
 from ..gravity import accelerated
 from ..scene import Scene
 from . import fixed_step, implicit_rule
@@ -33,6 +33,9 @@ class Midpoint(fixed_step.SoftWalls):
     Traceback (most recent call last):
     swarm.errors.SceneError: penalty must be above 0, got -1
     """
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        return *fixed_step.of_steps(scene), *implicit.NEEDS
 
     def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
         return implicit_rule.RuleNumbers(self.dt, self.law(), fixed_step.longest_step(scene), MidpointRule())

@@ -10,7 +10,7 @@ from .._jit import scratch, select
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
-from ..contact.discrete_gradient import form_of, nested
+from ..contact.discrete_gradient import form_of, nested, reaction_needs
 from ..gravity import accelerated, displacement
 from ..scene import Scene
 from ..status import Status
@@ -52,6 +52,9 @@ class Penalty(fixed_step.SoftWalls):
 
     def seldom_hard(self, scene: Scene) -> bool:
         return self.gradient == "composite" and super().seldom_hard(scene)
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        return *fixed_step.of_steps(scene), *reaction_needs(self.gradient)
 
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
         return PenaltyNumbers(self.dt, self.law(), form_of(self.gradient), fixed_step.longest_step(scene))

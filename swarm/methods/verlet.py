@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .._jit import inlined, select
+from ..contact.force import NEEDS as FORCE_NEEDS
 from ..contact.force import add_impulses, force
 from ..gravity import accelerated, displacement
 from ..scene import Scene
@@ -38,6 +39,9 @@ class Verlet(fixed_step.SoftWalls):
     Traceback (most recent call last):
     swarm.errors.SceneError: dt must be above 0, got 0
     """
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        return *fixed_step.of_steps(scene), *FORCE_NEEDS
 
     def numbers(self, scene: Scene) -> "VerletNumbers":
         return VerletNumbers(self.dt, self.law(), fixed_step.longest_step(scene))

@@ -211,13 +211,26 @@ def may_be_far(surface):
 
 @by_type
 def falling_hit(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    """`first_hit` for the parabola r + v t + G t^2/2."""
+    """`first_hit` for the parabola r + v t + G t^2/2. Who gives a `course`, or a `bend` of smooth.py, has one."""
+    raise NotImplementedError
+
+
+@course.implies(falling_hit)
+def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     return first_rise(may_be_far(surface), *course(surface, x, y, z, vx, vy, vz, gx, gy, gz))
 
 
 @by_type
 def safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    """A time during which the parabola r + v t + G t^2/2 surely stays admissible: a lower bound, cheap."""
+    """A time during which the parabola r + v t + G t^2/2 surely stays admissible: a lower bound, cheap.
+
+    0 says nothing: a method then takes every one of its steps. Who gives a `course`, or a `bend`, has a better one.
+    """
+    return 0.0
+
+
+@course.implies(safe_time)
+def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     return safe_rise_time(*course(surface, x, y, z, vx, vy, vz, gx, gy, gz))
 
 

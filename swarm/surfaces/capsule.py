@@ -135,8 +135,6 @@ def _(surface, q0, q1):
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
-smooth.marches(CapsuleNumbers)
-
 
 @base.first_hit.register(CapsuleNumbers)
 def _(surface, x, y, z, vx, vy, vz):

@@ -12,6 +12,9 @@ from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved
 from .solid import body
 
+# A cone nearer to its tangent plane than this [rad] leaves it by round-off only.
+_FLATTEST = 1e-12
+
 
 @dataclass(frozen=True, repr=False)
 class Cone(Revolved):
@@ -44,6 +47,11 @@ class Cone(Revolved):
         angle = number("half_angle", self.half_angle, "a finite number of radians")
         if not 0.0 < angle < 0.5 * math.pi:
             raise SceneError(f"half_angle must be between 0 and pi/2 rad, got {angle:g}")
+        if angle > 0.5 * math.pi - _FLATTEST:
+            raise SceneError(
+                f"half_angle must be at most pi/2 - {_FLATTEST:g} rad, got pi/2 - {0.5 * math.pi - angle:.3g}: so "
+                "flat a cone is a plane to round-off; use Plane"
+            )
         object.__setattr__(self, "half_angle", angle)
 
     def numbers(self) -> QuadricNumbers:

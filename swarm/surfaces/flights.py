@@ -9,6 +9,18 @@ from .chain import Chain, outside
 from .course import arrived, close, leave, safe_step
 
 
+def of_flights(falls):
+    """What the free flights of a method ask of every wall, with gravity or without."""
+    return (base.falling_hit if falls else base.first_hit,)
+
+
+def of_steps(falls):
+    """The same for whole steps, some of which are jumped over."""
+    # The loops of a fall are compiled for every method.
+    free = (base.safe_time, base.falling_hit) if falls else (base.first_hit,)
+    return *free, base.inner, base.level_of
+
+
 @by_type
 def hit(gravity, surface, x, y, z, vx, vy, vz):
     """When the free flight leaves the admissible side of one surface: (time, whether it does then)."""

@@ -8,17 +8,18 @@ import collections
 import functools
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numba
 import numpy as np
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import overload
 from numpy.typing import ArrayLike
 
 from .. import checks
-from .._jit import _INLINE, inlined
+from .._jit import _INLINE, inlined, kernel
 from ..checks import Vector
 from ..errors import SceneError
 from . import base, smooth
@@ -236,6 +237,54 @@ def _register(
             return hessian(of(surface), x - surface.cx, y - surface.cy, z - surface.cz)
 
 
+# --- Whether it compiles ---------------------------------------------------------------------------------
+
+NUMBA_ERRORS = (NumbaError, UnsupportedBytecodeError)
+# Lines of Numba's errors that say where it was, not what the matter is.
+_WHERE = re.compile(
+    r"\s*(>>>|There (are|is) |- |Overload |Intrinsic |With argument|Rejected|During|raised from|File |No match|"
+    r"<source|Enable|$)|.*(Failed in nopython|No implementation of function)"
+)
+
+
+@kernel
+def _compiled_phi(surface, x, y, z):
+    return base.phi(surface, x, y, z) + 0.0
+
+
+@kernel
+def _compiled_gradient(surface, x, y, z):
+    gx, gy, gz = base.gradient(surface, x, y, z)
+    return gx + gy + gz
+
+
+def require_compiled(surfaces: Sequence[base.Surface]) -> None:
+    """Raise a `SceneError` where Numba cannot compile a function: in a moment, before half a minute of a kernel."""
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return
+    for surface in surfaces:
+        if isinstance(surface, OwnSurface):
+            numbers: Any = surface.numbers()
+            kinds = (numba.typeof(numbers), *(numba.float64,) * 3)
+            for function, compiled in (
+                (surface.phi_function, _compiled_phi),
+                (surface.gradient_function, _compiled_gradient),
+            ):
+                try:
+                    compiled.compile(kinds)  # type: ignore[attr-defined]
+                except NUMBA_ERRORS as error:
+                    raise not_compiled(function.__name__, error) from None
+
+
+def not_compiled(name: str, error: Exception) -> SceneError:
+    """The error about a function of that name, with the first line of Numba's that says what the matter is."""
+    lines = [line.strip() for line in str(error).splitlines() if not _WHERE.match(line)]
+    matter = lines[0] if lines else str(error).strip().splitlines()[0]
+    if "NRT required" in matter or "Only accept returning of array" in matter:
+        matter = "it makes a list or an array, for which kernels have no memory"
+    return SceneError(f"{name} must be a function of numbers that Numba can compile, got one that it cannot: {matter}")
+
+
 def _for_arrays(function: Callable[..., Any], count: int) -> Callable[..., Any]:
     """The function, which in Python takes arrays of points too, whatever it is made of."""
     plain: list[bool] = []
@@ -258,7 +307,10 @@ def _for_arrays(function: Callable[..., Any], count: int) -> Callable[..., Any]:
         rows = [np.ascontiguousarray(row, dtype=np.float64).ravel() for row in np.broadcast_arrays(x, y, z)]
         out = np.empty((rows[0].size, count)) if count > 1 else np.empty(rows[0].size)
         with np.errstate(all="ignore"):
-            loop()(parameters, *rows, out)
+            try:
+                loop()(parameters, *rows, out)
+            except NUMBA_ERRORS as error:
+                raise not_compiled(function.__name__, error) from None
         shape = np.broadcast(x, y, z).shape
         return tuple(column.reshape(shape) for column in out.T) if count > 1 else out.reshape(shape)
 

@@ -120,10 +120,6 @@ def _outside(surface, x, y, z):
     return max(across, surface.low[2] - dz, dz - surface.high[2])
 
 
-# The straight march below knows more; this one falls.
-smooth.marches(OwnNumbers)
-
-
 @smooth.bend.register(OwnNumbers)
 def _(surface, x, y, z):
     # Around a solid the bend is known up to the margin; half way there `clearance` takes over.

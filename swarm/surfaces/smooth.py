@@ -48,6 +48,7 @@ def difference(surface, x0, y0, z0, x1, y1, z1):
 def bend(surface, x, y, z):
     """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
 
+    Who gives it has the march of this file as `first_hit`, `falling_hit` and `safe_time`, unless it registers its own.
     The distance may only be infinite where there is no gravity.
     """
     raise NotImplementedError
@@ -91,17 +92,12 @@ def _(surface, q0, q1):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-def marches(numbers):
-    """Register the march of this file as the flight of a surface: for what is no quadric, but says how it bends."""
-    base.first_hit.register(numbers)(_first_hit)
-    base.falling_hit.register(numbers)(_march)
-    base.safe_time.register(numbers)(_safe_time)
-
-
+@bend.implies(base.first_hit)
 def _first_hit(surface, x, y, z, vx, vy, vz):
     return _march(surface, x, y, z, vx, vy, vz, 0.0, 0.0, 0.0)
 
 
+@bend.implies(base.safe_time)
 def _safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     level, _half, step, _way = _safe_step(surface, x, y, z, vx, vy, vz, gx, gy, gz)
     return select(level > 0.0, 0.0, step)
@@ -109,7 +105,7 @@ def _safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz):
 
 @base.course.register(object)
 def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    # No polynomial. The compiler wants a type also for what is not asked.
+    # No polynomial: nobody asks for it who has not given `is_quartic`. The compiler wants a type all the same.
     return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
 
 
@@ -160,6 +156,7 @@ def _travelled(speed, pull, t):
     return (speed + 0.5 * pull * t) * t
 
 
+@bend.implies(base.falling_hit)
 @outlined
 def _march(surface, x, y, z, vx, vy, vz, gx, gy, gz):
     """Safe steps to the first root of the level along the flight."""
@@ -180,6 +177,10 @@ def _march(surface, x, y, z, vx, vy, vz, gx, gy, gz):
         if (i > 0 or step == 0.0) and way <= 2.0 * _EPSILON * (abs(px) + abs(py) + abs(pz)):
             return t, True
     return t, False
+
+
+# What `bend` implies.
+MARCHES = (_first_hit, _march, _safe_time)
 
 
 @outlined

@@ -138,8 +138,6 @@ def _(surface, q0, q1):
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
-smooth.marches(TorusNumbers)
-
 
 @smooth.bend.register(TorusNumbers)
 def _(surface, x, y, z):

@@ -15,7 +15,7 @@ import pytest
 from conftest import call
 
 import swarm
-from swarm import _jit, tables
+from swarm import _jit, blocks, tables
 from swarm.surfaces import base, frozen, own, smooth
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
@@ -203,6 +203,67 @@ def test_errors_name_the_argument(arguments, keywords, parts):
     with pytest.raises(swarm.SceneError) as caught:
         swarm.OwnSurface(*arguments, **{"size": 0.3, "bounds": BOX, **keywords})
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+class Thing:
+    radius = 0.4
+
+
+THING = Thing()
+
+
+def of_a_list(axes, x, y, z):
+    parts = [x / axes.a, y / axes.b, z / axes.c]
+    return parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2] - 1.0
+
+
+def of_an_array(axes, x, y, z):
+    parts = np.array([x / axes.a, y / axes.b, z / axes.c])
+    return (parts * parts).sum() - 1.0
+
+
+def of_an_object(axes, x, y, z):
+    return phi(axes, x, y, z) + 0.0 * THING.radius
+
+
+def of_another_name(axes, x, y, z):
+    return phi(axes, x, y, z) if x < 100.0 else axes.d
+
+
+def a_list(axes, x, y, z):
+    gx, gy, gz = gradient(axes, x, y, z)
+    return [gx, gy, gz]
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    ("functions", "parts"),
+    [
+        ((of_a_list, gradient), ["of_a_list", "list or an array"]),
+        ((of_an_array, gradient), ["of_an_array", "list or an array"]),
+        ((of_an_object, gradient), ["of_an_object", "THING", "Thing"]),
+        ((of_another_name, gradient), ["of_another_name", "Unknown attribute 'd'"]),
+        ((phi, a_list), ["a_list", "list or an array"]),
+    ],
+    ids=lambda value: value[0].__name__ if callable(value[0]) else "",
+)
+def test_what_numba_cannot_compile_is_one_sentence(functions, parts, tmp_path):
+    """Found before a kernel is compiled or a file is written."""
+    before = len(blocks.advance_block.signatures)
+
+    def run():
+        scene = swarm.Scene([swarm.OwnSurface(Axes(0.3, 0.4, 0.5), *functions, size=0.3, bounds=BOX)])
+        particles = swarm.fill(scene, 1, speed=1.0)
+        swarm.simulate(scene, particles, swarm.Impact(), until=0.1, trajectory=tmp_path / "own.h5")
+
+    with pytest.raises(swarm.SceneError) as caught:
+        run()
+    told = str(caught.value)
+    assert "\n" not in told
+    assert len(told) < 250
+    assert all(part in told for part in (*parts, "Numba can compile")), told
+    assert len(blocks.advance_block.signatures) == before
+    assert not list(tmp_path.iterdir())
 
 
 # --- The digest ------------------------------------------------------------------------------------------

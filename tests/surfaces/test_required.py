@@ -1,0 +1,349 @@
+"""What a surface must give: said in one sentence before anything compiles, and no default that means "never"."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from conftest import METHODS, SURFACES, call
+
+import swarm
+from swarm import blocks, observables
+from swarm.methods import base as methods
+from swarm.surfaces import base, rotation, smooth
+from swarm.surfaces.solid import body
+
+SHIPPED = {
+    **SURFACES,
+    "box": lambda: swarm.Box((0.5, 0.5, 0.5)),
+    "rotated box": lambda: swarm.Box((0.5, 0.5, 0.5), rotation=(1.0, 2.0, 3.0, 4.0)),
+    "brick": lambda: swarm.Box((0.5, 0.5, 0.5), side="outside"),
+    "cylinder": lambda: swarm.Cylinder(0.5),
+    "pillar": lambda: swarm.Cylinder(0.5, side="outside"),
+    "cone": lambda: swarm.Cone(0.5),
+    "spike": lambda: swarm.Cone(0.5, side="outside", rotation=(1.0, 2.0, 3.0, 4.0)),
+    "paraboloid": lambda: swarm.Paraboloid(0.5),
+    "hill": lambda: swarm.Paraboloid(0.5, side="outside"),
+    "quadric": lambda: swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)), (0.0, 0.0, 0.0), -1.0),
+    "slab": lambda: swarm.Slab((0.0, 0.0, 1.0), 0.5),
+    "plate": lambda: swarm.Slab((0.0, 0.0, 1.0), 0.5, side="outside"),
+}
+PULL = (0.0, 0.0, -9.81)
+
+
+# --- Surfaces as a developer writes them -----------------------------------------------------------------
+
+
+def ball_like(*functions, sided=True):
+    """A new class of numbers, and the surface of it: the unit sphere, with these functions registered."""
+    fields = [("r", float), ("side", float)] if sided else [("r", float), ("sign", float)]
+    numbers = NamedTuple("MineNumbers", fields)
+    for function in functions:
+        DEFINITIONS[function.__name__](function, numbers)
+
+    @dataclass(frozen=True, repr=False)
+    class Mine(base.Surface):
+        side: str = "inside"
+
+        def numbers(self):
+            return numbers(1.0, base.side_sign(self.side))
+
+        def size(self):
+            return 1.0
+
+        def bounds(self):
+            return base.box_around((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), self.side)
+
+        def extent(self):
+            return 1.0
+
+        def own_center(self):
+            return (0.0, 0.0, 0.0)
+
+    return Mine
+
+
+def _phi(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z):
+        return x * x + y * y + z * z - surface.r * surface.r
+
+
+def _gradient(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z):
+        return 2.0 * x, 2.0 * y, 2.0 * z
+
+
+def _first_hit(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z, vx, vy, vz):
+        b, a = x * vx + y * vy + z * vz, vx * vx + vy * vy + vz * vz
+        return (np.sqrt(b * b - a * (x * x + y * y + z * z - 1.0)) - b) / a, True
+
+
+def _hessian(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z):
+        return 1.0, 1.0, 1.0, 0.0, 0.0, 0.0
+
+
+def _bend(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z):
+        return 1.0, 1.0, 1.0
+
+
+def _farthest_push(generic, numbers):
+    @generic.register(numbers)
+    def _(surface):
+        return surface.side * np.inf
+
+
+def _is_quartic(generic, numbers):
+    @generic.register(numbers)
+    def _(surface):
+        return True
+
+
+def _inner(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z):
+        return x * x + y * y + z * z
+
+
+def _course(generic, numbers):
+    @generic.register(numbers)
+    def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
+        return (
+            surface.side * (x * x + y * y + z * z - 1.0),
+            surface.side * (x * vx + y * vy + z * vz),
+            surface.side * (vx * vx + vy * vy + vz * vz + x * gx + y * gy + z * gz),
+            surface.side * (vx * gx + vy * gy + vz * gz),
+            surface.side * 0.25 * (gx * gx + gy * gy + gz * gz),
+            1.0,
+        )
+
+
+DEFINITIONS = {
+    "phi": _phi,
+    "gradient": _gradient,
+    "first_hit": _first_hit,
+    "hessian": _hessian,
+    "bend": _bend,
+    "farthest_push": _farthest_push,
+    "is_quartic": _is_quartic,
+    "inner": _inner,
+    "course": _course,
+}
+LEVEL = (base.phi, base.gradient)
+PARTICLES = swarm.Particles([[0.1], [0.2], [0.3]], [[0.5], [0.0], [0.1]])
+
+
+def refused(surface, method, gravity=None):
+    """The sentence, after which nothing has been compiled."""
+    kernels = (blocks.advance_block, observables.observe, observables.start_energies)
+    before = [] if numba.config.DISABLE_JIT else [len(kernel.signatures) for kernel in kernels]
+    scene = swarm.Scene([swarm.Box((2.0, 2.0, 2.0)), surface], gravity)
+    with pytest.raises(swarm.SceneError) as caught:
+        swarm.simulate(scene, PARTICLES, method, until=0.1)
+    assert before == ([] if numba.config.DISABLE_JIT else [len(kernel.signatures) for kernel in kernels])
+    told = str(caught.value)
+    assert "\n" not in told
+    assert len(told) < 300
+    assert "surfaces[1] (Mine)" in told
+    assert "MineNumbers" in told
+    assert type(method).__name__ in told
+    return told
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    """Every surface, as a cavity and as a solid, some of them turned."""
+    return [make() for make in SHIPPED.values()]
+
+
+@pytest.mark.parametrize("gravity", [None, PULL], ids=["no gravity", "gravity"])
+@pytest.mark.parametrize("name", METHODS)
+def test_every_shipped_surface_gives_what_every_method_needs(shipped, name, gravity):
+    for surface in shipped:
+        methods.check_surfaces(METHODS[name], swarm.Scene([surface], gravity))
+
+
+# --- No default means "never" ----------------------------------------------------------------------------
+
+
+def test_no_falling_hit_is_refused_under_gravity():
+    told = refused(ball_like(*LEVEL, base.first_hit)(), swarm.Impact(), PULL)
+    assert "base.falling_hit" in told
+    assert "smooth.bend" in told
+    assert "under gravity" in told
+
+
+def test_without_gravity_it_is_not_asked():
+    scene = swarm.Scene([ball_like(*LEVEL, base.first_hit)()])
+    methods.check_surfaces(swarm.Impact(), scene)
+    methods.check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
+
+
+def test_steps_that_know_no_safe_time_are_all_taken():
+    """A lower bound that says nothing is 0, never infinity."""
+    wall = ball_like(*LEVEL)().numbers()
+    assert call(base.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
+
+
+@pytest.mark.parametrize("given", [smooth.bend, base.course], ids=["bend", "course"])
+def test_flights_follow_from_what_is_given(given):
+    """The fall of a unit sphere from its bend or its course is that of the shipped one."""
+    mine, shipped = ball_like(*LEVEL, given)().numbers(), swarm.Sphere(1.0).numbers()
+    rng = np.random.default_rng(1)
+    pull = np.array(PULL)
+    for _ in range(20):
+        position, velocity = rng.uniform(-0.5, 0.5, 3), rng.normal(size=3)
+        assert sum_of_hits(mine, position, velocity, pull) == pytest.approx(
+            sum_of_hits(shipped, position, velocity, pull), rel=1e-9
+        )
+        assert 0.0 < call(base.safe_time, mine, position, velocity, pull) <= sum_of_hits(mine, position, velocity, pull)
+
+
+def sum_of_hits(surface, position, velocity, pull):
+    """The time of the first hit, in as many parts as it takes."""
+    total = 0.0
+    for _part in range(100):
+        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        total += time
+        if found:
+            return total
+        position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
+    raise AssertionError("not found")
+
+
+def test_what_is_given_is_not_replaced():
+    shipped = base.first_hit.dispatch(type(swarm.Capsule(0.5, 1.0).numbers()))
+    assert shipped.__module__ == "swarm.surfaces.capsule"
+    numbers = type(ball_like(*LEVEL, base.first_hit, smooth.bend)().numbers())
+    assert base.first_hit.dispatch(numbers).__module__ == __name__
+    assert base.falling_hit.dispatch(numbers) is smooth._march
+
+
+def test_a_quartic_without_its_polynomial_is_refused():
+    surface = ball_like(*LEVEL, base.first_hit, smooth.bend, base.is_quartic)()
+    assert "base.course" in refused(surface, swarm.Impact(), PULL)
+
+
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.1, penalty=1.0)], ids=["impact", "penalty"])
+def test_another_inner_function_comes_with_its_gap(method):
+    """q without g(q) would count q itself as the gap."""
+    told = refused(ball_like(*LEVEL, base.first_hit, smooth.hessian, base.farthest_push, base.inner)(), method)
+    assert "base.gap_of for its `inner`" in told
+
+
+def test_the_sign_of_the_gap_is_asked_for():
+    told = refused(ball_like(*LEVEL, base.first_hit, sided=False)(), swarm.Impact())
+    assert "the field `side`" in told
+
+
+# --- One sentence ----------------------------------------------------------------------------------------
+
+COMPLETE = (*LEVEL, base.first_hit, smooth.bend, smooth.hessian, base.farthest_push)
+NEED_HESSIAN = [name for name in METHODS if name not in ("impact", "verlet")]
+
+
+@pytest.mark.parametrize("gravity", [None, PULL], ids=["no gravity", "gravity"])
+@pytest.mark.parametrize("name", METHODS)
+def test_what_each_method_needs(name, gravity):
+    given = [f for f in COMPLETE if f is not smooth.hessian]
+    without, whole = (swarm.Scene([ball_like(*some)()], gravity) for some in (given, COMPLETE))
+    methods.check_surfaces(METHODS[name], whole)
+    if name in NEED_HESSIAN:
+        with pytest.raises(swarm.SceneError, match=r"smooth\.hessian"):
+            methods.check_surfaces(METHODS[name], without)
+    else:
+        methods.check_surfaces(METHODS[name], without)
+
+
+def test_no_hessian_and_no_farthest_push_are_named_together():
+    told = refused(ball_like(*LEVEL, base.first_hit)(), swarm.Penalty(dt=0.1, penalty=1.0))
+    assert "base.farthest_push and smooth.hessian" in told
+
+
+def test_no_first_hit():
+    assert "base.first_hit" in refused(ball_like(*LEVEL)(), swarm.Impact())
+
+
+def test_a_scene_asks_for_phi_and_gradient():
+    for given, missing in (((base.phi,), "base.gradient"), ((base.gradient,), "base.phi")):
+        with pytest.raises(swarm.SceneError, match=f"surfaces\\[0\\] \\(Mine\\).*MineNumbers without {missing}"):
+            swarm.Scene([ball_like(*given)()])
+
+
+@pytest.mark.parametrize("name", ["size", "bounds", "extent", "numbers"])
+def test_a_class_without_a_method(name):
+    kind = ball_like(*COMPLETE)
+    delattr(kind, name)
+    with pytest.raises(swarm.SceneError, match=rf"surfaces\[0\] .*Mine without {name}\(\)"):
+        swarm.Scene([kind()])
+
+
+def test_the_parts_of_wrapped_walls_are_asked():
+    kind = ball_like(*LEVEL, base.first_hit)
+    part = kind("outside").numbers()
+    turned = rotation.rotated((0.5, 0.5, 0.5, 0.5), part)
+    for wall in (turned, body((part, swarm.Plane((0.0, 0.0, 1.0), 0.0).numbers())), body((turned,))):
+
+        class Wrapped(kind):
+            def walls(self, wall=wall):
+                return (wall,)
+
+        scene = swarm.Scene([Wrapped("outside")], PULL)
+        with pytest.raises(swarm.SceneError, match=r"MineNumbers without base\.falling_hit"):
+            methods.check_surfaces(swarm.Impact(), scene)
+
+
+def test_a_history_asks_too():
+    scene = swarm.Scene([ball_like(*LEVEL, base.first_hit)()])
+    with pytest.raises(swarm.SceneError, match=r"smooth\.hessian"):
+        swarm.contact_history(scene, (0.9, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, swarm.Penalty(dt=0.2, penalty=1.0))
+
+
+# --- Registration ----------------------------------------------------------------------------------------
+
+
+def wall_first(wall, x, y, z):
+    return 0.0
+
+
+def points(surface, a, b, c):
+    return 0.0
+
+
+def too_few(surface, x, y):
+    return 0.0
+
+
+@pytest.mark.parametrize("as_call", [True, False])
+@pytest.mark.parametrize("wrong", [wall_first, points, too_few])
+def test_argument_names_are_asked_at_registration(wrong, as_call):
+    class Numbers(NamedTuple):
+        r: float
+
+    with pytest.raises(swarm.SceneError) as caught:
+        base.phi.register(Numbers, wrong) if as_call else base.phi.register(Numbers)(wrong)
+    told = str(caught.value)
+    assert "\n" not in told
+    for part in ("swarm.surfaces.base.phi", "(surface, x, y, z)", wrong.__name__, "Numbers"):
+        assert part in told
+    assert base.phi.dispatch(Numbers) is base.phi.dispatch(object)
+
+
+def test_registration_is_that_of_singledispatch():
+    class Numbers(NamedTuple):
+        r: float
+
+    def right(surface, x, y, z):
+        return 3.0
+
+    assert base.phi.register(Numbers, right) is right
+    assert base.phi.registry[Numbers] is right
+    assert base.phi(Numbers(1.0), 0.0, 0.0, 0.0) == 3.0
