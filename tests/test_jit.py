@@ -266,7 +266,6 @@ def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
 # --- The start -------------------------------------------------------------------------------------------
 
 
-@compiled_only
 def one_more(x):
     return x + 1.0
 
@@ -287,6 +286,7 @@ def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkey
     assert told == [sentence]
 
 
+@compiled_only
 def test_no_kernel_waits_for_scipy():
     """Numba imports it before its first kernel, for products of matrices; a kernel that has them finds it still."""
     code = """
