@@ -17,7 +17,7 @@ pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 
 def command(*args, cwd):
-    return subprocess.run([sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=300)
+    return subprocess.run([sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=600)
 
 
 @pytest.fixture
@@ -128,7 +128,7 @@ def test_interrupt_keeps_finished_frames(folder, request):
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
     request.addfinalizer(process.kill)
-    deadline = time.monotonic() + 200.0
+    deadline = time.monotonic() + 600.0
     frames = 0
     while frames < 5 and time.monotonic() < deadline:
         time.sleep(0.2)
@@ -139,7 +139,7 @@ def test_interrupt_keeps_finished_frames(folder, request):
             except swarm.SceneError:
                 continue  # the very first moment, before the first flush
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, told = process.communicate(timeout=600)
     assert process.returncode == 130
     assert b"interrupted" in told
     with swarm.load(folder / "scene.h5") as trajectory:
@@ -148,22 +148,26 @@ def test_interrupt_keeps_finished_frames(folder, request):
 
 
 def test_wall_time_and_resume(folder):
-    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits."""
-    text = GOOD.replace("until = 1.0", "until = 8e6").replace("every = 0.5", "every = 2e6")
+    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits. A nanosecond is over at the
+    first frame."""
+    text = GOOD.replace("until = 1.0", "until = 8e4").replace("every = 0.5", "every = 2e4")
     (folder / "scene.toml").write_text(text)
-    first = command("run", "scene.toml", "--walltime", "0.2s", "--json", cwd=folder)
+    limit = "0.000000001s"
+    first = command("run", "scene.toml", "--walltime", limit, "--json", cwd=folder)
     assert first.returncode == 0
     assert "the wall time is over" in first.stderr
     told = json.loads(first.stdout)
     assert told["status"] == "walltime"
-    assert told["resume"] == "swarm run scene.toml --walltime 0.2s --json --resume"
+    assert told["resume"] == f"swarm run scene.toml --walltime {limit} --json --resume"
+    with swarm.load(folder / "scene.h5") as begun:
+        assert begun.times.tolist() == [0.0]
     assert (folder / "scene.h5.checkpoint").exists()
     assert command("run", "scene.toml", cwd=folder).returncode == 2
     second = command("run", "scene.toml", "--resume", "--json", cwd=folder)
     told = json.loads(second.stdout)
     assert (second.returncode, second.stderr) == (0, "")
-    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 8e6, 10)
-    assert told["impacts"] > 5e7
+    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 8e4, 10)
+    assert told["impacts"] > 5e5
     assert told["energy_error"] < 1e-14
     assert sorted(path.name for path in folder.iterdir()) == ["scene.h5", "scene.toml"]
     third = command("run", "scene.toml", "--resume", cwd=folder)
@@ -191,7 +195,7 @@ def test_a_full_disk_is_exit_code_1_and_the_run_goes_on_later(folder):
     assert (whole.returncode, whole.stderr) == (0, "")
     limit = 8_000_000
     done = subprocess.run(
-        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=100,
+        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
     )  # fmt: skip
     assert done.returncode == 1

@@ -2,11 +2,13 @@
 
 import signal
 import threading
+import time
 import weakref
 
 import pytest
 
 import swarm
+from swarm.run import Run
 
 CAVITY = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 
@@ -92,11 +94,23 @@ def test_other_threads_have_no_handler():
     assert done
 
 
-def test_a_long_frame_stops_within():
-    """The first frame is one of 1e10 impacts."""
-    swarm.simulate(CAVITY, swarm.fill(CAVITY, 10, speed=1.0), swarm.Impact(), until=1.0, threads=1)  # compiled
-    timer = threading.Timer(1.0, signal.pthread_kill, [threading.main_thread().ident, signal.SIGINT])
-    timer.start()
+def test_a_long_frame_stops_within(monkeypatch):
+    """The first frame is one of 1e11 impacts; the signal comes when its thread is at them."""
+    advance = Run.advance
+
+    def interrupted(run, *arguments):
+        def interrupt():
+            while run._ticket[0] == 0:
+                time.sleep(0.001)
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+        thread = threading.Thread(target=interrupt)
+        thread.start()
+        try:
+            return advance(run, *arguments)
+        finally:
+            thread.join()
+
+    monkeypatch.setattr(Run, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        swarm.simulate(CAVITY, swarm.fill(CAVITY, 10, speed=1.0), swarm.Impact(), until=1e9, threads=1)
-    timer.join()
+        swarm.simulate(CAVITY, swarm.fill(CAVITY, 10, speed=1.0), swarm.Impact(), until=1e10, threads=1)
