@@ -2,7 +2,6 @@
 
 import signal
 import threading
-import time
 import weakref
 
 import pytest
@@ -99,16 +98,20 @@ def test_a_long_frame_stops_within(monkeypatch):
     advance = Run.advance
 
     def interrupted(run, *arguments):
+        over = threading.Event()
+
         def interrupt():
-            while run._ticket[0] == 0:
-                time.sleep(0.001)
-            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+            while not over.wait(0.001):
+                if run._ticket[0] > 0:
+                    signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+                    return
 
         thread = threading.Thread(target=interrupt)
         thread.start()
         try:
             return advance(run, *arguments)
         finally:
+            over.set()
             thread.join()
 
     monkeypatch.setattr(Run, "advance", interrupted)

@@ -64,12 +64,13 @@ def test_layout_is_h5md(run):
 
 def wait_for(path, frames):
     """Return when a file that is being written holds so many frames."""
-    held = 0
-    while held < frames:
-        time.sleep(0.01)
+    for _ in range(60_000):
         if path.exists():
             with swarm.load(path) as trajectory:
-                held = len(trajectory)
+                if len(trajectory) >= frames:
+                    return
+        time.sleep(0.01)
+    pytest.fail(f"after ten minutes there are no {frames} frames")
 
 
 def test_a_file_being_written_can_be_read(tmp_path):
