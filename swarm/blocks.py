@@ -41,6 +41,8 @@ from .surfaces.course import MORE_STEPS, SAFE_STEPS
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
+# Passes after which a call of `advance_block` that nobody halts would return.
+NEVER = 2**63 - 1
 
 
 class Hard(NamedTuple):
@@ -53,13 +55,14 @@ class Hard(NamedTuple):
 def advance_block(method, chain, gravity, hard, state, done, halted, span, draws, halt, lanes):
     """Advance what `draws` gives by `span` and return (status, particle, drawn): DONE, or the first that failed.
 
-    `drawn` is how many draws that were; `span` is in the method's unit; `lanes` are any. `halt[0]` set to 1 by another
-    thread ends it at its next pass: (INTERRUPTED, live lanes, drawn), and `lanes.left_behind` has what these held,
-    which the next call takes as `halted`. Particles that are `done` are left alone, and those that arrive become it:
-    where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
+    `drawn` is how many draws that were; `span` is in the method's unit; `lanes` are any. After `halt[0]` passes, which
+    another thread may change at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and
+    `lanes.left_behind` has what these held, which the next call takes as `halted`. Particles that are `done` are left
+    alone, and those that arrive become it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to
+    go on from there with what can do it.
     """
     lanes = with_distances(lanes)
-    following, stop, drawn, live = 0, 0, 0, 0
+    following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
         following, stop, drawn = following_particle(draws, done, following, stop, drawn)
         if following == stop:
@@ -68,9 +71,10 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
         following += 1
         live += 1
     while live > 0:
-        if halt[0] != 0:
+        if passes >= halt[0]:
             leave(lanes, live)
             return Status.INTERRUPTED.value, live, drawn
+        passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, state.multipliers, lanes, live)
         if some_hard:
             status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)

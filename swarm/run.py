@@ -60,7 +60,7 @@ class Run:
         self._draws = math.ceil(n / self._size)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
-        self._halt = np.zeros(1, np.int8)
+        self._halt = np.full(1, blocks.NEVER)
         self._done = np.zeros(n, np.bool_)
         self._halted = lanes.nobody(len(self._owners))
         self._cut_short = False
@@ -76,9 +76,13 @@ class Run:
         self.halt()
         self._pool.shutdown(wait=True)
 
-    def halt(self) -> None:
-        """Let the kernels return before their frame is done."""
-        self._halt[0] = 1
+    def halt(self, passes: int = 0) -> None:
+        """Let each call of a kernel return after so many passes, before its frame is done; 0: at once.
+
+        It holds until `advance` returns. It never takes back a halt that comes sooner, not even one that a signal or
+        another thread asks for meanwhile: NumPy compares and writes under one hold of the interpreter's lock.
+        """
+        np.minimum(self._halt, passes, out=self._halt)
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
@@ -93,7 +97,7 @@ class Run:
             self._hard = blocks.Hard(blocks.MOST_HITS)
             status, particle = self._all_shares(span, writing, latest)
         self._cut_short = status == Status.INTERRUPTED
-        self._halt[0] = 0
+        self._halt[0] = blocks.NEVER
         if status not in (Status.DONE, Status.INTERRUPTED):
             told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
             if status == Status.TOO_FAST:

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 def command(*args, cwd, **more):
     done = subprocess.run(
-        [sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=300, **more
+        [sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=600, **more
     )
     # Whether it compiles depends on what ran before.
     lines = done.stderr.splitlines(keepends=True)
@@ -196,7 +196,7 @@ cli.main()
 """
     words = ["run", "scene.toml", "--json", *options]
     done = subprocess.run(
-        [sys.executable, "-c", code.format(at=1), *words], cwd=folder, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", code.format(at=1), *words], cwd=folder, capture_output=True, text=True, timeout=600
     )
     told = json.loads(done.stdout)
     assert (done.returncode, told["status"], told["frames"]) == (130, "interrupted", 2)
@@ -224,7 +224,7 @@ main()
 def test_an_interrupt_in_an_import_is_one_word(folder, name):
     done = subprocess.run(
         [sys.executable, "-c", INTERRUPTED.format(name=name), "run", "scene.toml"],
-        cwd=folder, capture_output=True, text=True, timeout=300,
+        cwd=folder, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
     assert [path.name for path in folder.iterdir()] == ["scene.toml"]
@@ -245,7 +245,7 @@ cli._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
 from swarm.__main__""",
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", code, "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600
     )
     lines = [line for line in done.stderr.splitlines() if not line.startswith("compiling")]
     assert (done.returncode, lines) == (130, ["interrupted"])
@@ -257,7 +257,7 @@ def test_what_compiles_is_said(folder):
     for expected in (True, False):
         done = subprocess.run(
             [sys.executable, "-m", "swarm", "run", "scene.toml", "--overwrite"],
-            cwd=folder, capture_output=True, text=True, timeout=300, env=environment,
+            cwd=folder, capture_output=True, text=True, timeout=600, env=environment,
         )  # fmt: skip
         assert done.returncode == 0
         assert ("compiling a kernel for this kind of scene (advance_block), once" in done.stderr) == expected
@@ -301,7 +301,7 @@ def test_interrupt_keeps_finished_frames(folder, request):
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
     request.addfinalizer(process.kill)
-    deadline = time.monotonic() + 200.0
+    deadline = time.monotonic() + 600.0
     frames = 0
     while frames < 5 and time.monotonic() < deadline:
         time.sleep(0.2)
@@ -312,7 +312,7 @@ def test_interrupt_keeps_finished_frames(folder, request):
             except swarm.SceneError:
                 continue  # the very first moment, before the first flush
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, told = process.communicate(timeout=600)
     assert process.returncode == 130
     assert b"interrupted" in told
     with swarm.load(folder / "scene.h5") as trajectory:
@@ -321,22 +321,26 @@ def test_interrupt_keeps_finished_frames(folder, request):
 
 
 def test_wall_time_and_resume(folder):
-    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits."""
-    text = GOOD.replace("until = 1.0", "until = 8e6").replace("every = 0.5", "every = 2e6")
+    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits. A nanosecond is over at the
+    first frame."""
+    text = GOOD.replace("until = 1.0", "until = 8e4").replace("every = 0.5", "every = 2e4")
     (folder / "scene.toml").write_text(text)
-    first = command("run", "scene.toml", "--walltime", "0.2s", "--json", cwd=folder)
+    limit = "0.000000001s"
+    first = command("run", "scene.toml", "--walltime", limit, "--json", cwd=folder)
     assert first.returncode == 0
     assert "the wall time is over" in first.stderr
     told = json.loads(first.stdout)
     assert told["status"] == "walltime"
-    assert told["resume"] == "swarm run scene.toml --walltime 0.2s --json --resume"
+    assert told["resume"] == f"swarm run scene.toml --walltime {limit} --json --resume"
+    with swarm.load(folder / "scene.h5") as begun:
+        assert begun.times.tolist() == [0.0]
     assert (folder / "scene.h5.checkpoint").exists()
     assert command("run", "scene.toml", cwd=folder).returncode == 2
     second = command("run", "scene.toml", "--resume", "--json", cwd=folder)
     told = json.loads(second.stdout)
     assert (second.returncode, second.stderr) == (0, "")
-    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 8e6, 10)
-    assert told["impacts"] > 5e7
+    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 8e4, 10)
+    assert told["impacts"] > 5e5
     assert told["energy_error"] < 1e-14
     assert sorted(path.name for path in folder.iterdir()) == ["scene.h5", "scene.toml"]
     third = command("run", "scene.toml", "--resume", cwd=folder)
@@ -364,7 +368,7 @@ def test_a_full_disk_is_exit_code_1_and_the_run_goes_on_later(folder):
     assert (whole.returncode, whole.stderr) == (0, "")
     limit = 8_000_000
     done = subprocess.run(
-        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=100,
+        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
     )  # fmt: skip
     assert done.returncode == 1

@@ -1,4 +1,4 @@
-"""The shares of a frame: every particle in one of them, whoever draws it."""
+"""The shares of a frame: every particle in one of them, whoever draws it; and where a frame is halted."""
 
 import threading
 
@@ -9,6 +9,7 @@ import swarm
 from swarm import _jit, lanes, observables
 from swarm._jit import kernel, next_of
 from swarm.run import Run
+from swarm.status import Status
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 
@@ -83,3 +84,72 @@ def test_a_short_frame_wakes_no_thread(monkeypatch):
         monkeypatch.setattr(run, "_pace", 1.0)
         run.advance(1.0, 2.2)
         assert len(submitted) == 3
+
+
+# --- Halts ------------------------------------------------------------------------------------------------
+
+
+def along_diameters(n):
+    """Particles that start in the middle of SPHERE: they meet its wall at 0.5 s, 1.5 s, ..."""
+    directions = swarm.fill(SPHERE, n, speed=1.0, seed=1).velocity
+    return swarm.Particles(np.zeros((3, n)), directions)
+
+
+@pytest.mark.parametrize(("halts", "share"), [([3], 0.25), ([5, 2, 4], 0.15), ([1, 0], 0.0), ([0, 7], 0.0)])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_run_halts_at_the_pass_it_was_told(threads, halts, share):
+    """At the soonest one, each thread by its own count, and that frame only: a pass is a flight to the wall."""
+    n = threads * lanes.LANES
+    with Run(SPHERE, along_diameters(n), swarm.Impact(), threads, None) as run:
+        for passes in halts:
+            run.halt(passes)
+        assert not run.advance(10.0, 10.0)
+        assert run.share_done(10.0) == pytest.approx(share, abs=1e-14)
+        assert run.advance(10.0, 10.0)
+        assert (run.state.impacts == 10).all()
+        assert run.advance(10.0, 20.0)
+
+
+def test_at_its_end_a_run_is_halted_for_good():
+    """What a thread still does then, or begins, ends at once: here on its own, since none is waited for."""
+    with Run(SPHERE, along_diameters(lanes.LANES), swarm.Impact(), 1, None) as run:
+        pass
+    run.halt(1000)
+    status, _particle, left = run._share(10.0)
+    assert status == Status.INTERRUPTED
+    assert (left.rows[lanes.LEFT] == 10.0).all()
+
+
+def test_a_frame_whose_time_is_over_is_halted():
+    """It would take a quarter of an hour."""
+    with Run(SPHERE, along_diameters(1), swarm.Impact(), 1, None) as run:
+        assert not run.advance(1e10, 1e10, latest=0.0)
+        assert run.state.impacts[0] == 0
+        assert run.share_done(1e10) < 1.0
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_halt_and_a_hard_contact_in_one_frame(threads):
+    """What begins again with the kernel for hard contacts counts its passes anew, and is halted like the first."""
+    start = swarm.fill(SPHERE, 600, speed=1.0, seed=6)
+    start.position[:, 300], start.velocity[:, 300] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
+    method = swarm.Impact(shortest_flight=1e-2)
+    with Run(SPHERE, start, method, threads, None) as whole:
+        assert whole.advance(3.0, 3.0)
+    with Run(SPHERE, start, method, threads, None) as run:
+        assert run._hard is None
+        run.halt()
+        assert not run.advance(3.0, 3.0)
+        assert run.share_done(3.0) == 0.0
+        passes = 1
+        while True:
+            run.halt(passes)
+            if run.advance(3.0, 3.0):
+                break
+            passes += 1
+        assert run._hard is not None
+        # The grazing particle slides, a hundred steps a second; the others fly.
+        assert passes >= 3
+        for name, array in whole.state._asdict().items():
+            assert array is None or np.array_equal(array, getattr(run.state, name)), name

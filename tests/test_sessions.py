@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 import signal
 import subprocess
 import sys
@@ -15,7 +14,7 @@ from conftest import METHODS, rarely
 
 import swarm
 from examples import long_run
-from swarm import progress
+from swarm import blocks, progress
 from swarm.output import checkpoint, paths
 from swarm.progress import lines
 from swarm.run import Run
@@ -32,53 +31,65 @@ CASES = {
 FRAMES = 3
 
 
-def arrays_after(run, scene, method, every, between=lambda run, cut_short: run, delay=math.inf):
-    """State and observables of every frame; `between` may put another run in place of this, `delay` halts it."""
+def frames_of(run, method, every, halted=False, between=lambda run, cut_short: run):
+    """State and observables of every frame; `between` may put another run in place of this.
+
+    A frame that is `halted` is so after 1, 2, 4, ... passes, until it is done.
+    """
     seen = []
     for k in range(FRAMES):
-        span = method.span("every", every)
-        while not run.advance(span, every * (k + 1), latest=time.monotonic() + delay):
-            run, delay = between(run, True), 2.0 * delay
+        passes = 1 if halted else blocks.NEVER
+        while True:
+            run.halt(passes)
+            if run.advance(method.span("every", every), every * (k + 1)):
+                break
+            run, passes = between(run, True), 2 * passes
         seen.append(run.seen())
         run = between(run, False)
     return {name: array.copy() for name, array in run.arrays().items()}, seen
 
 
-def require_resumed_is_whole(tmp_path, scene, method, n=700, every=1.0, delay=1e-4):
+def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=(2, 1, 3)):
     """A run that is halted again and again, each time saved and gone on with by a new one, ends as one never halted."""
     start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=5)
     with Run(scene, start, method, 1, None) as whole:
-        expected, expected_seen = arrays_after(whole, scene, method, every)
-    halts, threads = [], itertools.cycle([2, 1, 3])
+        expected, expected_seen = frames_of(whole, method, every)
+    halts, next_threads = [], itertools.cycle(threads)
     job = checkpoint.Job("", "", "", "", n, "")
 
     def begin_again(run, cut_short):
         halts.append(cut_short)
         checkpoint.save(tmp_path / "a.checkpoint", job, run.arrays())
         run.__exit__()
-        other = Run(scene, start, method, next(threads), None)
+        other = Run(scene, start, method, next(next_threads), None)
         other.restore(checkpoint.read(tmp_path / "a.checkpoint")[1], cut_short)
         return other
 
-    run = Run(scene, start, method, 2, None)
-    found, found_seen = arrays_after(run, scene, method, every, begin_again, delay)
+    run = Run(scene, start, method, next(next_threads), None)
+    found, found_seen = frames_of(run, method, every, True, begin_again)
     assert found.keys() == expected.keys()
     for name, array in expected.items():
         assert np.array_equal(found[name], array), name
     for one, other in zip(expected_seen, found_seen, strict=True):
         for name, value in one.items():
             assert np.array_equal(value, other[name]), name
+    # A pass is one flight to a wall at most, and whatever the wall, a few are needed.
+    assert sum(halts) >= 2 * FRAMES
     return sum(halts)
 
 
 @pytest.mark.physics
 @pytest.mark.parametrize("name", [rarely(name) if name == "impact, lossy" else name for name in CASES])
 def test_resumed_is_whole(tmp_path, name):
-    """In frames of some 20 ms, halted after 0.1 ms, 0.2 ms, ...: in the midst of most particles' flights."""
-    # What loses energy comes to graze the wall, and slides, which is slow: many particles for a short time.
-    special = {"impact, sphere": (4000.0, 700), "impact, lossy": (30.0, 5_000), "penalty, sphere": (50.0, 700)}
-    every, n = special.get(name, (1000.0, 700))
-    assert require_resumed_is_whole(tmp_path, *CASES[name], n, every) >= 2
+    """In the midst of most particles' flights."""
+    # What loses energy comes to graze the wall, and slides.
+    every = {"impact, lossy": 30.0, "penalty, sphere": 4.0}.get(name, 20.0)
+    assert require_resumed_is_whole(tmp_path, *CASES[name], every=every) >= 5 * FRAMES
+
+
+@pytest.mark.physics
+def test_a_thread_is_halted_as_often_on_every_machine(tmp_path):
+    assert require_resumed_is_whole(tmp_path, *CASES["impact, sphere"], every=20.0, threads=(1,)) == 24
 
 
 def run(path, scene=SPHERE, method=None, until=2.0, every=0.5, n=20, **keywords):
@@ -129,24 +140,45 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
                 assert np.array_equal(one.frame(k).velocity, other.frame(k).velocity)
 
 
+def halted_after(monkeypatch, passes, seconds):
+    """Each frame is halted after so many passes, again and again, and a halt is the one thing that takes `seconds`.
+
+    What else asks for a halt asks for it in `seconds`: it never comes to that. Gives the moments of the halts.
+    """
+    clock, advance = [0.0], Run.advance
+    monkeypatch.setattr(time, "monotonic", lambda: clock[-1])
+
+    def halting(run, span, moment, writing, latest):
+        assert latest == clock[-1] + seconds
+        run.halt(passes)
+        done = advance(run, span, moment, writing, latest)
+        if not done:
+            clock.append(clock[-1] + seconds)
+        return done
+
+    monkeypatch.setattr(Run, "advance", halting)
+    return clock
+
+
 @pytest.mark.physics
-def test_the_wall_time_ends_a_run_in_the_middle_of_a_frame(tmp_path):
-    path, whole = tmp_path / "run.h5", tmp_path / "whole.h5"
-    sessions, within, limit = 0, 0, 0.1
+def test_the_wall_time_ends_a_run_in_the_middle_of_a_frame(tmp_path, monkeypatch):
+    path, day = tmp_path / "run.h5", 86_400.0
+    expected = run(tmp_path / "whole.h5", until=60.0, every=20.0)
+    halted_after(monkeypatch, 12, day)
+    frames = []
     while True:
         try:
-            result = run(path, until=6e6, every=2e6, resume=True, checkpoint=60.0, walltime=limit)
+            result = run(path, until=60.0, every=20.0, resume=True, checkpoint=7.0 * day, walltime=day)
             break
         except swarm.WallTimeError:
-            sessions, limit = sessions + 1, 1.3 * limit
-            within += checkpoint.read(paths.checkpoint_of(path))[0].following is not None
-    assert sessions >= 2
-    assert within >= 1
-    expected = run(whole, until=6e6, every=2e6)
+            saved = checkpoint.read(paths.checkpoint_of(path))[0]
+            assert saved.following == 20.0 * (saved.frame + 1)
+            frames.append(saved.frame)
+    assert frames == [0] * 5 + [1] * 5 + [2] * 5
     assert np.array_equal(result.particles.position, expected.particles.position)
     for name, values in expected.observables.items():
         assert np.array_equal(values, result.observables[name]), name
-    assert result.wall_time > limit
+    assert result.wall_time == len(frames) * day
 
 
 def test_a_longer_run_goes_on_from_a_shorter_one(tmp_path):
@@ -296,8 +328,10 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monke
         saved.append(entries["job"])
 
     monkeypatch.setattr(checkpoint.np, "savez", full)
+    clock = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[-1])
     with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the one before it"):
-        run(path, checkpoint=0.05, progress=lambda frame: time.sleep(0.06))
+        run(path, checkpoint=600.0, progress=lambda frame: clock.append(clock[-1] + 600.0))
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.h5", "run.h5.checkpoint"]
     assert json.loads(saved[-1])["frame"] == 1
     monkeypatch.undo()
@@ -365,15 +399,15 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
 def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
     """A run without frames in between tells how far it is all the same."""
     monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: False)
-    monkeypatch.setattr(progress, "_A_MINUTE", 0.002)
     start = swarm.fill(SPHERE, 300, speed=1.0, seed=1)
-    whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1)
-    told = swarm.simulate(SPHERE, start, swarm.Impact(), until=1e5, threads=1, progress=True)
+    whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, threads=1)
+    clock = halted_after(monkeypatch, 12, 60.0)
+    told = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, threads=1, progress=True)
     assert np.array_equal(told.particles.position, whole.particles.position)
     shares = [float(line.split("%")[0]) for line in capsys.readouterr().err.splitlines()]
-    assert len(shares) >= 3
+    assert len(shares) == len(clock) - 1 >= 10
     assert shares == sorted(shares)
-    assert 0.0 < shares[len(shares) // 2] < 100.0
+    assert 0.0 < shares[0] < shares[len(shares) // 2] < 100.0
 
 
 @pytest.mark.physics
@@ -390,6 +424,8 @@ def test_the_example_is_stopped_twice_and_conserves(tmp_path):
 
 # --- Processes -------------------------------------------------------------------------------------------
 
+# A child that is not killed waits for it after so many frames; a checkpoint is made every twenty.
+FARTHEST = 200
 KILLED = """
     import os, random, signal, sys, time
     from pathlib import Path
@@ -401,34 +437,44 @@ KILLED = """
         return swarm.simulate(scene, start, swarm.Impact(), until=60.0, every=0.01, trajectory=path, threads=1,
                               progress=progress, **more)
 
+    def child(into):
+        told = 0
+
+        def tell(frame):
+            nonlocal told
+            told += 1
+            os.write(into, frame.written.to_bytes(8, "little"))
+            if told == {farthest}:
+                signal.pause()
+
+        time.monotonic = lambda: float(told)
+        try:
+            run({path!r}, tell, checkpoint=20.0, resume=True)
+        except swarm.CompleteError:
+            pass  # killed when all was done
+        os._exit(0)
+
     swarm.simulate(scene, start, swarm.Impact(), until=1.0, threads=1)  # compiled, and no thread is left
     random.seed(7)
-    kills, low = 0, 0
+    kills = 0
     while True:
         out, into = os.pipe()
-        child = os.fork()
-        if child == 0:
-            tell = lambda frame: os.write(into, frame.written.to_bytes(8, "little"))
-            try:
-                run({path!r}, tell, checkpoint=0.02, resume=True)
-            except swarm.CompleteError:
-                pass  # killed when all was done
-            os._exit(0)
+        pid = os.fork()
+        if pid == 0:
+            child(into)
         os.close(into)
-        first = os.read(out, 8)
-        time.sleep(random.uniform(0.0, {longest}))
-        os.kill(child, signal.SIGKILL)
-        _, status = os.waitpid(child, 0)
-        told = first
+        told = b"".join(os.read(out, 8) for _ in range(random.randint(1, {farthest})))
+        time.sleep(random.uniform(0.0, 0.005))  # anywhere in what follows that frame
+        os.kill(pid, signal.SIGKILL)
+        _, status = os.waitpid(pid, 0)
         while more := os.read(out, 1 << 16):
             told += more
         os.close(out)
         if not os.WIFSIGNALED(status):
             break
         kills += 1
-        if Path({path!r}).exists():
-            reports = [int.from_bytes(told[i : i + 8], "little") for i in range(0, len(told) - 7, 8)]
-            print(len(swarm.load({path!r})), max(reports))
+        reports = [int.from_bytes(told[i : i + 8], "little") for i in range(0, len(told) - 7, 8)]
+        print(len(swarm.load({path!r})) if Path({path!r}).exists() else 0, max(reports, default=0))
     print("kills", kills)
 """
 
@@ -437,15 +483,15 @@ KILLED = """
 def test_kill_9_at_random_moments(tmp_path):
     """Each child is killed for good and the next goes on from its checkpoint, until one is through."""
     path = tmp_path / "run.h5"
-    code = textwrap.dedent(KILLED).format(path=str(path), longest=0.12)
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=400)
+    code = textwrap.dedent(KILLED).format(path=str(path), farthest=FARTHEST)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
     assert (told.returncode, told.stderr) == (0, "")
     *pairs, last = told.stdout.splitlines()
     print(last, *pairs, sep="; ")
     for pair in pairs:
         held, reported = map(int, pair.split())
         assert held >= reported
-    assert int(last.split()[1]) >= 20
+    assert int(last.split()[1]) >= 6000 // FARTHEST
     start = swarm.fill(SPHERE, 50, speed=1.0, seed=1)
     expected = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, every=0.01, trajectory=tmp_path / "whole.h5")
     with swarm.load(path) as one, swarm.load(tmp_path / "whole.h5") as other:

@@ -1,7 +1,6 @@
 """Frames written by a thread of their own: all of them, in order, as they were; what went wrong is raised."""
 
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -12,10 +11,10 @@ from swarm.particles import State
 
 
 class Writer:
-    """Keeps what it is told to write; fails at frame `fails`."""
+    """Keeps what it is told to write, each frame when `waits` returns; fails at frame `fails`."""
 
-    def __init__(self, fails=None, seconds=0.0):
-        self.fails, self.seconds = fails, seconds
+    def __init__(self, fails=None, waits=lambda: None):
+        self.fails, self.waits = fails, waits
         self.frames, self.threads, self.left_with = [], set(), "never left"
 
     def __enter__(self):
@@ -25,8 +24,8 @@ class Writer:
         self.left_with = error
 
     def write(self, frames):
-        time.sleep(self.seconds)
         for number, moment, state, seen in frames:
+            self.waits()
             if number == self.fails:
                 raise OSError(f"frame {number} does not fit")
             self.threads.add(threading.get_ident())
@@ -40,12 +39,16 @@ def state_of(n=5):
 
 @pytest.mark.parametrize("n", [5, 2_000_000])
 def test_every_frame_is_written_as_it_was(n):
-    """The state goes on changing while a slow writer is behind."""
-    writer, state = Writer(seconds=0.01), state_of(n)
+    """The state goes on changing while a slow writer is behind: it writes no frame before the next has begun."""
+    changed, state = threading.Semaphore(0), state_of(n)
+    writer = Writer(waits=changed.acquire)
     with Beside(writer, n) as write:
         for number in range(6):
             state.position[:], state.velocity[:] = number, -number
+            if number > 0:
+                changed.release()
             write(number, 0.1 * number, state, {"time": 0.1 * number})
+        changed.release()
     assert [frame[0] for frame in writer.frames] == list(range(6))
     for number, moment, position, velocity, seen in writer.frames:
         assert moment == seen["time"] == 0.1 * number
@@ -59,7 +62,7 @@ def test_the_run_does_not_wait_for_a_frame():
     """It goes on before the frame is written: here it must, for the frame to be."""
     writer, went_on = Writer(), threading.Event()
     write_now = writer.write
-    writer.write = lambda frames: went_on.wait(60.0) and write_now(frames)
+    writer.write = lambda frames: went_on.wait(600.0) and write_now(frames)
     with Beside(writer, 5) as write:
         write(0, 0.0, state_of(), {})
         went_on.set()
@@ -87,14 +90,14 @@ def test_a_frame_that_fails_ends_the_run_and_none_follows():
 
 
 def test_the_last_frame_fails_too():
-    writer = Writer(fails=0, seconds=0.1)
+    writer = Writer(fails=0)
     with pytest.raises(OSError, match="frame 0 does not fit"):
         run(writer, 1)
     assert isinstance(writer.left_with, OSError)
 
 
 def test_an_error_of_the_run_is_the_one_that_is_raised():
-    writer = Writer(seconds=0.05)
+    writer = Writer()
     with pytest.raises(ValueError, match="the run"):
         run(writer, 1, then=ValueError("the run"))
     assert len(writer.frames) == 1

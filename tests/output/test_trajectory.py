@@ -62,6 +62,17 @@ def test_layout_is_h5md(run):
         assert not file["particles/all/position/value"].attrs
 
 
+def wait_for(path, frames):
+    """Return when a file that is being written holds so many frames."""
+    for _ in range(60_000):
+        if path.exists():
+            with swarm.load(path) as trajectory:
+                if len(trajectory) >= frames:
+                    return
+        time.sleep(0.01)
+    pytest.fail(f"after ten minutes there are no {frames} frames")
+
+
 def test_a_file_being_written_can_be_read(tmp_path):
     """Every frame is flushed, so another process sees all frames so far."""
     path = tmp_path / "run.h5"
@@ -69,6 +80,7 @@ def test_a_file_being_written_can_be_read(tmp_path):
 
     def look(frame):
         if frame.number in (0, 3):
+            wait_for(path, frame.number + 1)
             code = f"import swarm; print(len(swarm.load({str(path)!r})))"
             seen.append(int(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
 
@@ -183,14 +195,9 @@ def test_other_programs_read_it_while_the_run_goes_on(tmp_path):
     path, told = tmp_path / "run.h5", []
     with_mdanalysis = [] if importlib.util.find_spec("MDAnalysis") is None else ["MDAnalysis"]
 
-    def frames():
-        with swarm.load(path) as trajectory:
-            return len(trajectory)
-
     def look(frame):
         if frame.number == 3:
-            while not path.exists() or frames() < 4:
-                time.sleep(0.01)
+            wait_for(path, 4)
             command = [sys.executable, "-c", OTHERS, str(path), *with_mdanalysis]
             told.append(subprocess.run(command, capture_output=True, text=True))
 

@@ -193,7 +193,7 @@ def test_a_full_disk_loses_no_frame(tmp_path, size):
     """The limit of a file's size does what a full disk does: a write in the middle of others fails."""
     path = tmp_path / "run.h5"
     code = textwrap.dedent(FULL).format(path=sys.path, file=str(path), size=size)
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
     *numbers, error = told.stdout.split("\n")[:-1]
     assert (told.returncode, told.stderr) == (0, "")
     assert error == f"error: cannot write frame {len(numbers)} to {path}: File too large"

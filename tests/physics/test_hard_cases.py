@@ -16,8 +16,8 @@ import swarm
 
 pytestmark = pytest.mark.physics
 
-# Seconds: none needs five, and compiling its kernels takes up to thirty.
-_HANGS = 60.0
+# Seconds after which something has no end; that it ends cheaply, hard_cases.py counts in passes.
+_HANGS = 600.0
 
 
 def _outcome_of(name):
