@@ -25,6 +25,8 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except filelock.Timeout as error:
+        if not path.exists():  # what no file can be made of looks to filelock like one that comes and goes
+            raise FileError(f"cannot write the trajectory {trajectory}: no file can be made in that folder") from error
         raise FileError(
             f"the trajectory {trajectory} is being written by another run; wait until that has ended, or choose "
             "another name"
