@@ -321,6 +321,23 @@ def _as_usual() -> dict[str, str]:
     return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
+def set_up(n: int, repeats: int) -> list[Row]:
+    """What a run takes in which nothing is hit: checks, copies, and two frames observed; one thread."""
+    rows = []
+    for name, scene in (("sphere", SPHERE), ("sphere and two planes", SLICE)):
+        particles = swarm.fill(scene, n, speed=SPEED, seed=1)
+
+        def seconds(scene: swarm.Scene = scene, particles: swarm.Particles = particles) -> float:
+            start = time.perf_counter()
+            swarm.simulate(scene, particles, swarm.Impact(), until=1e-9, threads=1)
+            return time.perf_counter() - start
+
+        seconds()
+        least, median = repeated(seconds, repeats)
+        rows.append(Row(f"a run in which nothing is hit, {name}", least / n * 1e9, median / n * 1e9, "ns/particle"))
+    return rows
+
+
 def memory(n: int) -> list[Row]:
     """Peak bytes a particle of a whole run: caller's particles and engine's state."""
     small, large = (float(_child(_MEMORY, str(k))) for k in (1000, n))
@@ -422,6 +439,7 @@ def main(quick: bool) -> None:
     rows += scale(1_000 if quick else 100_000, 10_000 if quick else 10_000_000)
     rows += output(20 if quick else 500, repeats)
     rows += recording(20 if quick else 500, repeats if quick else 3)
+    rows += set_up(10_000 if quick else 1_000_000, repeats)
     rows += memory(100_000 if quick else 10_000_000)
     rows += start_up(1 if quick else 7)
     rows += accuracy(1e2 if quick else 1e5)
