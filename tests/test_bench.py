@@ -15,7 +15,7 @@ def printed(name):
     """What `python -m bench NAME --quick` prints."""
     root = Path(__file__).parents[1]
     done = subprocess.run(
-        [sys.executable, "-m", "bench", name, "--quick"], cwd=root, capture_output=True, text=True, timeout=600
+        [sys.executable, "-m", "bench", name, "--quick"], cwd=root, capture_output=True, text=True, timeout=3600
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
