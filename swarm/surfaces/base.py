@@ -24,9 +24,6 @@ from .course import first_rise, safe_rise_time
 
 SIDES = {"inside": 1.0, "outside": -1.0}
 
-# Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
-_TANGENTS = 8
-
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
@@ -132,17 +129,6 @@ def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
     middle, half = (np.array(box[0]) + box[1]) / 2.0, (np.array(box[1]) - box[0]) / 2.0
     middle, half = center + matrix @ (middle - center), np.abs(matrix) @ half
     return tuple((middle - half).tolist()), tuple((middle + half).tolist())
-
-
-def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[HalfSpace]:
-    """Half-spaces (u + lean axis).(r - through) <= offset for directions u all around a unit vector."""
-    frame = rotations.matrix(rotations.onto(axis))
-    found = []
-    for angle in np.linspace(0.0, 2.0 * math.pi, _TANGENTS, endpoint=False):
-        normal = frame @ (math.cos(angle), math.sin(angle), lean)
-        x, y, z = (normal / math.hypot(1.0, lean)).tolist()
-        found.append(((x, y, z), offset / math.hypot(1.0, lean) + float(np.dot((x, y, z), through))))
-    return found
 
 
 def farthest(point: Vector) -> float:

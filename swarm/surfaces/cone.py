@@ -9,7 +9,7 @@ from ..errors import SceneError
 from . import base
 from .plane import PlaneNumbers
 from .quadratic import QuadricNumbers, quadric_numbers
-from .revolved import Revolved
+from .revolved import Revolved, tangents
 from .solid import body
 
 # A cone nearer to its tangent plane than this [rad] leaves it by round-off only.
@@ -85,7 +85,7 @@ class Cone(Revolved):
     def half_spaces(self) -> list[base.HalfSpace]:
         # rho cos <= z sin in every direction around the axis
         lean = -math.tan(self.half_angle)
-        return [] if self.is_solid() else base.tangents(self.direction(), self.center, lean, 0.0)
+        return [] if self.is_solid() else tangents(self.direction(), self.center, lean, 0.0)
 
     def extent(self) -> float:
         return base.farthest(self.center)

@@ -10,7 +10,7 @@ from . import base
 from . import rotation as rotations
 from .principal import extents
 from .quadratic import QuadricNumbers, quadric_numbers
-from .revolved import Revolved
+from .revolved import Revolved, tangents
 from .slab import SlabNumbers, slab_numbers
 from .solid import body
 
@@ -71,7 +71,7 @@ class Cylinder(Revolved):
         return base.box_around(self.center, (x, y, z), self.side)
 
     def half_spaces(self) -> list[base.HalfSpace]:
-        return [] if self.is_solid() else base.tangents(self.direction(), self.center, 0.0, self.radius)
+        return [] if self.is_solid() else tangents(self.direction(), self.center, 0.0, self.radius)
 
     def extent(self) -> float:
         return base.farthest(self.center) + math.hypot(self.radius, 0.5 * (self.length or 0.0))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ..checks import Vector, length
 from . import base
 from .quadratic import QuadricNumbers, quadric_numbers
-from .revolved import Revolved
+from .revolved import Revolved, tangents
 
 # Slopes of the tangent planes that stand in for the bowl.
 _SLOPES = (0.5, 2.0)
@@ -51,7 +51,7 @@ class Paraboloid(Revolved):
     def half_spaces(self) -> list[base.HalfSpace]:
         # rho^2/(4 f) <= z is rho - z/s <= f s for every slope s
         f = self.focal_length
-        planes = (base.tangents(self.direction(), self.center, -1.0 / s, f * s) for s in _SLOPES)
+        planes = (tangents(self.direction(), self.center, -1.0 / s, f * s) for s in _SLOPES)
         return [] if self.is_solid() else list(itertools.chain.from_iterable(planes))
 
     def extent(self) -> float:
