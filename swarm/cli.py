@@ -166,14 +166,15 @@ def _trajectory_rows(file: Path) -> dict[str, str]:
     from .output.trajectory import load
 
     with load(file) as trajectory:
-        times, seen = trajectory.times, trajectory.observables
+        times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
+        last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
         rows = {
-            "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+            "frames": f"{len(times)}{last}",
             "particles": f"{trajectory.count}",
             "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
             "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
             "method": _call(trajectory.method),
-            "observables": ", ".join(seen),
+            "observables": ", ".join(seen) or "none",
             "size": f"{file.stat().st_size / 1e6:.1f} MB",
         }
         if len(times):

@@ -64,6 +64,16 @@ def frames(file: Any, path: Path) -> int:
     return n
 
 
+def require_index(file: Any) -> None:
+    """Go through the indexes of all chunks, which raises what h5py raises if one is damaged."""
+
+    def count(_name: str, found: Any) -> None:
+        if isinstance(found, h5py.Dataset) and found.chunks is not None:
+            found.id.get_num_chunks()
+
+    file.visititems(count)
+
+
 def text(dataset: Any, path: Path) -> str:
     """A text of the file; a ValueError says that it is none.
 

@@ -7,7 +7,6 @@ number that were run. All elements share one step and one time dataset by hard l
 
 import contextlib
 import operator
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,10 +20,13 @@ from ..errors import SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import layout
+from . import layout, superblock
 from .sources import DAMAGE, DamagedError, path_of, reason, require_file
 
-_STILL_WRITTEN, _LOCKS = "already open", re.compile(r"file locking|lock file")
+_STILL_WRITTEN = "already open"
+# Of all who open a file in one process by the same driver HDF5 wants the same flags of locking. That for logs, which
+# reads as the usual one does and logs nothing unless it is asked to, is hardly another's.
+_DRIVER = "swarm"
 
 
 class Trajectory:
@@ -41,7 +43,7 @@ class Trajectory:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = path_of("a trajectory", path)
+        self.path = path_of("swarm.load", path)
         require_file(self.path, "a trajectory (.h5)")
         self._file = _opened(self.path)
         try:
@@ -112,6 +114,11 @@ class Trajectory:
         """Raise a SceneError if there is no frame."""
         if not len(self):
             raise SceneError(f"{self.path} holds no frame: its run ended before the first one was written")
+
+    def require_index(self) -> None:
+        """Raise a SceneError if HDF5 could not find all chunks: a writer would wait for a damaged index for ever."""
+        with self._reading("its index") as file:
+            layout.require_index(file)
 
     def frame(self, k: int) -> Particles:
         """The particles at frame k; negative k count from the end."""
@@ -193,29 +200,29 @@ class Trajectory:
 
 def _opened(path: Path) -> h5py.File:
     # Without a chunk cache only those rows of a chunk are read that are asked for: of one particle's path a thousandth.
-    options: dict[str, Any] = {"rdcc_nbytes": 0}
-    problem: Exception | None = None
-    # HDF5 wants the same flags of locking of all who open a file in one process: first those of readers that ask for
-    # none; then none, as swarm's own writer, which also reads where somebody holds a lock; then those that are left.
-    for locking in (None, False, True):
+    # Without locking, a file that is still being written can be read.
+    options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
+    try:
         try:
-            try:
-                return h5py.File(path, "r", locking=locking, **options)
-            except OSError as error:
-                if _STILL_WRITTEN not in str(error):
-                    raise
-                # Marked by its writer in this very moment, or in the one in which it was killed.
-                return h5py.File(path, "r", locking=locking, swmr=True, **options)
-        except DAMAGE as error:
-            problem = error
-            if not _LOCKS.search(str(error)):
-                break
-    told = str(problem)
-    if "signature not found" in told:
-        raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from problem
-    if _LOCKS.search(told) or getattr(problem, "errno", None):
-        raise SceneError(f"cannot read {path}: {reason(problem)}") from problem
-    raise DamagedError(f"{path} is damaged: {reason(problem)}") from problem
+            return h5py.File(path, "r", driver=_DRIVER, **options)
+        except OSError as error:
+            if _STILL_WRITTEN not in str(error):
+                raise
+            # Marked by its writer in this very moment, or in the one in which it was killed.
+            return h5py.File(superblock.Unmarked(path), "r", **options)
+    except DAMAGE as error:
+        if "signature not found" in str(error):
+            raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
+        if getattr(error, "errno", None):
+            raise SceneError(f"cannot read {path}: {reason(error)}") from error
+        raise DamagedError(f"{path} is damaged: {reason(error)}") from error
+
+
+def _own_driver(plist: Any, **_options: Any) -> None:
+    plist.set_fapl_log(b"", 0, 0)
+
+
+h5py.register_driver(_DRIVER, _own_driver)
 
 
 def _finite(values: Any) -> NDArray[Any]:
