@@ -85,10 +85,10 @@ def run(
         with interrupt.at_once():
             job = files.read(scene_file)
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
-            target = paths.path_of("trajectory", output or stored)
+            target = paths.target_of("trajectory", output or stored)
             limit = None if walltime is None else duration("--walltime", walltime)
             named = recording or (None if resume else job.run.recording)
-            shown = None if named is None else paths.path_of("recording", named)
+            shown = None if named is None else paths.target_of("recording", named)
             # Before particles are made and kernels compiled.
             Storage(job.run.frames, job.run.precision, job.run.compression)
             outputs = {"trajectory": target, "checkpoint": paths.checkpoint_of(target), "recording": shown}
@@ -184,14 +184,15 @@ def _trajectory_rows(file: Path) -> dict[str, str]:
     from .output.trajectory import load
 
     with load(file) as trajectory:
-        times, seen = trajectory.times, trajectory.observables
+        times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
+        last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
         rows = {
-            "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+            "frames": f"{len(times)}{last}",
             "particles": f"{trajectory.count}",
             "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
             "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
             "method": _call(trajectory.method),
-            "observables": ", ".join(seen),
+            "observables": ", ".join(seen) or "none",
             "size": f"{file.stat().st_size / 1e6:.1f} MB",
         }
         if len(times):
@@ -240,7 +241,7 @@ def record(
     from .output import paths
     from .output.trajectory import load
 
-    target = paths.path_of("recording", output or file.with_suffix(".rrd"))
+    target = paths.target_of("recording", output or file.with_suffix(".rrd"))
     paths.check_distinct({"recording": target}, {"trajectory": file})
     with load(file) as trajectory:
         recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)

@@ -133,6 +133,7 @@ class Session:
                 f"{self._path} needs its trajectory {trajectory}, which is gone; start afresh without resume"
             )
         with load(trajectory) as before:
+            before.require_index()
             if len(before) <= saved.frame:
                 raise SceneError(
                     f"{trajectory} must hold {saved.frame + 1} frames, as {self._path} says, got {len(before)}: it was "
@@ -144,7 +145,10 @@ class Session:
 
     def restore(self, run: Run) -> None:
         """Let the run be where the checkpoint is."""
-        if self._arrays is not None and self._job is not None:
+        if self._arrays is not None and self._job is not None and self._path is not None:
+            from .output.checkpoint import require_fit
+
+            require_fit(self._path, self._arrays, run.arrays())
             run.restore(self._arrays, self._job.following is not None)
             self._arrays = {}
 

@@ -131,8 +131,8 @@ def simulate(
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    target = None if trajectory is None else paths.path_of("trajectory", trajectory)
-    recorded = None if recording is None else paths.path_of("recording", recording)
+    target = None if trajectory is None else paths.target_of("trajectory", trajectory)
+    recorded = None if recording is None else paths.target_of("recording", recording)
     paths.check_distinct(
         {"trajectory": target, "checkpoint": target and paths.checkpoint_of(target), "recording": recorded}, {}
     )

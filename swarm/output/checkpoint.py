@@ -4,10 +4,15 @@ A line of JSON under "job" says what was run and how far; the other entries are 
 checksum.
 """
 
+import contextlib
 import hashlib
+import io
 import json
+import math
 import os
 import zipfile
+import zlib
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import tables
 from ..errors import FileError, SceneError
 from ..particles import Particles
 from . import paths
+from .sources import DAMAGE, DamagedError, reason, require_file
 
 Arrays = dict[str, NDArray[Any]]
 # The name of an archive's first entry ends here.
@@ -122,13 +129,53 @@ def read(path: Path) -> tuple[Job, Arrays]:
     """A checkpoint.
 
     Raises:
-        SceneError: it cannot be read, or is damaged.
+        SceneError: it is not there, or is damaged.
     """
+    require_file(path, "a checkpoint")
+    with _reading(path):
+        with zipfile.ZipFile(path) as archive:
+            # All that it holds has a checksum, which is known when it is read to its end.
+            entries = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in archive.infolist()}
+        # Up to here it may not be looked at: its arrays may be of any size.
+        arrays = {
+            name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
+        }
+        job = tables.convert(json.loads(str(arrays.pop("job"))), Job, "job")
+        if job.frame < 0 or not all(map(math.isfinite, (job.time, job.wall_time, job.following or 0.0))):
+            raise ValueError(f"it cannot be at frame {job.frame}, {job.time} s")
+    return job, arrays
+
+
+def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
+    """Raise a SceneError if these are not the arrays of that run, whose own are given.
+
+    What a halt left in the lanes may be of any number of particles, each once.
+    """
+    with _reading(path):
+        if arrays.keys() != run.keys():
+            raise ValueError(f"expected the arrays {sorted(run)}, got {sorted(arrays)}")
+        left = arrays["halted.particle"].shape
+        for name, mine in run.items():
+            shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
+            if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
+                raise ValueError(
+                    f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
+                )
+        particles = arrays["halted.particle"]
+        if len(particles) and not (particles[0] >= 0 and particles[-1] < len(run["mass"]) and _ascends(particles)):
+            raise ValueError("it names particles that there are not")
+
+
+def _ascends(values: NDArray[Any]) -> bool:
+    return bool((np.diff(values) > 0).all())
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        return Job(**json.loads(str(arrays.pop("job")))), arrays
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise SceneError(
-            f"cannot read the checkpoint {path}: {error}; remove it and its trajectory to start afresh"
+        yield
+    except (*DAMAGE, zipfile.BadZipFile, zlib.error) as error:
+        raise DamagedError(
+            f"{path} is damaged: {reason(error)}; the frames in its trajectory are whole: go on from the last of them "
+            "as a new run (from = in [particles]), or start afresh, with overwrite and without resume"
         ) from error

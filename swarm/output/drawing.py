@@ -64,7 +64,12 @@ def colour_bar(picture: Any, axes: Any, quantity: str, low: float, high: float) 
 
 
 def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarithm: bool) -> None:
-    """The time series of one plot, by their names: (times [s], values)."""
+    """The time series of one plot, by their names: (times [s], values). Rates have no value at the first frame."""
+    axes.set_title(view, fontsize=10)
+    if not any(len(times) for times, _values in drawn.values()):
+        axes.text(0.5, 0.5, "needs two frames", ha="center", va="center", color="grey", transform=axes.transAxes)
+        axes.set_axis_off()
+        return
     for colour, (name, (times, values)) in zip(LINES * (len(drawn) // len(LINES) + 1), drawn.items(), strict=False):
         shown = 10.0**values if logarithm else values
         axes.plot(times, shown, color=colour, linewidth=1.2, label=name, marker="." if len(times) < 30 else None)
@@ -80,7 +85,6 @@ def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarit
                           xytext=(3, 0), textcoords="offset points", fontsize=8, color="grey", va="center")  # fmt: skip
     else:
         _steady(axes, drawn)
-    axes.set_title(view, fontsize=10)
     axes.set_xlabel("time [s]", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

@@ -10,17 +10,21 @@ from ..errors import SceneError
 _OURS = "swarm-"
 
 
-def path_of(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file; a symbolic link is the file it leads to.
+def given(name: str, value: Any) -> Path:
+    """The argument `name` as the path of a file.
 
     Raises:
         SceneError: it is no path, or an empty one.
     """
-    if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
-        raise SceneError(f"{name} must be the path of a file, got {value!r}")
-    if not os.fspath(value) or "\0" in os.fspath(value):
-        raise SceneError(f"{name} must be the path of a file, got {os.fspath(value)!r}")
-    path = Path(value)
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else value
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise SceneError(f"{name} must be the path of a file, got {text!r}")
+    return Path(text)
+
+
+def target_of(name: str, value: Any) -> Path:
+    """The argument `name` as the path of a file to write: behind a symbolic link, the file it leads to."""
+    path = given(name, value)
     return path.resolve() if path.is_symlink() else path
 
 

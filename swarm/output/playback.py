@@ -14,8 +14,11 @@ from rerun.chunk import RrdReader
 
 from ..errors import FileError, SceneError
 from ..particles import Floats
+from .sources import DAMAGE, DamagedError, reason, require_file
 
 _PARTICLES = "/scene/particles"
+_BEGIN = b"RRF"
+_ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 
 
@@ -31,19 +34,26 @@ class Playback:
         wires: of each surface, whether it is a solid and its curves.
 
     Raises:
-        SceneError: the file cannot be read, is cut off, or is no recording of swarm.
+        SceneError: there is no such file, it is damaged or cut off, or is no recording of swarm.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if not path.is_file():
-            raise SceneError(f"cannot read the recording {path}: there is no such file")
+        require_file(path, "a recording (.rrd)")
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that it has no footer, which is_whole says
-                chunks = RrdReader(path).stream().to_chunks()
-        except (RuntimeError, ValueError, OSError) as error:
-            raise SceneError(f"cannot read the recording {path}: {error}; swarm info --repair may mend it") from error
+            self._read()
+        except DAMAGE as error:
+            with open(path, "rb") as file:
+                foreign = not file.read(len(_BEGIN)).startswith(_BEGIN)
+            if foreign:
+                raise SceneError(f"{path} is not a recording of swarm") from error
+            told = reason(error).replace(f"Failed to read RRD file at {path}: ", "")
+            raise DamagedError(f"{path} is damaged: {told}; swarm info --repair may mend it") from error
+
+    def _read(self) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it has no footer, which is_whole says
+            chunks = RrdReader(self.path).stream().to_chunks()
         self.entities: dict[str, int] = {}
         self.series: dict[str, tuple[Floats, Floats]] = {}
         self.names: dict[str, str] = {}
@@ -65,10 +75,15 @@ class Playback:
                 rows.setdefault(entity, []).append((batch.column("frame").to_numpy(), values))
             self._static(entity, batch, names)
         if not self._frames or "/time" not in rows:
-            raise SceneError(f"{path} is not a recording of swarm, or holds no frame")
+            raise ValueError("it is not a recording of swarm, or holds no frame")
+        missing = [name for name in _ABOUT if name not in self.about]
+        if missing:
+            raise ValueError(f"it does not say its {missing[0]}")
         moments = {k: t for numbers, values in rows.pop("/time") for k, t in zip(numbers, values, strict=True)}
         # A crash may have left more points than rows of the time series.
         self.numbers = sorted(number for number in self._frames if number in moments)
+        if not self.numbers:
+            raise ValueError("it holds no frame whose time is known")
         self.times = np.array([moments[number] for number in self.numbers])
         for entity, parts in rows.items():
             numbers, values = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
@@ -78,8 +93,7 @@ class Playback:
         if "SeriesLines:names" in names:
             self.names[entity] = batch.column("SeriesLines:names")[0].as_py()[0]
         if entity == "/about":
-            known = {"quantity", "low", "high", "particles", "shown", "stride"}
-            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in known}
+            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in _ABOUT}
         if "LineStrips3D:strips" in names:
             strips = batch.column("LineStrips3D:strips")[0].as_py()
             self.wires.append((entity.startswith("/scene/solids/"), [np.array(strip) for strip in strips]))
@@ -127,6 +141,7 @@ def repair(path: Path) -> Playback:
     Raises:
         SceneError, FileError: as `repaired`; the file is as it was.
     """
+    require_file(path, "a recording (.rrd)")
     target = path.with_name(f".{path.name}.repaired.rrd")
     try:
         repaired(path, target)
@@ -138,7 +153,8 @@ def repair(path: Path) -> Playback:
 
 def described(path: Path) -> tuple[Playback, bool]:
     """A recording, and whether it is whole: of one that is not, what could be repaired."""
-    if is_whole(path) or not path.is_file():
+    require_file(path, "a recording (.rrd)")
+    if is_whole(path):
         return Playback(path), True
     with tempfile.TemporaryDirectory() as folder:
         return repaired(path, Path(folder) / "repaired.rrd"), False

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot
 
-from ..errors import SceneError
 from . import colours, drawing, series
 from .shapes import shapes_of
 from .trajectory import Trajectory
@@ -21,11 +20,10 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     """Draw the time series of a trajectory, its speeds, and its particles at the end.
 
     Raises:
-        SceneError: the trajectory holds no frame.
+        SceneError: the trajectory is damaged, or holds no frame.
     """
-    if not len(trajectory):
-        raise SceneError(f"{trajectory.path} holds no frame")
-    scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observables
+    trajectory.require_frames()
+    scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observed()
     end = trajectory.frame(-1)
     shapes = shapes_of(scene, end.position)
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
@@ -59,15 +57,18 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     _speeds(cells[len(views)], trajectory)
     for cell in cells[len(views) + 1 :]:
         cell.set_axis_off()
-    picture.suptitle(f"{trajectory.path.name}: {len(times)} frames, {method!r}".replace("swarm.", ""), fontsize=11)
+    frames = "frame" if len(times) == 1 else "frames"
+    picture.suptitle(f"{trajectory.path.name}: {len(times)} {frames}, {method!r}".replace("swarm.", ""), fontsize=11)
     drawing.save(picture, target)
 
 
 def _speeds(axes: Any, trajectory: Trajectory) -> None:
     """How many particles have which speed, at the start and at the end."""
-    first, last = trajectory.frame(0), trajectory.frame(-1)
-    top = 1.05 * max(first.fastest(), last.fastest()) or 1.0
-    for colour, frame, name in zip(drawing.LINES, (first, last), ("start", "end"), strict=False):
+    ends = {"start": trajectory.frame(0), "end": trajectory.frame(-1)}
+    if len(trajectory) == 1:
+        del ends["end"]
+    top = 1.05 * max(frame.fastest() for frame in ends.values()) or 1.0
+    for colour, (name, frame) in zip(drawing.LINES, ends.items(), strict=False):
         speeds = np.sqrt((frame.velocity**2).sum(axis=0))
         counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}

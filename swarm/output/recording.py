@@ -21,7 +21,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .. import checks
-from ..errors import FileError
+from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
@@ -248,18 +248,23 @@ def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bo
     """Make the recording of a trajectory.
 
     Raises:
-        SceneError: the target exists, or the trajectory holds no frame.
+        SceneError: the target exists, or the trajectory is damaged, or holds no frame.
         FileError: the recording cannot be written.
     """
     frames, start, times = len(trajectory), trajectory.frame(0), trajectory.times
-    seen = trajectory.observables
+    seen = trajectory.observed()
     writer = RecordingWriter(path, overwrite, trajectory.scene, trajectory.method, start, frames, settings)
-    with writer as write:
-        for first in range(0, frames, _AT_ONCE):
-            numbers = range(first, min(first + _AT_ONCE, frames))
-            write(
-                [
-                    (k, times[k], trajectory.frame(k), {name: values[k] for name, values in seen.items()})  # type: ignore[misc]
-                    for k in numbers
-                ]
-            )
+    try:
+        with writer as write:
+            for first in range(0, frames, _AT_ONCE):
+                numbers = range(first, min(first + _AT_ONCE, frames))
+                write(
+                    [
+                        (k, times[k], trajectory.frame(k), {name: values[k] for name, values in seen.items()})  # type: ignore[misc]
+                        for k in numbers
+                    ]
+                )
+    except SceneError:
+        # Of a damaged trajectory half a recording would look like a whole one.
+        path.unlink(missing_ok=True)
+        raise

@@ -95,7 +95,8 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             drawing.particles(cells[-1], positions, drawing.red_green_blue(packed), playback.wires)
     about = playback.about
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
-    told = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {len(playback.times)} frames"
+    count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
+    told = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {count}"
     top.suptitle(f"{told}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
     for place, (group, (view, logarithm)) in enumerate((g, v) for g, v in _GROUPS.items() if g in groups):
         drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), view, groups[group], logarithm)

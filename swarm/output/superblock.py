@@ -7,8 +7,10 @@ that mode refuse it, even after the writer is dead. The mark is a byte of the su
 File Format Specification, II.A, superblock version 3.
 """
 
+import io
 import os
-from typing import BinaryIO
+from pathlib import Path
+from typing import Any, BinaryIO
 
 SIZE = 48
 _VERSION, _FLAGS, _END, _CHECKSUM = 8, 11, slice(28, 36), slice(44, 48)
@@ -37,6 +39,45 @@ def mend(file: BinaryIO) -> None:
         _write(file, block)
 
 
+class Unmarked(io.FileIO):
+    """A file as if it had no mark, to be read by h5py.
+
+    A marked one opens in the mode for readers only, and there HDF5 waits until the writer has mended what is damaged:
+    if there is no writer, for ever.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._place = 0
+        block = bytearray(super().read(SIZE) or b"")
+        if len(block) == SIZE and block[_VERSION] == 3 and _sum(block) == block[_CHECKSUM]:
+            block[_FLAGS] = 0
+            block[_CHECKSUM] = _sum(block)
+        self._block = bytes(block)
+
+    def __del__(self) -> None:
+        # h5py closes no file that it did not open.
+        self.close()
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Go to a place."""
+        self._place = super().seek(offset, whence)
+        return self._place
+
+    def readinto(self, buffer: Any) -> int:
+        """Read from there; the superblock is the one without a mark."""
+        at, view = self._place, memoryview(buffer)
+        # Where processes are forked, they share the place of a file.
+        data = os.pread(self.fileno(), len(view), at) if hasattr(os, "pread") else super().read(len(view)) or b""
+        part = self._block[at : at + len(data)]
+        view[: len(data)] = part + data[len(part) :]
+        return len(data)
+
+
+def _sum(block: bytearray) -> bytes:
+    return checksum(bytes(block[: _CHECKSUM.start])).to_bytes(4, "little")
+
+
 def put_back(file: BinaryIO, block: bytes) -> None:
     """Let the superblock be what it was."""
     file.seek(0)
@@ -49,7 +90,7 @@ def _read(file: BinaryIO) -> bytearray:
 
 
 def _write(file: BinaryIO, block: bytearray) -> None:
-    block[_CHECKSUM] = checksum(bytes(block[: _CHECKSUM.start])).to_bytes(4, "little")
+    block[_CHECKSUM] = _sum(block)
     put_back(file, bytes(block))
 
 

@@ -6,6 +6,9 @@ number that were run, and parameters/start, a digest of them at the start. All e
 dataset by hard links. writer.py writes them.
 """
 
+import contextlib
+import operator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +21,13 @@ from ..errors import SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
+from . import layout, paths, superblock
+from .sources import DAMAGE, DamagedError, reason, require_file
 
-_PARTS = ("position", "velocity")
 _STILL_WRITTEN = "already open"
+# Of all who open a file in one process by the same driver HDF5 wants the same flags of locking. That for logs, which
+# reads as the usual one does and logs nothing unless it is asked to, is hardly another's.
+_DRIVER = "swarm"
 
 
 class Trajectory:
@@ -32,27 +39,23 @@ class Trajectory:
         scene, method: as they were run.
         scene_text: the scene file's text, or None.
 
-    A file that is being written can be read, and so can what a kill left of one.
+    A file that is being written can be read, and so can what a kill left of one: the frames that are whole when it is
+    opened. What cannot be right is a SceneError that says what of the file is damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        # Without a chunk cache only those rows of a chunk are read that are asked for, a thousandth for one particle's
-        # path. Without locking, a file that is still being written can be read.
-        options: dict[str, Any] = {"locking": False, "rdcc_nbytes": 0}
+        self.path = paths.given("path", path)
+        require_file(self.path, "a trajectory (.h5)")
+        self._file = _opened(self.path)
         try:
-            try:
-                self._file = h5py.File(self.path, "r", **options)
-            except OSError as error:
-                if _STILL_WRITTEN not in str(error):
-                    raise
-                # Marked by its writer in this very moment, or in the one in which it was killed.
-                self._file = h5py.File(self.path, "r", swmr=True, **options)
-        except OSError as error:
-            raise SceneError(f"cannot read the trajectory {self.path}: {error}") from error
-        if "h5md" not in self._file or "parameters/time" not in self._file:
-            self._file.close()
-            raise SceneError(f"{self.path} is an HDF5 file, but not a trajectory of swarm")
+            with self._reading("its structure") as file:
+                foreign = layout.missing(file)
+                self._frames = 0 if foreign else layout.frames(file, self.path)
+            if foreign:
+                raise SceneError(f"{self.path} is an HDF5 file, but not a trajectory of swarm: it has no {foreign}")
+        except SceneError:
+            self.close()
+            raise
 
     def __enter__(self) -> "Trajectory":
         return self
@@ -64,86 +67,193 @@ class Trajectory:
         """Close the file."""
         self._file.close()
 
+    @contextlib.contextmanager
+    def _reading(self, what: str) -> Iterator[Any]:
+        """The open file, for reading `what`: whatever goes wrong with that is a SceneError, for the file is damaged."""
+        if not self._file:
+            raise SceneError(f"{self.path} is closed; open it again with swarm.load")
+        try:
+            yield self._file
+        except DamagedError:
+            raise
+        except DAMAGE as error:
+            raise DamagedError(f"{self.path} is damaged: {what}: {reason(error)}") from error
+
     def __len__(self) -> int:
         """Number of frames that are whole: their times are written last."""
-        return int(self._file["parameters/time"].shape[0])
+        with self._reading("its frames"):
+            return self._frames
 
     @property
     def times(self) -> NDArray[np.float64]:
         """Times of the frames [s]."""
-        return np.asarray(self._file["parameters/time"][: len(self)])
+        with self._reading("its times") as file:
+            times = _finite(file["parameters/time"][: self._frames])
+            if (np.diff(times) <= 0.0).any():
+                raise ValueError(f"frame {int((np.diff(times) <= 0.0).argmax()) + 1} is not after the one before it")
+        return times
 
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
         """Everything that was observed, one entry a frame."""
-        group, n = self._file.get("observables", {}), len(self)
-        return {"time": self.times, **{name: np.asarray(group[name]["value"][:n]) for name in group}}
+        seen = {"time": self.times}
+        with self._reading("its observables") as file:
+            group = file.get("observables", {})
+            for name in group:
+                with self._reading(f"its observable {name}"):
+                    seen[name] = _finite(group[name]["value"][: self._frames])
+        return seen
+
+    def observed(self) -> dict[str, NDArray[Any]]:
+        """The observables, all of them that every run has."""
+        seen, scene = self.observables, self.scene
+        with self._reading("its observables"):
+            layout.require_observables(seen, len(scene.surfaces))
+        return seen
+
+    def require_frames(self) -> None:
+        """Raise a SceneError if there is no frame."""
+        if not len(self):
+            raise SceneError(f"{self.path} holds no frame: its run ended before the first one was written")
+
+    def require_index(self) -> None:
+        """Raise a SceneError if HDF5 could not find all chunks: a writer would wait for a damaged index for ever."""
+        with self._reading("its index") as file:
+            layout.require_index(file)
 
     def frame(self, k: int) -> Particles:
         """The particles at frame k; negative k count from the end."""
-        n = len(self)
+        k, n = _whole(f"{self.path}: frame", k), len(self)
+        self.require_frames()
         if not -n <= k < n:
             raise SceneError(f"{self.path}: frame must lie between {-n} and {n - 1}, got {k}")
-        everything = self._particles()
-        position, velocity = (everything[f"{name}/value"][k % n].T for name in _PARTS)
-        return Particles(position, velocity, everything["mass"][()])
+        self._require_particles()
+        with self._reading(f"frame {k % n}") as file:
+            everything = file["particles/all"]
+            position, velocity = (everything[f"{name}/value"][k % n].T for name in layout.PARTS)
+            return Particles(position, velocity, everything["mass"][()])
 
     def particle(self, i: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """The path of particle i: its positions and velocities, (3, frames) each."""
-        everything, n = self._particles(), len(self)
-        ids = everything["id"][()]
+        i = _whole(f"{self.path}: particle", i)
+        self._require_particles()
+        with self._reading("the numbers of its particles") as file:
+            ids = file["particles/all/id"][()]
+            if (np.diff(ids) <= 0).any() or ids[0] < 0 or ids[-1] >= self.count:
+                raise ValueError(f"expected some of 0 to {self.count - 1}, each once and in order")
         column = int(np.searchsorted(ids, i))
         if column == len(ids) or ids[column] != i:
             raise SceneError(
                 f"{self.path}: particle must be one of the {len(ids)} that the file keeps, from {ids[0]} to {ids[-1]}, "
                 f"got {i}"
             )
-        position, velocity = (everything[f"{name}/value"][:n, column].T for name in _PARTS)
+        with self._reading(f"particle {i}") as file:
+            position, velocity = (
+                _finite(file[f"particles/all/{name}/value"][: self._frames, column]).T for name in layout.PARTS
+            )
         return position, velocity
 
-    def _particles(self) -> Any:
-        if "particles/all" not in self._file:
+    def _require_particles(self) -> None:
+        with self._reading("its particles") as file:
+            kept = "particles/all" in file
+        if not kept:
             raise SceneError(f'{self.path} keeps no particles: it was run with frames = "none"')
-        return self._file["particles/all"]
 
     @property
     def count(self) -> int:
         """Number of particles that were run; a frame may keep fewer."""
-        return int(self._file["parameters/particles"][()])
+        with self._reading("its number of particles") as file:
+            return int(file["parameters/particles"][()])
 
     @property
     def descriptions(self) -> dict[str, str]:
         """What makes a run another one, as texts: scene, method and storage."""
-        return {name: str(self._file[f"parameters/{name}"].asstr()[()]) for name in ("scene", "method", "storage")}
+        return {name: self._text(name) for name in ("scene", "method", "storage")}
 
     @property
     def start(self) -> str:
         """A digest of the particles at the start: "" in a file of a version that stored none."""
-        stored = self._file.get("parameters/start")
-        return "" if stored is None else str(stored.asstr()[()])
+        with self._reading("its start") as file:
+            stored = "parameters/start" in file
+        return self._text("start") if stored else ""
 
     @property
     def scene(self) -> Scene:
         """The scene that was run."""
-        table = _toml(self._file["parameters/scene"])
-        return tables.scene_of(table["surface"], table.get("gravity"))
+        with self._reading("its scene"):
+            table = _toml(self._text("scene"))
+            surfaces = table["surface"]
+            own = any(surface["kind"] == "own" for surface in surfaces)
+        # A surface of one's own is no damage: that the file does not hold it is said as it is.
+        with contextlib.nullcontext() if own else self._reading("its scene"):
+            return tables.scene_of(surfaces, table.get("gravity"))
 
     @property
     def method(self) -> Method:
         """The method that was run."""
-        return tables.method_of(_toml(self._file["parameters/method"]))
+        with self._reading("its method"):
+            return tables.method_of(_toml(self._text("method")))
 
     @property
     def scene_text(self) -> str | None:
         """The scene file that was run."""
-        stored = self._file.get("parameters/scene_file")
-        return None if stored is None else str(stored.asstr()[()])
+        with self._reading("its scene file") as file:
+            stored = "parameters/scene_file" in file
+        return self._text("scene_file") if stored else None
+
+    def _text(self, name: str) -> str:
+        with self._reading(f"its {name.replace('_', ' ')}") as file:
+            return layout.text(file[f"parameters/{name}"], self.path)
 
 
-def _toml(dataset: Any) -> dict[str, Any]:
+def _opened(path: Path) -> h5py.File:
+    # Without a chunk cache only those rows of a chunk are read that are asked for: of one particle's path a thousandth.
+    # Without locking, a file that is still being written can be read.
+    options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
+    try:
+        try:
+            return h5py.File(path, "r", driver=_DRIVER, **options)
+        except OSError as error:
+            if _STILL_WRITTEN not in str(error):
+                raise
+            # Marked by its writer in this very moment, or in the one in which it was killed.
+            return h5py.File(superblock.Unmarked(path), "r", **options)
+    except DAMAGE as error:
+        if "signature not found" in str(error):
+            raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
+        if getattr(error, "errno", None):
+            raise SceneError(f"cannot read {path}: {reason(error)}") from error
+        raise DamagedError(f"{path} is damaged: {reason(error)}") from error
+
+
+def _own_driver(plist: Any, **_options: Any) -> None:
+    plist.set_fapl_log(b"", 0, 0)
+
+
+h5py.register_driver(_DRIVER, _own_driver)
+
+
+def _finite(values: Any) -> NDArray[Any]:
+    """What was read, if it can have been written: no run writes an infinity or a NaN."""
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        raise ValueError(f"expected finite numbers, got {values[wrong][0]:g} at frame {int(np.argwhere(wrong)[0, 0])}")
+    return np.asarray(values)
+
+
+def _whole(name: str, value: Any) -> int:
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        return operator.index(value)
+    except TypeError:
+        raise SceneError(f"{name} must be a whole number, got {value!r}") from None
+
+
+def _toml(text: str) -> dict[str, Any]:
     import tomllib
 
-    return tomllib.loads(dataset.asstr()[()])
+    return tomllib.loads(text)
 
 
 def load(path: str | Path) -> Trajectory:

@@ -1,0 +1,138 @@
+"""What a trajectory must look like before anything of it is read: its datasets, their types, and shapes that agree."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+from numpy.typing import NDArray
+
+PARTS = ("position", "velocity")
+_TEXTS = ("scene", "method", "storage")
+_REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
+# No filter of HDF5 packs more densely: deflate, 1032 to 1.
+_DENSEST = 1032
+# Of a heap of texts, and of each object in it: bytes of the header; and how it begins.
+_HEADER, _HEAP = 16, int.from_bytes(b"GCOL", "little")
+_INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
+
+# What every run observes, and tables and pictures show; of each surface there is an impulse.
+_NUMBERS = (
+    "kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy", "energy_error",
+    "max_penetration", "impacts", "escaped", "unconverged",
+)  # fmt: skip
+
+
+def missing(file: Any) -> str | None:
+    """What a trajectory has and this file has not, or None."""
+    return next((name for name in _REQUIRED if name not in file), None)
+
+
+def frames(file: Any, path: Path) -> int:
+    """The number of whole frames of a file; a ValueError says what is not as it was written.
+
+    A file that is being written may hold more of a part than whole frames, never less.
+    """
+    parameters = file["parameters"]
+    for name in (*_TEXTS, "scene_file", "start"):
+        if name in parameters and (
+            h5py.check_string_dtype(_dataset(parameters, name).dtype) is None or parameters[name].shape != ()
+        ):
+            raise ValueError(f"parameters/{name} must be a text")
+    count = int(_dataset(parameters, "particles", _INTEGER, ())[()])
+    time = _dataset(parameters, "time", _REAL, (None,))
+    n = int(time.shape[0])
+    _require_fits(time, n, path)
+    _dataset(parameters, "frame", _INTEGER, (n,))
+    if "observables" in file:
+        for name in file["observables"]:
+            value = _dataset(file, f"observables/{name}/value", _NUMBER)
+            if value.ndim not in (1, 2) or value.shape[0] < n:
+                raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
+            _require_fits(value, n, path)
+    if "particles/all" not in file:
+        return n
+    everything = file["particles/all"]
+    kept = _dataset(everything, "mass", _REAL, (None,))
+    if not 1 <= len(kept) <= count:
+        raise ValueError(f"of {count} particles it cannot keep {len(kept)}")
+    _require_fits(kept, len(kept), path)
+    if _dataset(everything, "id", _INTEGER, (None,)).shape != kept.shape:
+        raise ValueError(f"particles/all/id must have {len(kept)} entries, got {everything['id'].shape}")
+    for name in PARTS:
+        _require_fits(_dataset(everything, f"{name}/value", _REAL, (n, len(kept), 3)), n, path)
+    return n
+
+
+def require_index(file: Any) -> None:
+    """Go through the indexes of all chunks, which raises what h5py raises if one is damaged."""
+
+    def count(_name: str, found: Any) -> None:
+        if isinstance(found, h5py.Dataset) and found.chunks is not None:
+            found.id.get_num_chunks()
+
+    file.visititems(count)
+
+
+def text(dataset: Any, path: Path) -> str:
+    """A text of the file; a ValueError says that it is none.
+
+    HDF5 keeps it in a heap without a checksum, and goes through a damaged one for ever: so it is gone through here
+    before. HDF5 File Format Specification, III.E and VIII: a text is its length, the address of its heap and a number;
+    the heap is objects one after the other, and number 0 is the rest of it.
+    """
+    place = dataset.id.get_offset()
+    with open(path, "rb") as file:
+
+        def integer(at: int, size: int) -> int:
+            file.seek(at)
+            return int.from_bytes(file.read(size), "little")
+
+        begin = at = -1 if place is None else integer(place + 4, 8)
+        if not 0 <= begin < path.stat().st_size or integer(begin, 4) != _HEAP:
+            raise ValueError("it is in no heap")
+        end = begin + integer(begin + 8, 8)
+        at += _HEADER
+        while at + _HEADER <= end:
+            number, size = integer(at, 2), integer(at + 8, 8)
+            step = _HEADER + -(-size // 8) * 8 if number else size
+            if step < _HEADER or at + step > end:
+                raise ValueError("its heap is no chain of objects")
+            at += step
+    return str(dataset.asstr()[()])
+
+
+def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
+    """Raise a ValueError if one that every run has is not there, or not of its shape."""
+    n = len(seen["time"])
+    shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
+    for name, shape in shapes.items():
+        if name not in seen or seen[name].shape != shape:
+            came = "nothing" if name not in seen else str(seen[name].shape)
+            raise ValueError(f"expected {name} of the shape {shape}, got {came}")
+
+
+def _dataset(group: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
+    """A dataset of one of these kinds and of this shape; None is any length, and there may be more frames."""
+    found = group[name]
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        raise ValueError(f"{name} must be a dataset")
+    if kinds is not None and found.dtype.kind not in kinds:
+        raise ValueError(f"{name} must hold numbers, got {found.dtype}")
+    if shape is not None:
+        same = len(found.shape) == len(shape) and all(
+            wanted is None or got == wanted or (axis == 0 and got > wanted)
+            for axis, (got, wanted) in enumerate(zip(found.shape, shape, strict=True))
+        )
+        if not same:
+            told = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
+            raise ValueError(f"{name} must have the shape ({told}), got {found.shape}")
+    return found
+
+
+def _require_fits(dataset: Any, rows: int, path: Path) -> None:
+    """Raise a ValueError if so many rows cannot be in a file of that size: nothing is to be made for them."""
+    size, packed = path.stat().st_size, dataset.id.get_create_plist().get_nfilters() > 0
+    wanted = rows * math.prod(dataset.shape[1:]) * dataset.dtype.itemsize
+    if wanted > size * (_DENSEST if packed else 1):
+        raise ValueError(f"{dataset.name} takes {wanted} bytes, and the file has {size}")
