@@ -5,16 +5,13 @@ import json
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from . import interrupt
 from .errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .version import VERSION
-
-if TYPE_CHECKING:
-    from .simulation import Result
 
 _FAILED, _BAD_INPUT, _INTERRUPTED = 1, 2, 130
 
@@ -75,7 +72,7 @@ def run(
         from .output import paths
         from .output.storage import Storage
         from .simulation import simulate
-        from .summary import numbers
+        from .summary import numbers, of_result
 
     def told(status: str, **more: Any) -> None:
         if as_json:
@@ -136,7 +133,7 @@ def run(
         raise
     told("complete", **numbers(target), wall_time=result.wall_time)
     if not (quiet or as_json):
-        _summary(result, particles.volume)
+        _table(of_result(result, particles.volume))
 
 
 def _stopped(status: str, target: Path, began: bool) -> str | None:
@@ -172,54 +169,14 @@ def info(
     repair: Annotated[bool, typer.Option("--repair", help="Mend a recording that a crash cut off, in place.")] = False,
 ) -> None:
     """Say what a trajectory or a recording holds."""
+    from . import summary
+
     if file.suffix == ".rrd":
-        _table(_recording_rows(file, repair))
+        _table(summary.of_recording(file, repair))
     elif repair:
         raise SceneError(f"--repair is for recordings (.rrd), got {file}; a trajectory needs none")
     else:
-        _table(_trajectory_rows(file))
-
-
-def _trajectory_rows(file: Path) -> dict[str, str]:
-    from .output.trajectory import load
-
-    with load(file) as trajectory:
-        times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
-        last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
-        rows = {
-            "frames": f"{len(times)}{last}",
-            "particles": f"{trajectory.count}",
-            "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
-            "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
-            "method": _call(trajectory.method),
-            "observables": ", ".join(seen) or "none",
-            "size": f"{file.stat().st_size / 1e6:.1f} MB",
-        }
-        if len(times):
-            rows |= _figures(seen)
-    return rows
-
-
-def _recording_rows(file: Path, repair: bool) -> dict[str, str]:
-    from .output.extras import needed_by
-
-    with needed_by("a recording", "record"):
-        from .output import playback
-
-    if repair:
-        playback.repair(file)
-    held, whole = playback.described(file)
-    about, times = held.about, held.times
-    missing = "" if whole else "; these are the frames that swarm info --repair will keep"
-    every = f", of the run's every {about['stride']}th" if about["stride"] > 1 else ""
-    return {
-        "frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s{every}{missing}",
-        "particles": f"{about['shown']} of {about['particles']}",
-        "colour": f"{about['quantity']}, {about['low']:g} to {about['high']:g}",
-        "entities": "\n".join(f"{path} ({rows} rows)" for path, rows in sorted(held.entities.items())),
-        "size": f"{file.stat().st_size / 1e6:.1f} MB",
-        "whole": "yes" if whole else f"no, it was cut off: swarm info --repair {file}",
-    }
+        _table(summary.of_trajectory(file))
 
 
 @app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")
@@ -313,39 +270,6 @@ def _numbers(name: str, text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise SceneError(f"{name} must be numbers with commas between them, got {text!r}") from None
-
-
-def _call(described: Any) -> str:
-    """A surface or method as one would write it."""
-    return str(described).replace("swarm.", "")
-
-
-def _figures(seen: dict[str, Any]) -> dict[str, str]:
-    """The figures that say whether a run went well."""
-    from .observables import drift
-
-    escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
-    lost = seen.get("dissipated_energy", [0.0])[-1]
-    dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
-    return {
-        "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
-        "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
-        "largest penetration": f"{seen['max_penetration'].max():.1e} m",
-        **dissipated,
-        **escaped,
-    }
-
-
-def _summary(result: "Result", volume: float | None) -> None:
-    seen = result.observables
-    rate = seen["impacts"][-1] / result.wall_time
-    rows = {
-        **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
-        **_figures(seen),
-        "wall time": f"{result.wall_time:.2f} s, {rate:.3g} impacts/s",
-        "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",
-    }
-    _table(rows)
 
 
 def _table(rows: dict[str, str]) -> None:

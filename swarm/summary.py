@@ -1,9 +1,10 @@
-"""How a run went, in numbers for other programs."""
+"""How a run went and what its files hold: rows for people, numbers for other programs."""
 
 from pathlib import Path
 from typing import Any
 
 from .observables import drift
+from .simulation import Result
 
 
 def numbers(trajectory: Path) -> dict[str, Any]:
@@ -11,7 +12,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
     from .output.trajectory import load
 
     with load(trajectory) as written:
-        seen, particles = written.observables, written.count
+        seen, particles = written.observed(), written.count
     return {
         "trajectory": str(trajectory),
         "particles": particles,
@@ -25,3 +26,78 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "escaped": int(seen["escaped"][-1]),
         "unconverged": int(seen["unconverged"][-1]),
     }
+
+
+def of_trajectory(file: Path) -> dict[str, str]:
+    """What a trajectory holds, and whether it went well."""
+    from .output.trajectory import load
+
+    with load(file) as trajectory:
+        times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
+        last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
+        rows = {
+            "frames": f"{len(times)}{last}",
+            "particles": f"{trajectory.count}",
+            "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
+            "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
+            "method": _call(trajectory.method),
+            "observables": ", ".join(seen) or "none",
+            "size": f"{file.stat().st_size / 1e6:.1f} MB",
+        }
+        if len(times):
+            rows |= _figures(seen)
+    return rows
+
+
+def of_recording(file: Path, repair: bool) -> dict[str, str]:
+    """What a recording holds; mended before, if it is to be."""
+    from .output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from .output import playback
+
+    if repair:
+        playback.repair(file)
+    held, whole = playback.described(file)
+    about, times = held.about, held.times
+    missing = "" if whole else "; these are the frames that swarm info --repair will keep"
+    every = f", of the run's every {about['stride']}th" if about["stride"] > 1 else ""
+    return {
+        "frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s{every}{missing}",
+        "particles": f"{about['shown']} of {about['particles']}",
+        "colour": f"{about['quantity']}, {about['low']:g} to {about['high']:g}",
+        "entities": "\n".join(f"{path} ({rows} rows)" for path, rows in sorted(held.entities.items())),
+        "size": f"{file.stat().st_size / 1e6:.1f} MB",
+        "whole": "yes" if whole else f"no, it was cut off: swarm info --repair {file}",
+    }
+
+
+def of_result(result: Result, volume: float | None) -> dict[str, str]:
+    """How a run went; `volume` is what its particles were filled into [m^3]."""
+    seen = result.observables
+    rate = seen["impacts"][-1] / result.wall_time
+    return {
+        **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
+        **_figures(seen),
+        "wall time": f"{result.wall_time:.2f} s, {rate:.3g} impacts/s",
+        "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",
+    }
+
+
+def _figures(seen: dict[str, Any]) -> dict[str, str]:
+    """The figures that say whether a run went well."""
+    escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
+    lost = seen.get("dissipated_energy", [0.0])[-1]
+    dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
+    return {
+        "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
+        "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
+        "largest penetration": f"{seen['max_penetration'].max():.1e} m",
+        **dissipated,
+        **escaped,
+    }
+
+
+def _call(described: Any) -> str:
+    """A surface or method as one would write it."""
+    return str(described).replace("swarm.", "")

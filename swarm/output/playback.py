@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 
 from ..errors import FileError, SceneError
 from ..particles import Floats
+from . import paths
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _PARTICLES = "/scene/particles"
@@ -142,7 +143,7 @@ def repair(path: Path) -> Playback:
         SceneError, FileError: as `repaired`; the file is as it was.
     """
     require_file(path, "a recording (.rrd)")
-    target = path.with_name(f".{path.name}.repaired.rrd")
+    target = paths.part_of(path)
     try:
         repaired(path, target)
         os.replace(target, path)
