@@ -4,11 +4,11 @@ import swarm
 
 scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=None)
 particles = swarm.fill(scene, 10_000, speed=0.5, mass=1.0, seed=1)
-result = swarm.simulate(scene, particles, swarm.Impact(), until=10.0, every=0.1, trajectory="cavity.h5", threads=2)
+result = swarm.simulate(scene, particles, swarm.Impact(), until=10.0, every=0.1, trajectory="sphere.h5", threads=2)
 
 print(result.particles.position.shape)
 print(result.observables["impacts"][-1], "impacts")
 print(result.observables["energy_error"].max(), "worst relative energy error of a particle")
 
-with swarm.load("cavity.h5") as trajectory:
+with swarm.load("sphere.h5") as trajectory:
     print(trajectory.times[-1], trajectory.frame(-1).velocity[:, 0])

@@ -61,7 +61,7 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
     if path.exists() and not path.is_file():
         raise SceneError(f"{what}: expected a file name, got {path}, which is a device or a pipe")
     if path.exists() and not overwrite:
-        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it with --overwrite")
+        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it (--overwrite, overwrite=True)")
 
 
 def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:
