@@ -44,7 +44,7 @@ class Scene:
 
     Args:
         surfaces: at least one surface.
-        gravity: None, or three numbers (gx, gy, gz) [m/s^2].
+        gravity: None, or three numbers (gx, gy, gz) [m/s^2], each at most 1e100.
 
     Raises:
         SceneError: no surface, more than 24 walls, or surfaces that leave no volume.
@@ -66,6 +66,8 @@ class Scene:
                 raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
         required.require_description(surfaces)
         pull = None if gravity is None else checks.vector("gravity", gravity)
+        for i, part in enumerate(pull or ()):
+            checks.magnitude(f"|gravity[{i}]|", abs(part))
         object.__setattr__(self, "surfaces", surfaces)
         walls = len(self.owners())
         if walls > MOST_WALLS:

@@ -77,6 +77,7 @@ def test_no_volume_is_refused(surfaces):
         (lambda: Scene([BALL], gravity=9.81), ["gravity", "three numbers", "9.81"]),
         (lambda: Scene([BALL], gravity=(0, 0)), ["gravity", "three numbers", "got 2"]),
         (lambda: Scene([BALL], gravity=(0, 0, math.nan)), ["gravity[2]", "finite", "nan"]),
+        (lambda: Scene([BALL], gravity=(0, 0, -1e300)), ["|gravity[2]|", "at most 1e+100", "1e+300"]),
     ],
 )
 def test_errors_name_the_argument(build, parts):
