@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from .. import tables
 from ..errors import FileError, SceneError
 from ..particles import Particles
-from .sources import DAMAGE, DamagedError, reason, require_file
+from .sources import DAMAGE, DamagedError, reason
 
 Arrays = dict[str, NDArray[Any]]
 _HINT = "run it with the inputs it was started with, or start afresh with --overwrite"
@@ -116,9 +116,8 @@ def read(path: Path) -> tuple[Job, Arrays]:
     """A checkpoint.
 
     Raises:
-        SceneError: it is not there, or is damaged.
+        SceneError: it is damaged.
     """
-    require_file(path, "a checkpoint")
     with _reading(path):
         with zipfile.ZipFile(path) as archive:
             # All that it holds has a checksum, which is known when it is read to its end.
@@ -141,7 +140,7 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
     with _reading(path):
         if arrays.keys() != run.keys():
             raise ValueError(f"expected the arrays {sorted(run)}, got {sorted(arrays)}")
-        left = arrays["halted.particle"].shape
+        left = arrays["halted.particle"].shape[-1:]
         for name, mine in run.items():
             shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
             if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
@@ -161,7 +160,7 @@ def _ascends(values: NDArray[Any]) -> bool:
 def _reading(path: Path) -> Iterator[None]:
     try:
         yield
-    except (*DAMAGE, zipfile.BadZipFile, zlib.error) as error:
+    except (*DAMAGE, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise DamagedError(
             f"{path} is damaged: {reason(error)}; the frames in its trajectory are whole: go on from the last of them "
             "as a new run (from = in [particles]), or start afresh, with overwrite and without resume"
