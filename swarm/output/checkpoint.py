@@ -24,7 +24,7 @@ from .. import tables
 from ..errors import FileError, SceneError
 from ..particles import Particles
 from . import paths
-from .sources import DAMAGE, DamagedError, reason, require_file
+from .sources import DAMAGE, DamagedError, reason
 
 Arrays = dict[str, NDArray[Any]]
 # The name of an archive's first entry ends here.
@@ -129,9 +129,8 @@ def read(path: Path) -> tuple[Job, Arrays]:
     """A checkpoint.
 
     Raises:
-        SceneError: it is not there, or is damaged.
+        SceneError: it is damaged.
     """
-    require_file(path, "a checkpoint")
     with _reading(path):
         with zipfile.ZipFile(path) as archive:
             # All that it holds has a checksum, which is known when it is read to its end.
@@ -154,7 +153,7 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
     with _reading(path):
         if arrays.keys() != run.keys():
             raise ValueError(f"expected the arrays {sorted(run)}, got {sorted(arrays)}")
-        left = arrays["halted.particle"].shape
+        left = arrays["halted.particle"].shape[-1:]
         for name, mine in run.items():
             shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
             if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
@@ -174,7 +173,7 @@ def _ascends(values: NDArray[Any]) -> bool:
 def _reading(path: Path) -> Iterator[None]:
     try:
         yield
-    except (*DAMAGE, zipfile.BadZipFile, zlib.error) as error:
+    except (*DAMAGE, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise DamagedError(
             f"{path} is damaged: {reason(error)}; the frames in its trajectory are whole: go on from the last of them "
             "as a new run (from = in [particles]), or start afresh, with overwrite and without resume"

@@ -33,17 +33,14 @@ def frames(file: Any, path: Path) -> int:
 
     A file that is being written may hold more of a part than whole frames, never less.
     """
-    parameters = file["parameters"]
-    for name in (*_TEXTS, "scene_file", "start"):
-        if name in parameters and (
-            h5py.check_string_dtype(_dataset(parameters, name).dtype) is None or parameters[name].shape != ()
-        ):
-            raise ValueError(f"parameters/{name} must be a text")
-    count = int(_dataset(parameters, "particles", _INTEGER, ())[()])
-    time = _dataset(parameters, "time", _REAL, (None,))
+    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start")):
+        if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
+            raise ValueError(f"{name} must be a text")
+    count = int(_dataset(file, "parameters/particles", _INTEGER, ())[()])
+    time = _dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])
     _require_fits(time, n, path)
-    _dataset(parameters, "frame", _INTEGER, (n,))
+    _dataset(file, "parameters/frame", _INTEGER, (n,))
     if "observables" in file:
         for name in file["observables"]:
             value = _dataset(file, f"observables/{name}/value", _NUMBER)
@@ -52,15 +49,14 @@ def frames(file: Any, path: Path) -> int:
             _require_fits(value, n, path)
     if "particles/all" not in file:
         return n
-    everything = file["particles/all"]
-    kept = _dataset(everything, "mass", _REAL, (None,))
+    kept = _dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
         raise ValueError(f"of {count} particles it cannot keep {len(kept)}")
     _require_fits(kept, len(kept), path)
-    if _dataset(everything, "id", _INTEGER, (None,)).shape != kept.shape:
-        raise ValueError(f"particles/all/id must have {len(kept)} entries, got {everything['id'].shape}")
+    if (ids := _dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
+        raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
     for name in PARTS:
-        _require_fits(_dataset(everything, f"{name}/value", _REAL, (n, len(kept), 3)), n, path)
+        _require_fits(_dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
     return n
 
 
@@ -112,9 +108,9 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
             raise ValueError(f"expected {name} of the shape {shape}, got {came}")
 
 
-def _dataset(group: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
+def _dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
     """A dataset of one of these kinds and of this shape; None is any length, and there may be more frames."""
-    found = group[name]
+    found = file[name]
     if not isinstance(found, h5py.Dataset) or found.shape is None:
         raise ValueError(f"{name} must be a dataset")
     if kinds is not None and found.dtype.kind not in kinds:

@@ -194,7 +194,7 @@ def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.rrd").write_text("no recording")
     with pytest.raises(swarm.SceneError, match=r"text\.rrd is not a recording of swarm"):
         playback.described(tmp_path / "text.rrd")
-    with pytest.raises(swarm.SceneError, match=r"absent\.rrd: there is no such file"):
+    with pytest.raises(swarm.SceneError, match=r"there is no file .*absent\.rrd"):
         playback.described(tmp_path / "absent.rrd")
     assert (tmp_path / "text.rrd").read_text() == "no recording"
 

@@ -113,11 +113,11 @@ def test_other_files_are_refused(tmp_path):
     text.write_text("no HDF5")
     with h5py.File(other, "w") as file:
         file["x"] = 1
-    with pytest.raises(swarm.SceneError, match=r"cannot read the trajectory .*text\.h5"):
+    with pytest.raises(swarm.SceneError, match=r"text\.h5 is not an HDF5 file"):
         swarm.load(text)
     with pytest.raises(swarm.SceneError, match=r"not a trajectory of swarm"):
         swarm.load(other)
-    with pytest.raises(swarm.SceneError, match=r"cannot read the trajectory .*absent\.h5"):
+    with pytest.raises(swarm.SceneError, match=r"there is no file .*absent\.h5"):
         swarm.load(tmp_path / "absent.h5")
 
 
