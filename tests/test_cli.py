@@ -73,6 +73,30 @@ def test_record_view_plot_and_info(folder):
     assert "recording and live cannot go on with a run that was stopped" in refused.stderr
 
 
+def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
+    assert command("run", "scene.toml", "--quiet", cwd=folder).returncode == 0
+    whole = (folder / "scene.h5").read_bytes()
+    (folder / "damaged.h5").write_bytes(whole[:100] + bytes(900) + whole[1000:])
+    (folder / "empty.rrd").touch()
+    for words, told in (
+        (["info", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
+        (["plot", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
+        (["record", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
+        (["run", "scene.toml", "-o", "damaged.h5", "--resume"], "damaged.h5 is damaged: its structure: "),
+        (["info", "absent.h5"], "there is no file absent.h5; expected a trajectory (.h5)"),
+        (["info", "."], ". is a folder; expected a trajectory (.h5)"),
+        (["plot", "scene.toml"], "scene.toml is not an HDF5 file"),
+        (["record", "absent.h5"], "there is no file absent.h5; expected a trajectory (.h5)"),
+        (["view", "absent.rrd"], "there is no file absent.rrd; expected a recording (.rrd)"),
+        (["view", "scene.h5"], "scene.h5 is not a recording of swarm"),
+        (["info", "empty.rrd"], "empty.rrd is empty; expected a recording (.rrd)"),
+    ):
+        done = command(*words, cwd=folder)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith(f"error: {told}")
+        assert len(done.stderr.splitlines()) == 1
+
+
 def test_results_do_not_depend_on_threads(folder):
     for threads in ("1", "2"):
         assert command("run", "scene.toml", "--threads", threads, "-o", f"{threads}.h5", cwd=folder).returncode == 0
