@@ -320,6 +320,8 @@ def test_interrupt_keeps_finished_frames(folder, request):
     process = subprocess.Popen(
         [sys.executable, "-m", "swarm", "run", "scene.toml"],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        # A shell starts what is in its background with SIGINT ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     request.addfinalizer(process.kill)
     deadline = time.monotonic() + 600.0

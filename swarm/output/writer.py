@@ -88,7 +88,7 @@ class TrajectoryWriter:
             superblock.mend(self._handle)
         # HDF5's locks would shut readers out.
         self._file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
-        self._descriptor = self._file.id.get_vfd_handle()
+        self._descriptor = _descriptor_of(self._file)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -251,6 +251,11 @@ class TrajectoryWriter:
         void = os.open(os.devnull, os.O_RDWR)
         os.dup2(void, self._descriptor)
         os.close(void)
+
+
+def _descriptor_of(file: h5py.File) -> int:
+    """The system's number of an open file."""
+    return int(file.id.get_vfd_handle())
 
 
 def _reason(error: Exception) -> str:
