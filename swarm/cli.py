@@ -74,9 +74,9 @@ def run(
         from .simulation import simulate
         from .summary import numbers, of_result
 
-    def told(status: str, **more: Any) -> None:
+    def told(status: str, written: Path | None = None, **more: Any) -> None:
         if as_json:
-            print(json.dumps({"status": status, **more}, indent=2))
+            print(json.dumps({"status": status, **(numbers(written) if written else {}), **more}, indent=2))
 
     try:
         with interrupt.at_once():
@@ -94,6 +94,7 @@ def run(
             if shown is not None:
                 paths.check_target(shown, overwrite, "recording")
             before, particles = paths.identity(target), job.particles()
+            goes_on = resume and paths.checkpoint_of(target).exists()
         result = simulate(
             job.scene,
             particles,
@@ -121,17 +122,21 @@ def run(
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
         # A second signal ends what follows: the files are closed.
         with interrupt.at_once():
-            began = resume or paths.identity(target) != before
-            told(status, **(numbers(target) if began else {"frames": 0}), resume=_stopped(status, target, began))
+            began = target.exists() and (goes_on or paths.identity(target) != before)
+            again = _stopped(status, target, began)
+            if began:
+                told(status, target, resume=again)
+            else:
+                told(status, frames=0, resume=again)
         raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
-        told("complete", **numbers(target))
+        told("complete", target)
         return
     except SwarmError as error:
         told("failed", error=str(error))
         raise
-    told("complete", **numbers(target), wall_time=result.wall_time)
+    told("complete", target, wall_time=result.wall_time)
     if not (quiet or as_json):
         _table(of_result(result, particles.volume))
 

@@ -3,14 +3,13 @@
 import contextlib
 import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
-# As a shell's for a process that SIGINT ended.
-_EXIT = 130
+# As a shell's for a process that SIGINT ended; and where it says so.
+_EXIT, _STDERR = 130, 2
 _DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
@@ -36,7 +35,7 @@ def leave_at_once() -> None:
     """Let a SIGINT end the process from now on: there is nothing left to lose."""
 
     def leave(number: int, frame: FrameType | None) -> None:
-        os.write(sys.stderr.fileno(), b"interrupted\n")
+        os.write(_STDERR, b"interrupted\n")
         os._exit(_EXIT)
 
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:

@@ -227,6 +227,31 @@ cli.main()
     assert (done.returncode, json.loads(done.stdout)["frames"]) == (0, 3)
 
 
+@pytest.mark.parametrize("options", [[], ["--resume"], ["--overwrite"], ["--resume", "--overwrite"]])
+def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, options):
+    """What was there before is not this run's, and there is nothing to go on from."""
+    if "--overwrite" in options:
+        assert command("run", "scene.toml", cwd=folder).returncode == 0
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    code = """
+import signal, sys
+from swarm import cli, simulation
+def interrupted(*about):
+    signal.raise_signal(signal.SIGINT)
+    raise KeyboardInterrupt
+simulation.Run = interrupted
+signal.signal(signal.SIGINT, signal.default_int_handler)
+cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, "run", "scene.toml", "--json", *options],
+        cwd=folder, capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert (done.returncode, json.loads(done.stdout)) == (130, {"status": "interrupted", "frames": 0, "resume": None})
+    assert "no frame was finished, and nothing was written" in done.stderr
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
 INTERRUPTED = """
 import importlib.abc, signal, sys
 class Finder(importlib.abc.MetaPathFinder):
