@@ -112,6 +112,11 @@ class Session:
             texts: dict[str, Any] = before.descriptions
             there = dataclasses.replace(self._job, **texts, particles=before.count, start=before.start)
             frames, last = len(before), before.times[-1:]
+        if not there.start:
+            raise SceneError(
+                f"{trajectory} must say of which start it is, to be resumed or found complete, got one of a version "
+                "that did not store it; choose another name, or overwrite it with --overwrite"
+            )
         there.require_same(self._job, trajectory)
         if frames and last[0] >= until:
             raise CompleteError(f"{trajectory} is complete: its last frame is at {last[0]:g} s")

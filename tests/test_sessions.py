@@ -8,6 +8,7 @@ import sys
 import textwrap
 import time
 
+import h5py
 import numpy as np
 import pytest
 from conftest import METHODS, rarely
@@ -239,6 +240,15 @@ def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):
         run(path, resume=True)
     with pytest.raises(swarm.SceneError, match="is of another run") as caught:
         run(path, resume=True, seed=2)
+    assert not isinstance(caught.value, swarm.CompleteError)
+
+
+def test_a_trajectory_of_a_version_that_stored_no_start_is_not_taken_for_complete(tmp_path):
+    run(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        del file["parameters/start"]
+    with pytest.raises(swarm.SceneError, match=r"run\.h5 must say of which start it is") as caught:
+        run(tmp_path / "run.h5", resume=True)
     assert not isinstance(caught.value, swarm.CompleteError)
 
 
