@@ -15,7 +15,7 @@ Vector = tuple[float, float, float]
 # Magnitudes whose squares and inverse squares are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes of a particle in a run (`python -m bench bars`); so few of them fit everywhere.
-_PARTICLE, _FEW = 176, 1_000_000
+_PARTICLE, _FEW = 146, 1_000_000
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -85,8 +85,8 @@ def memory() -> int:
 def in_bytes(size: float) -> str:
     """A number of bytes as people read it.
 
-    >>> in_bytes(1.76e14)
-    '176 TB'
+    >>> in_bytes(1.46e14)
+    '146 TB'
     """
     units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"]
     while size >= 999.5 and len(units) > 1:
