@@ -1,7 +1,6 @@
 """What is damaged, foreign, empty or not there is one sentence: no traceback, no absurd array and no endless wait."""
 
 import json
-import os
 import random
 import shutil
 import signal
@@ -302,7 +301,7 @@ def stopped(tmp_path):
 
     def stop(frame):
         if frame.number == 2:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(KeyboardInterrupt):
         simulate(path, checkpoint=60.0, progress=stop)
