@@ -86,17 +86,20 @@ class FrameTimes:
             target: the trajectory, or None.
             numbers: bytes of the particles in a frame.
             surfaces: how many there are.
-            packed: whether the file is compressed; it is not known then how small it becomes.
+            packed: whether these are compressed: nobody knows how small they become, but observables never are.
         """
         frames = self.count - first
         if target is None:
-            size, room, where = frames * (_OBJECTS + _SURFACE * surfaces), checks.memory(), "this machine's memory"
+            size = least = frames * (_OBJECTS + _SURFACE * surfaces)
+            room, where = checks.memory(), "this machine's memory"
         else:
-            size = frames * (numbers + _NUMBERS + _SURFACE * surfaces)
+            least = frames * (_NUMBERS + _SURFACE * surfaces)
+            size = least + frames * numbers
+            least = least if packed else size
             there = target.stat().st_size if target.exists() else 0
             room, where = shutil.disk_usage(target.parent).free + there, f"what is free in {target.parent.resolve()}"
         told = f"{frames} frames, {'at most ' * packed}{checks.in_bytes(size)}"
-        if size > room and not packed:
+        if least > room:
             raise SceneError(
                 f"every must leave frames that fit, got {self.every:g} s until {self.until:g} s: {told}, and {where} "
                 f"is {checks.in_bytes(room)}; make every longer"

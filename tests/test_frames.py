@@ -33,6 +33,13 @@ def test_endless_frames_are_refused_before_the_run_with_their_number_and_size(tm
         swarm.SceneError, match=r"every must leave frames .* EB, and what is free in .* is .* make every"
     ):
         swarm.simulate(SPHERE, START, swarm.Impact(), until=1e300, every=1e-300, trajectory=tmp_path / "run.h5")
+    # What is compressed may become small, but not its observables.
+    with pytest.raises(
+        swarm.SceneError, match=r"1000000000001 frames, at most .* TB, and what is free in .* make every"
+    ):
+        swarm.simulate(
+            SPHERE, START, swarm.Impact(), until=1.0, every=1e-12, trajectory=tmp_path / "run.h5", compression="gzip"
+        )
     assert list(tmp_path.iterdir()) == []
 
 
