@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import swarm
-from swarm.run import Run
+from swarm.run.engine import Run
 
 from . import yardstick
 from .report import ROOT, Row, in_turn, repeated, show, write

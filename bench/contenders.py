@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import swarm
 from swarm.methods.base import Method
-from swarm.run import Run
+from swarm.run.engine import Run
 
 from . import yardstick
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import swarm
 from swarm.output import checkpoint
-from swarm.run import Run
+from swarm.run.engine import Run
 
 from .bars import SPEED, SPHERE
 from .report import Row, repeated, show, write

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .output.trajectory import Trajectory, load
     from .particles import Particles
+    from .run.simulation import Result, simulate
     from .scene import Scene
-    from .simulation import Result, simulate
     from .surfaces import (
         Box,
         Capsule,
@@ -45,7 +45,7 @@ _HOMES = {
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
-    "simulation": ("Result", "simulate"),
+    "run.simulation": ("Result", "simulate"),
     "surfaces": (
         "Box",
         "Capsule",

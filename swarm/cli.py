@@ -71,7 +71,7 @@ def run(
         from .checks import duration
         from .output import paths
         from .output.storage import Storage
-        from .simulation import simulate
+        from .run.simulation import simulate
         from .summary import numbers, of_result
 
     def told(status: str, written: Path | None = None, **more: Any) -> None:

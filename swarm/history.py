@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from .contact import corner, reflection, uzawa
 from .contact.regularisation import regularisation
 from .errors import RunError, SceneError
-from .gravity import accelerated, displacement
+from .kernel.gravity import accelerated, displacement
 from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles

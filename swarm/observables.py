@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import by_type, inlined, kernel, scratch, select
 from .contact.energy import contact_energy
-from .gravity import Nothing, potential
+from .kernel.gravity import Nothing, potential
+from .kernel.jit import by_type, inlined, kernel, scratch, select
 from .particles import State
 from .surfaces import base as surfaces
 from .surfaces import chain as walls

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .errors import SceneError
-from .gravity import Gravity
+from .kernel.gravity import Gravity
 from .surfaces import base, required
 from .surfaces.base import Box, Surface
 from .surfaces.chain import Chain, chain_of

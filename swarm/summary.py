@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from .observables import drift
-from .simulation import Result
+from .run.simulation import Result
 
 
 def numbers(trajectory: Path) -> dict[str, Any]:

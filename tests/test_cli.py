@@ -266,7 +266,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("name", ["typer", "numpy", "numba", "msgspec", "swarm.simulation"])
+@pytest.mark.parametrize("name", ["typer", "numpy", "numba", "msgspec", "swarm.run.simulation"])
 def test_an_interrupt_in_an_import_is_one_word(folder, name):
     done = subprocess.run(
         [sys.executable, "-c", INTERRUPTED.format(name=name), "run", "scene.toml"],

@@ -6,7 +6,7 @@ from conftest import EPSILON, call, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.gravity import Gravity, accelerated, displacement, potential
+from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 
 times = st.floats(0.0, 10.0, allow_subnormal=False)
 pulls = st.none() | vectors.map(lambda g: Gravity(*g))

@@ -7,7 +7,7 @@ import weakref
 import pytest
 
 import swarm
-from swarm.run import Run
+from swarm.run.engine import Run
 
 CAVITY = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 

@@ -16,9 +16,9 @@ import pytest
 from conftest import LAWS, call, every_surface, numbers_of, scene_of
 
 import swarm
-from swarm import _jit
 from swarm.contact import regularisation
-from swarm.gravity import Gravity, Nothing, accelerated, displacement, potential
+from swarm.kernel import jit as _jit
+from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
 from swarm.surfaces import base, chain, flights
 
 PACKAGE = Path(swarm.__file__).parent
@@ -224,7 +224,7 @@ def copied(tmp_path, monkeypatch):
     shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
 
     def folder():
-        spec = importlib.util.spec_from_file_location("copied_jit", tmp_path / "swarm" / "_jit.py")
+        spec = importlib.util.spec_from_file_location("copied_jit", tmp_path / "swarm" / "kernel" / "jit.py")
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         return module.cache_folder()
@@ -232,7 +232,7 @@ def copied(tmp_path, monkeypatch):
     return tmp_path / "swarm", folder
 
 
-@pytest.mark.parametrize("edited", ["surfaces/sphere.py", "blocks.py", "_jit.py", "methods/base.py"])
+@pytest.mark.parametrize("edited", ["surfaces/shapes/sphere.py", "lanes/block.py", "kernel/jit.py", "methods/base.py"])
 def test_an_edit_anywhere_names_another_cache(copied, edited):
     """Numba looks at the file of the kernel only; an old answer must not come back."""
     package, folder = copied
@@ -312,20 +312,17 @@ LAYERS = [
     ["__main__"],
     ["cli"],
     ["scene_file", "summary"],
-    ["simulation"],
-    ["sessions"],
-    ["output", "progress", "run"],
+    ["run"],
+    ["output"],
     ["tables", "filling"],
-    ["observables", "blocks", "history", "workload"],
-    ["inner_solve"],
+    ["observables", "history"],
     ["lanes"],
     ["methods"],
     ["scene", "particles"],
     ["contact"],
     ["surfaces"],
-    ["frames", "gravity"],
+    ["frames", "kernel"],
     ["checks"],
-    ["_jit"],
     ["status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import _jit, lanes, observables
-from swarm._jit import kernel, next_of
-from swarm.run import Run
+from swarm import observables
+from swarm.kernel import jit as _jit
+from swarm.kernel.jit import kernel, next_of
+from swarm.lanes import arrays as lanes
+from swarm.run.engine import Run
 from swarm.status import Status
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

@@ -8,7 +8,7 @@ import pytest
 from conftest import SURFACES, scene_of
 
 from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill, scene
-from swarm.gravity import Gravity
+from swarm.kernel.gravity import Gravity
 from swarm.surfaces import base
 
 

@@ -15,10 +15,11 @@ from conftest import METHODS, rarely
 
 import swarm
 from examples import long_run
-from swarm import blocks, progress
+from swarm.lanes import block as blocks
 from swarm.output import checkpoint, paths
-from swarm.progress import lines
-from swarm.run import Run
+from swarm.run import progress
+from swarm.run.engine import Run
+from swarm.run.progress import lines
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
@@ -389,7 +390,7 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
     clock = [100.0]
     monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
-    from swarm.simulation import Frame
+    from swarm.run.simulation import Frame
 
     show = lines(60.0)
     for number in range(8):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import blocks
-from swarm.run import Run
+from swarm.lanes import block as blocks
+from swarm.run.engine import Run
 from swarm.surfaces import rotation
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

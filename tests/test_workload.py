@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import blocks, workload
+from swarm.lanes import block as blocks
+from swarm.run import workload
 
 THIN = 1e-12
 BOX = swarm.Box((0.5, 0.5, 0.5))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import swarm
-from swarm.run import Run
+from swarm.run.engine import Run
 
 from .. import figure, reference
 from . import picture

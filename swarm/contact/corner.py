@@ -5,8 +5,8 @@ Each wall is solved with the reactions of the others held, until the end of the 
 
 import math
 
-from .._jit import by_type, by_type_outlined, outlined
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, by_type_outlined, outlined
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import impulse

@@ -13,7 +13,7 @@ Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
 import math
 from typing import Any, NamedTuple
 
-from .._jit import by_type, by_type_outlined, inlined, outlined
+from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
 from ..surfaces import base as surfaces
 from . import impulse
 from . import regularisation as law_of

@@ -1,7 +1,7 @@
 """The energy that the walls store, summed over all surfaces of a scene, and how well it is known."""
 
-from .._jit import by_type, inlined, select
-from ..gravity import Nothing, potential, weight
+from ..kernel.gravity import Nothing, potential, weight
+from ..kernel.jit import by_type, inlined, select
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import regularisation as law_of

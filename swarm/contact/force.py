@@ -2,8 +2,8 @@
 
 import math
 
-from .._jit import by_type, by_type_outlined, inlined, select
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, by_type_outlined, inlined, select
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import regularisation as law_of

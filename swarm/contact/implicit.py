@@ -9,8 +9,8 @@ c = h^2/(4m) for the midpoint and the trapezoidal rule.
 import math
 from typing import NamedTuple
 
-from .._jit import by_type, inlined, select
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, inlined, select
 from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
 from . import regularisation as law_of

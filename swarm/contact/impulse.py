@@ -10,8 +10,8 @@ A multiplier is a float, or None where the method has none.
 
 import math
 
-from .._jit import by_type, inlined, outlined, select
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, inlined, outlined, select
 from ..surfaces import base as surfaces
 from ..surfaces.chain import Chain
 from . import regularisation as law_of

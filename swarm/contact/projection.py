@@ -2,7 +2,7 @@
 
 import math
 
-from .._jit import inlined, outlined, select
+from ..kernel.jit import inlined, outlined, select
 
 # Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
 ALLOWED = 64.0 * 2.220446049250313e-16

@@ -7,8 +7,8 @@ Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0.
 
 import math
 
-from .._jit import by_type, by_type_outlined, inlined, outlined, select
-from ..gravity import Gravity, Nothing, accelerated, potential
+from ..kernel.gravity import Gravity, Nothing, accelerated, potential
+from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from ..surfaces import flights

@@ -11,7 +11,7 @@ and close, the quotients would cancel, so each law has forms that do not.
 import math
 from typing import Any, NamedTuple
 
-from .._jit import by_type, inlined, select
+from ..kernel.jit import by_type, inlined, select
 
 
 class Linear(NamedTuple):

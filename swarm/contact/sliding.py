@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, outlined, scratch
-from ..gravity import accelerated
+from ..kernel.gravity import accelerated
+from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from ..surfaces import flights

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from .._jit import by_type, inlined, outlined, scratch, select
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, inlined, outlined, scratch, select
 from ..surfaces import base as surfaces
 from ..surfaces import chain as walls
 from . import corner, impulse

@@ -7,13 +7,13 @@ has a part in it, and the exact impacts that replace it.
 import math
 from typing import NamedTuple
 
-from .._jit import by_type, by_type_outlined, outlined, select
 from ..contact import regularisation as law_of
 from ..contact import uzawa
 from ..contact.discrete_gradient import nested
 from ..contact.reflection import chord, exact
 from ..contact.sliding import impact
-from ..gravity import displacement
+from ..kernel.gravity import displacement
+from ..kernel.jit import by_type, by_type_outlined, outlined, select
 from ..status import Status
 from ..surfaces import chain as walls
 from ..surfaces import flights

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from .._jit import kept, scratch, select
 from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -16,7 +15,8 @@ from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.reflection import CHORD_NEEDS
 from ..contact.sliding import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import kept, scratch, select
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status

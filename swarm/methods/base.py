@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from .._jit import by_type, by_type_outlined
 from ..errors import SceneError
+from ..kernel.jit import by_type, by_type_outlined
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import base as surfaces

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from .._jit import by_type, inlined, kept, select
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import by_type, inlined, kept, select
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
-from .._jit import by_type, kept, select
 from ..contact.reflection import CHORD_NEEDS, chord_end, chord_step, chord_turn, exact
 from ..contact.sliding import NEEDS as SLIDING_NEEDS
 from ..contact.sliding import impact
 from ..errors import SceneError
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import by_type, kept, select
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import by_type, by_type_outlined, scratch, select
 from ..contact import corner, implicit
-from ..gravity import displacement
+from ..kernel.gravity import displacement
+from ..kernel.jit import by_type, by_type_outlined, scratch, select
 from ..status import Status
 from ..surfaces import chain as walls
 from . import base, fixed_step

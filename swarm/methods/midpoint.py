@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..contact import corner, implicit
-from ..gravity import accelerated
+from ..kernel.gravity import accelerated
 from ..scene import Scene
 from . import fixed_step, implicit_rule
 

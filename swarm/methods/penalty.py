@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._jit import scratch, select
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, nested, reaction_needs
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import scratch, select
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ..contact import corner, implicit
 from ..contact.force import add_impulses, force
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
 from ..scene import Scene
 from . import fixed_step, implicit_rule
 

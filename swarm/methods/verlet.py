@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .._jit import inlined, select
 from ..contact.force import NEEDS as FORCE_NEEDS
 from ..contact.force import add_impulses, force
-from ..gravity import accelerated, displacement
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import inlined, select
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import chain as walls

@@ -1,22 +1,22 @@
 """The surfaces by their kind in a scene file."""
 
 # These only register their definitions.
-from . import rotated as _rotated  # noqa: F401
 from . import smooth as _smooth  # noqa: F401
 from .base import Surface
-from .box import Box
-from .capsule import Capsule
-from .cone import Cone
-from .cylinder import Cylinder
-from .ellipsoid import Ellipsoid
-from .formula import Formula
-from .own import OwnSurface
-from .paraboloid import Paraboloid
-from .plane import Plane
-from .quadric import Quadric
-from .slab import Slab
-from .sphere import Sphere
-from .torus import Torus
+from .formulas.formula import Formula
+from .formulas.own import OwnSurface
+from .shapes import rotated as _rotated  # noqa: F401
+from .shapes.box import Box
+from .shapes.capsule import Capsule
+from .shapes.cone import Cone
+from .shapes.cylinder import Cylinder
+from .shapes.ellipsoid import Ellipsoid
+from .shapes.paraboloid import Paraboloid
+from .shapes.plane import Plane
+from .shapes.quadric import Quadric
+from .shapes.slab import Slab
+from .shapes.sphere import Sphere
+from .shapes.torus import Torus
 
 __all__ = [
     "ALL_SURFACES",

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._jit import by_type
 from ..checks import Vector, array, number, one_of, vector
 from ..errors import SceneError
+from ..kernel.jit import by_type
 from . import rotation as rotations
 from .course import first_rise, safe_rise_time
 

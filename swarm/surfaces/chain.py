@@ -6,8 +6,8 @@ The fold ends at None, and its neutral element (no hit, no gap) is a constant th
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from .._jit import by_type, select
-from ..gravity import Nothing
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, select
 from . import base
 
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from .._jit import inlined, select
+from ..kernel.jit import inlined, select
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
 SAFE_STEPS = 5

@@ -2,8 +2,8 @@
 
 import math
 
-from .._jit import by_type, select
-from ..gravity import Gravity, Nothing
+from ..kernel.gravity import Gravity, Nothing
+from ..kernel.jit import by_type, select
 from . import base
 from .chain import Chain, outside
 from .course import arrived, close, leave, safe_step

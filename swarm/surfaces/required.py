@@ -11,7 +11,7 @@ from ..errors import SceneError
 from . import base, smooth
 from .chain import Chain
 from .rotation import Rotated
-from .solid import SolidNumbers
+from .shapes.solid import SolidNumbers
 
 _MARCH = (smooth.bend, smooth.slope, base.inner, base.level_of)
 # What the definitions in base.py and smooth.py are made of.

@@ -7,7 +7,7 @@ Newton's method. These loops are not vectorised.
 
 import math
 
-from .._jit import by_type, inlined, outlined, select
+from ..kernel.jit import by_type, inlined, outlined, select
 from . import base
 from .course import rise_time
 

@@ -24,17 +24,17 @@ import pytest
 from roots import EARLY, EXACT, MISSED, TOUCHED, Course, Exact, Terms, exact_course, judge, judge_all
 
 import swarm
-from swarm._jit import kernel
-from swarm.gravity import Gravity
+from swarm.kernel.gravity import Gravity
+from swarm.kernel.jit import kernel
 from swarm.surfaces import base
-from swarm.surfaces.capsule import CapsuleNumbers
 from swarm.surfaces.chain import chain_of
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.owned import OwnNumbers
-from swarm.surfaces.rotated import _own
+from swarm.surfaces.formulas.owned import OwnNumbers
 from swarm.surfaces.rotation import Rotated
-from swarm.surfaces.solid import SolidNumbers
-from swarm.surfaces.torus import TorusNumbers
+from swarm.surfaces.shapes.capsule import CapsuleNumbers
+from swarm.surfaces.shapes.rotated import _own
+from swarm.surfaces.shapes.solid import SolidNumbers
+from swarm.surfaces.shapes.torus import TorusNumbers
 
 pytestmark = pytest.mark.long
 

@@ -7,11 +7,12 @@ import numpy as np
 from conftest import call
 
 import swarm
-from swarm import blocks, observables
+from swarm import observables
 from swarm.contact import energy as energies
 from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
-from swarm.gravity import potential
+from swarm.kernel.gravity import potential
+from swarm.lanes import block as blocks
 from swarm.methods import base
 from swarm.status import Status
 from swarm.surfaces import flights

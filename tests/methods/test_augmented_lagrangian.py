@@ -11,7 +11,7 @@ import pytest
 from passes import simulate
 
 import swarm
-from swarm import blocks
+from swarm.lanes import block as blocks
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 SCENES = {

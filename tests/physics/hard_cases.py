@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from physics.billiards import AXES, FACES, launched, scene_of, ulps_outside, wall_frames, worst_energy
 
 import swarm
-from swarm.run import Run
+from swarm.run.engine import Run
 
 ANGLES = [0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3]
 # Passes of a frame: the dearest, in the slit, takes 12 300.

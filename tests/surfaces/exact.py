@@ -10,10 +10,10 @@ from conftest import EPSILON, body_of, call
 from numpy.polynomial import Polynomial
 
 from swarm.surfaces import base
-from swarm.surfaces.capsule import CapsuleNumbers
-from swarm.surfaces.rotated import _own
 from swarm.surfaces.rotation import Rotated
-from swarm.surfaces.torus import TorusNumbers
+from swarm.surfaces.shapes.capsule import CapsuleNumbers
+from swarm.surfaces.shapes.rotated import _own
+from swarm.surfaces.shapes.torus import TorusNumbers
 
 mp.mp.dps = 50
 _REST = (0.0, 0.0, 0.0)

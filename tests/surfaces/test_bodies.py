@@ -13,8 +13,8 @@ import swarm
 from swarm.surfaces import rotation
 from swarm.surfaces.chain import chain_of
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.plane import PlaneNumbers
-from swarm.surfaces.slab import SlabNumbers
+from swarm.surfaces.shapes.plane import PlaneNumbers
+from swarm.surfaces.shapes.slab import SlabNumbers
 
 TURN = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
 CENTER = (0.3, -0.2, 0.1)

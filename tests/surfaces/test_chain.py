@@ -8,7 +8,7 @@ from conftest import SURFACES, call, directions, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.gravity import Gravity
+from swarm.kernel.gravity import Gravity
 from swarm.surfaces import base, chain, flights
 
 every_chain = pytest.mark.parametrize(

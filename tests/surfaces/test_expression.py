@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 import swarm
-from swarm.surfaces.expression import FUNCTIONS, parse
+from swarm.surfaces.formulas.expression import FUNCTIONS, parse
 
 x, y, z = sympy.symbols("x y z")
 

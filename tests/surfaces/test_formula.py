@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm import tables
-from swarm.surfaces import base, own, smooth
-from swarm.surfaces.interval import Interval, bounds_of
+from swarm.surfaces import base, smooth
+from swarm.surfaces.formulas import own
+from swarm.surfaces.formulas.interval import Interval, bounds_of
 
 ELLIPSOID = "x**2/0.09 + y**2/0.16 + z**2/0.25 - 1"
 PILL = "x**2/0.09 + y**2/0.09 + z**4/0.13 - 1"
@@ -46,7 +47,7 @@ def test_derivatives(text):
 def test_small_powers_are_products(monkeypatch):
     written = []
     monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_none()))
-    from swarm.surfaces import derivatives
+    from swarm.surfaces.formulas import derivatives
 
     derivatives.derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
     assert written

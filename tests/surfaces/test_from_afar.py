@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.gravity import Gravity, accelerated, displacement
+from swarm.kernel.gravity import Gravity, accelerated, displacement
 from swarm.surfaces import rotation as rotations
 from swarm.surfaces.flights import first_hit
 

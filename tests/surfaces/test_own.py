@@ -15,8 +15,11 @@ import pytest
 from conftest import call
 
 import swarm
-from swarm import _jit, blocks, tables
-from swarm.surfaces import base, frozen, own, smooth
+from swarm import tables
+from swarm.kernel import jit as _jit
+from swarm.lanes import block as blocks
+from swarm.surfaces import base, smooth
+from swarm.surfaces.formulas import frozen, own
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
 
@@ -366,7 +369,7 @@ def test_the_class_of_another_process_is_found_by_its_name():
     name = "Own_0123456789abcdef"
     kind = getattr(own, name)
     assert kind is getattr(own, name)
-    assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.own", name)
+    assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.formulas.own", name)
     assert issubclass(kind, own.OwnNumbers)
     for wrong in ("Own_0123", "Own_0123456789abcdeg", "Own", "Own_0123456789abcdef0"):
         with pytest.raises(AttributeError):

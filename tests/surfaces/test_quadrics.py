@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 
 import swarm
 from swarm.surfaces import base, rotation
-from swarm.surfaces.quadratic import QuadricNumbers
+from swarm.surfaces.shapes.quadratic import QuadricNumbers
 
 mp.mp.dps = 50
 

@@ -9,10 +9,11 @@ import pytest
 from conftest import METHODS, SURFACES, call
 
 import swarm
-from swarm import blocks, observables
+from swarm import observables
+from swarm.lanes import block as blocks
 from swarm.methods import base as methods
 from swarm.surfaces import base, rotation, smooth
-from swarm.surfaces.solid import body
+from swarm.surfaces.shapes.solid import body
 
 SHIPPED = {
     **SURFACES,
@@ -221,7 +222,7 @@ def sum_of_hits(surface, position, velocity, pull):
 
 def test_what_is_given_is_not_replaced():
     shipped = base.first_hit.dispatch(type(swarm.Capsule(0.5, 1.0).numbers()))
-    assert shipped.__module__ == "swarm.surfaces.capsule"
+    assert shipped.__module__ == "swarm.surfaces.shapes.capsule"
     numbers = type(ball_like(*LEVEL, base.first_hit, smooth.bend)().numbers())
     assert base.first_hit.dispatch(numbers).__module__ == __name__
     assert base.falling_hit.dispatch(numbers) is smooth._march

@@ -11,7 +11,7 @@ from exact import level_along, noise, real_roots
 
 import swarm
 from swarm.surfaces import base
-from swarm.surfaces.solid import body
+from swarm.surfaces.shapes.solid import body
 
 AXES = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
 CORNERS = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]

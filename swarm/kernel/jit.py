@@ -1,0 +1,343 @@
+"""The one place for compiler flags, the kernel cache, and dispatch on the type of a parameter tuple.
+
+Kernels are plain functions of numbers. `kernel` compiles a loop over them, `by_type` makes a family of
+functions that is chosen by the type of its first argument: at compile time inside kernels, at run time in
+plain Python, from the same definitions.
+"""
+
+import contextlib
+import functools
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import logging
+import os
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import UnionType
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba import types
+from numba.core import cgutils, event
+from numba.core.imputils import impl_ret_borrowed
+from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
+from numba.np import linalg as blas
+from numba.np.arrayobj import populate_array
+from numpy.typing import NDArray
+
+Array = NDArray[np.generic]
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Strict IEEE arithmetic: `fastmath` would let the compiler reorder sums, and with them the energy balance.
+# The NumPy error model makes 1/0 an infinity; Python's would put a branch before every division, and a
+# branch in the lane loop costs its vectorisation.
+# Without reference counts: each array that a NamedTuple hands on counts as taken and given back, by an atomic
+# instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
+# through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
+_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+# Kernels call each other, Python never calls their compiled form: no wrappers saves a fifth of the compile time.
+_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_FLAGS}
+_INLINE: Any = {"forceinline": True, **_OUTLINE}
+
+
+def _find_scipy_only() -> None:
+    """Let Numba look whether SciPy is there, as it does before the first kernel, without importing its linear algebra.
+
+    The import is 0.2 s of every start where SciPy is installed, for products of matrices that no kernel here has. One
+    that has them imports it as it always did.
+    """
+    ask: Any = blas.ensure_blas
+
+    def find() -> None:
+        if importlib.util.find_spec("scipy") is None:
+            raise ImportError
+
+    blas.ensure_blas = find
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        blas.ensure_blas = ask
+
+
+_find_scipy_only()
+
+
+def _source_hash() -> str:
+    """Digest of every source file of the package: it names the cache folder.
+
+    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would
+    answer with the old code.
+    """
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels, $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then the source hash."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm"
+    return Path(base) / _source_hash()
+
+
+_CACHE = cache_folder()
+_CONFIG: Any = numba.config
+
+
+_LOG = logging.getLogger("swarm")
+_kernels: list[Any] = []
+_COMPILING = "compiling a kernel for this kind of scene ({}), once: the next run finds it"
+
+
+@contextlib.contextmanager
+def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
+    """Tell the logger and `tell`, by a sentence, of every kernel that is compiled in this context."""
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, compiled: Any) -> None:
+            if compiled.data["dispatcher"] in _kernels:
+                sentence = _COMPILING.format(compiled.data["dispatcher"].__name__)
+                _LOG.info(sentence)
+                tell(sentence)
+
+        def on_end(self, compiled: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
+
+
+def kernel(function: F) -> F:
+    """Compile a module-level function, without the GIL, cached on disk."""
+    previous = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(_CACHE)
+    try:
+        compiled: F = numba.njit(cache=True, **_FLAGS)(function)
+        _kernels.append(compiled)
+        return compiled
+    finally:
+        _CONFIG.CACHE_DIR = previous
+
+
+def outlined(function: F) -> F:
+    """Compile a helper that is rare and long: inlining it would only cost compile time."""
+    register_jitable(**_OUTLINE)(function)
+    return function
+
+
+def inlined(function: F) -> F:
+    """Compile a helper that is always inlined into the kernel that calls it, so that its loop vectorises."""
+    register_jitable(**_INLINE)(function)
+    return function
+
+
+def _python_class(kind: Any) -> Any:
+    """The Python class whose values the Numba type `kind` describes."""
+    if isinstance(kind, types.BaseNamedTuple):
+        return kind.instance_class  # type: ignore[attr-defined]
+    if isinstance(kind, types.NoneType):
+        return type(None)
+    return float if isinstance(kind, types.Float) else object
+
+
+def by_type(function: Callable[..., Any]) -> Any:
+    """A function dispatched on the type of its first argument, in Python and inside kernels alike; always inlined.
+
+    Register a definition with `@name.register(Class)`, where Class is a NamedTuple of numbers, or
+    `type(None)` for "the scene has none". Registered functions carry no annotations and the same argument
+    names, because Numba compares signatures. `@name.implies(other)` registers a definition of `other` for every class
+    that `name` is registered for, unless that has one.
+
+    Raises:
+        SceneError: a definition is registered whose arguments have other names.
+    """
+    return _dispatched(function, _INLINE)
+
+
+def by_type_outlined(function: Callable[..., Any]) -> Any:
+    """`by_type` for what is rare and long: inlining it would only cost compile time."""
+    return _dispatched(function, _OUTLINE)
+
+
+def _dispatched(function: Callable[..., Any], options: Any) -> Any:
+    generic: Any = functools.singledispatch(function)
+    known, names, implied = generic.register, _arguments(function), list[tuple[Any, Callable[..., Any]]]()
+
+    def register(kind: Any, definition: Any = None) -> Any:
+        if definition is None and isinstance(kind, (type, UnionType)):
+            return functools.partial(register, kind)
+        made = kind if definition is None else definition
+        if _arguments(made) != names:
+            from ..errors import SceneError  # only here: the cache folder is asked of this file alone
+
+            raise SceneError(
+                f"a definition of {function.__module__}.{function.__name__} must be a function of "
+                f"({', '.join(names)}), got {getattr(made, '__name__', made)}({', '.join(_arguments(made))}) for "
+                f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
+            )
+        known(kind, definition)
+        for other, derived in implied:
+            if kind is not object and other.dispatch(kind) is other.dispatch(object):
+                other.register(kind, derived)
+        return made
+
+    def implies(other: Any) -> Any:
+        def add(definition: Any) -> Any:
+            implied.append((other, definition))
+            return definition
+
+        return add
+
+    generic.register, generic.implies = register, implies
+
+    @functools.wraps(function)
+    def chosen(*args: Any) -> Any:
+        return generic.dispatch(_python_class(args[0]))
+
+    overload(generic, jit_options=options)(chosen)
+    return generic
+
+
+def _arguments(function: Any) -> list[str]:
+    return list(inspect.signature(function).parameters)
+
+
+def select(condition: Any, first: Any, second: Any) -> Any:
+    """`first if condition else second` without a branch; both are evaluated.
+
+    Python's conditional expression compiles to a branch. LLVM usually turns it back into a select, but with three
+    surfaces its jump threading splits the paths first, and the lane loop is no longer vectorised (measured:
+    58 ns an impact instead of 17).
+    """
+    return first if condition else second
+
+
+@type_callable(select)
+def _type_of_select(_context):
+    return lambda condition, first, second: types.unliteral(first)
+
+
+@lower_builtin(select, types.Boolean, types.Any, types.Any)
+def _emit_select(context, builder, signature, args):
+    kinds, kind = signature.args[1:], signature.return_type
+    return builder.select(args[0], *(context.cast(builder, *pair, kind) for pair in zip(args[1:], kinds, strict=True)))
+
+
+def spaced(stride: int) -> Callable[[Any], Any]:
+    """A function that tells the compiler how far apart rows of the 2-D arrays in a NamedTuple are: `stride` numbers.
+
+    It gives the tuple back. With distances that are known when the kernel is run only, a lane loop spends a third of
+    its instructions on addresses, and before it checks every row against every other for an overlap.
+    """
+
+    def known(tables: Any) -> Any:
+        return tables
+
+    @type_callable(known)
+    def _type_of_tables(_context):
+        return lambda tables: tables
+
+    @lower_builtin(known, types.BaseNamedTuple)
+    def _emit_tables(context, builder, signature, args):
+        (tables,) = args
+        columns, item = (context.get_constant(types.intp, k) for k in (stride, np.dtype(float).itemsize))
+        for k, kind in enumerate(signature.args[0]):
+            if isinstance(kind, types.Array) and kind.ndim == 2:
+                table = context.make_array(kind)(context, builder, builder.extract_value(tables, k))
+                table.shape = cgutils.pack_array(builder, [builder.extract_value(table.shape, 0), columns])
+                table.strides = cgutils.pack_array(builder, [builder.mul(columns, item), item])
+                tables = builder.insert_value(tables, table._getvalue(), k)
+        return impl_ret_borrowed(context, builder, signature.return_type, tables)
+
+    return known
+
+
+def scratch(shape: Any, dtype: Any) -> Any:
+    """An array of zeros for the function of a kernel that asks for it: it is gone when that returns.
+
+    On the stack: kernels count no references, so they cannot make arrays that would have to be freed.
+    """
+    return np.zeros(shape, dtype)
+
+
+@type_callable(scratch)
+def _type_of_scratch(_context):
+    return lambda shape, dtype: types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
+
+
+@lower_builtin(scratch, types.Any, types.Any)
+def _emit_scratch(context, builder, signature, args):
+    kind, asked = signature.return_type, signature.args[0]
+    shape = cgutils.unpack_tuple(builder, args[0]) if isinstance(asked, types.BaseTuple) else [args[0]]
+    size = functools.reduce(builder.mul, shape)
+    number = context.get_data_type(kind.dtype)
+    item = context.get_constant(types.intp, context.get_abi_sizeof(number))
+    data = builder.alloca(number, size)
+    cgutils.memset(builder, data, builder.mul(size, item), 0)
+    strides = [item]
+    for columns in reversed(shape[1:]):
+        strides.insert(0, builder.mul(columns, strides[0]))
+    table = context.make_array(kind)(context, builder)
+    populate_array(table, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return table._getvalue()
+
+
+_TAKING = threading.Lock()
+
+
+def next_of(ticket: Any) -> int:
+    """ticket[0], which becomes one more: of several threads no two get the same."""
+    with _TAKING:
+        ticket[0] += 1
+        return int(ticket[0]) - 1
+
+
+@intrinsic  # type: ignore[call-arg]
+def _next_of(_typing, ticket):
+    def emit(context, builder, signature, args):
+        (kind,) = signature.args
+        counter = context.make_array(kind)(context, builder, args[0]).data
+        return builder.atomic_rmw("add", counter, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(ticket), emit
+
+
+@overload(next_of, jit_options=_INLINE)
+def _compiled_next_of(ticket):
+    return lambda ticket: _next_of(ticket)  # type: ignore[call-arg]
+
+
+def index(value: Any) -> Any:
+    """A number from an array as an index, which is not negative.
+
+    Of a signed one a kernel asks at each use whether it counts from the end: half of the instructions of a lane that is
+    given back, a third of one that is loaded. A function that is given both kinds is compiled twice.
+    """
+    return value
+
+
+@type_callable(index)
+def _type_of_index(_context):
+    return lambda value: types.uintp
+
+
+@lower_builtin(index, types.Any)
+def _emit_index(context, builder, signature, args):
+    return context.cast(builder, *args, *signature.args, signature.return_type)
+
+
+@inlined
+def kept(value: Any) -> Any:
+    """A value from an array that a select may write back unchanged to its place.
+
+    Of such a select LLVM makes a masked store, which costs AMD processors some ten times an ordinary one (measured: 18
+    instead of 12 ns an impact with a contact step). An addition of 0 hides the origin of the value.
+    """
+    return value + 0.0

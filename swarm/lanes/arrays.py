@@ -1,0 +1,233 @@
+"""The particles that are being advanced, one a lane: arrays that fit in the cache, the ways in and out."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
+from ..kernel.jit import Array, by_type_outlined, index, inlined, next_of, outlined, spaced
+from ..methods import base as methods
+from ..particles import Multipliers
+from ..surfaces import chain as walls
+from ..surfaces import flights
+
+# Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
+LANES = 256
+# The row stride is not a power of two, so that the rows of a lane do not share a cache set.
+_STRIDE = 264
+# Bytes of a line of the cache, and of a number of eight flags.
+_LINE, EIGHT = 64, 8
+X, Y, Z, VX, VY, VZ, LEFT, K0, K1, K2, HITS, ROWS = range(12)
+
+with_distances = spaced(_STRIDE)
+
+
+class Lanes(NamedTuple):
+    """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
+
+    rows: Array  # (ROWS, stride) position, velocity, time left, the method's constants, impacts
+    impulse: Array  # (walls, stride) normal impulse per mass
+    surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
+    kappa: Array  # the contact's unknown
+    unsolved: Array  # bool, whether its solve goes on
+    sweeping: Array  # bool, whether the loop of its multiplier goes on
+    record: Array  # (RECORDS, stride) the loop of its multiplier
+    course: Array  # (walls COURSE, stride) the safe steps of a fall
+    turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
+    particle: Array  # int64, the particle in the lane
+    marked: Array  # bool, what one loop says to the next: of a fall that it needs more steps, then that it has arrived
+    eights: Array  # int64, `marked` of eight lanes in one number: the same memory
+    some: Array  # int64, those `eights` of which one is marked
+    order: Array  # int64, the lanes that are marked
+    left_behind: Array  # (ROWS + walls, stride) what the lanes hold when a halt ends the block
+
+
+class Halted(NamedTuple):
+    """Particles that a halt caught on their way: what their lanes held between two passes, one a column.
+
+    Their way cannot be cut in two: a flight that ends at the halt and one that goes on from there are rounded twice.
+    """
+
+    particle: Array  # int64, in order
+    rows: Array  # (ROWS + walls, particles) the lane's rows, then its impulses
+
+
+class Draws(NamedTuple):
+    """Where the particles of a block come from: draw k is of those from k size to (k + 1) size, for one thread alone.
+
+    A thread draws when a lane is free, so its lanes are full until there are no more: shares of fixed size, each with
+    its own end, cost 14 % with 512 particles a share and 3 % with 4096, and leave a thread idle while the other has
+    the last one.
+    """
+
+    ticket: Array  # (1,) the next draw, of all threads
+    size: int
+    mine: Array  # the draws of this thread, in order
+
+
+def empty(walls: int) -> Lanes:
+    """Lanes for one block."""
+    eights = np.zeros(_STRIDE // EIGHT, np.int64)
+    return Lanes(
+        rows=_table(ROWS),
+        impulse=_table(walls),
+        surface=_table(1)[0],
+        kappa=_table(1)[0],
+        unsolved=np.zeros(_STRIDE, np.bool_),
+        sweeping=np.zeros(_STRIDE, np.bool_),
+        record=_table(RECORDS),
+        course=_table(walls * flights.COURSE),
+        turned=_table(4),
+        particle=np.zeros(_STRIDE, np.int64),
+        marked=eights.view(np.bool_),
+        eights=eights,
+        some=np.zeros_like(eights),
+        order=np.zeros(_STRIDE, np.int64),
+        left_behind=_table(ROWS + walls),
+    )
+
+
+def _table(rows: int) -> NDArray[np.float64]:
+    """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
+    size = 8 * rows * _STRIDE
+    memory = np.zeros(size + _LINE, np.uint8)
+    first = -memory.ctypes.data % _LINE
+    return memory[first : first + size].view(np.float64).reshape(rows, _STRIDE)
+
+
+def nobody(walls: int) -> Halted:
+    """No particle was halted."""
+    return Halted(np.empty(0, np.int64), np.empty((ROWS + walls, 0)))
+
+
+@inlined
+def following_particle(draws, done, i, stop, drawn):
+    """(particle, stop, draws so far): the first from i on that is not done, of another draw if need be; or stop."""
+    while True:
+        while i < stop and done[i]:
+            i += 1
+        if i < stop:
+            return i, stop, drawn
+        k = next_of(draws.ticket)
+        i = min(k * draws.size, done.size)
+        stop = min(i + draws.size, done.size)
+        if i == stop:
+            return i, stop, drawn
+        draws.mine[drawn] = k
+        drawn += 1
+
+
+@inlined
+def load(method, chain, lanes, lane, state, halted, i, span):
+    """Particle i into a lane, as it starts the frame, or as a halt left it."""
+    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
+    particle[lane] = i
+    if halted.particle.size > 0 and _pick_up(lanes, lane, halted, i):
+        return
+    i = index(i)
+    position, velocity = state.position, state.velocity
+    for axis in range(3):
+        rows[X + axis, lane] = position[axis, i]
+        rows[VX + axis, lane] = velocity[axis, i]
+    constants = methods.lane_constants(
+        method, state.mass[i], state.energy[i], velocity[0, i], velocity[1, i], velocity[2, i]
+    )
+    rows[K0, lane], rows[K1, lane], rows[K2, lane] = constants
+    rows[LEFT, lane], rows[HITS, lane] = span, 0.0
+    for s in range(walls.length(chain)):
+        impulse[s, lane] = 0.0
+
+
+@outlined
+def _pick_up(lanes, lane, halted, i):
+    """What a halt left of particle i into a lane; whether there is any."""
+    first, last = 0, halted.particle.size
+    while first < last:
+        middle = (first + last) // 2
+        if halted.particle[middle] < i:
+            first = middle + 1
+        else:
+            last = middle
+    if first == halted.particle.size or halted.particle[first] != i:
+        return False
+    for row in range(ROWS):
+        lanes.rows[row, lane] = halted.rows[row, first]
+    for s in range(lanes.impulse.shape[0]):
+        lanes.impulse[s, lane] = halted.rows[ROWS + s, first]
+    return True
+
+
+@outlined
+def leave(lanes, live):
+    """The live lanes, between two passes: what one pass leaves for the next."""
+    left_behind = lanes.left_behind
+    for lane in range(live):
+        for row in range(ROWS):
+            left_behind[row, lane] = lanes.rows[row, lane]
+        for s in range(lanes.impulse.shape[0]):
+            left_behind[ROWS + s, lane] = lanes.impulse[s, lane]
+
+
+@inlined
+def retire(method, chain, lanes, lane, state):
+    """A lane back into its particle."""
+    rows, impulse = lanes.rows, lanes.impulse
+    position, velocity, impacts, total = state.position, state.velocity, state.impacts, state.impulse
+    i = index(lanes.particle[lane])
+    for axis in range(3):
+        position[axis, i] = rows[X + axis, lane]
+        velocity[axis, i] = rows[VX + axis, lane]
+    impacts[i] += np.int64(rows[HITS, lane])
+    for s in range(walls.length(chain)):
+        total[s, i] += impulse[s, lane] * state.mass[i]
+    if methods.dissipates(method):
+        # Each particle knows its energy: what it has lost is accounted for with it.
+        now = 0.5 * rows[K0, lane]
+        state.dissipated[i] += state.mass[i] * (state.energy[i] - now)
+        state.energy[i] = now
+
+
+@inlined
+def move(chain, lanes, source, target):
+    """The last live lane into the free slot. What flight and contact leave for each other need not move."""
+    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
+    for row in range(ROWS):
+        rows[row, target] = rows[row, source]
+    for s in range(walls.length(chain)):
+        impulse[s, target] = impulse[s, source]
+    particle[target] = particle[source]
+
+
+# --- What the loop of the multiplier took ----------------------------------------------------------------
+
+
+@by_type_outlined
+def count_sweeps(multipliers, lanes, live):
+    """Add the records of the lanes that had a contact to their particles; nothing where there are no multipliers."""
+
+
+@count_sweeps.register(Multipliers)
+def _(multipliers, lanes, live):
+    record = lanes.record
+    for i in range(live):
+        if record[SWEEPS, i] > 0.0:
+            particle = lanes.particle[i]
+            multipliers.sweeps[particle] += np.int64(record[SWEEPS, i])
+            multipliers.contacts[particle] += 1
+            multipliers.unconverged[particle] += np.int64(record[UNCONVERGED, i])
+            multipliers.stored_energy[particle] = max(multipliers.stored_energy[particle], record[STORED, i])
+            record[SWEEPS, i] = 0.0
+
+
+@by_type_outlined
+def keep_failure(multipliers, lanes, lane):
+    """Keep the record of the lane that failed, for the error."""
+
+
+@keep_failure.register(Multipliers)
+def _(multipliers, lanes, lane):
+    particle = lanes.particle[lane]
+    multipliers.sweeps[particle] = np.int64(lanes.record[SWEEPS, lane])
+    multipliers.stored_energy[particle] = lanes.record[STORED, lane]
+    multipliers.left[particle] = lanes.rows[LEFT, lane]

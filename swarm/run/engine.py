@@ -1,0 +1,232 @@
+"""A run under way: its state, and the threads that advance and observe it. The border to the kernels."""
+
+import functools
+import math
+import time
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import observables
+from ..errors import RunError
+from ..lanes import arrays as lanes
+from ..lanes import block as blocks
+from ..methods.base import Method
+from ..particles import Multipliers, Particles, State
+from ..scene import Scene
+from ..status import Status
+
+# A particle this many times the scene's extent away from the origin has escaped from an open scene.
+_FAR = 100.0
+# A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
+_OUTSIDE = 1e-9
+# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it is free
+# to take an interrupt.
+_SHORT_FRAME = 0.05
+# Frames of less work than this [s] are for the caller's thread alone: to wake another takes some 0.1 ms.
+_LITTLE_WORK = 2e-4
+# A frame that takes longer to write than this part of the work in it.
+_MUCH_WRITING = 1.0 / 3.0
+
+
+class Run:
+    """The state of a run and the threads that advance it."""
+
+    def __init__(
+        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None
+    ) -> None:
+        n = len(particles)
+        self.state = State(
+            particles.position.copy(),
+            particles.velocity.copy(),
+            particles.mass.copy(),
+            np.empty(n),
+            np.empty(n),
+            np.zeros(n, np.int64),
+            np.zeros((len(scene.owners()), n)),
+            np.zeros(0 if scene.restitution() is None else n),
+            _no_sweeps(n) if method.has_multipliers() else None,
+        )
+        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
+        self._faces = scene.open_faces()
+        self._too_fast = functools.partial(method.too_fast, scene)
+        self._failure, self._owners, self._scene = method.failure, scene.owners(), scene
+        self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
+        self._method, self._law = method.numbers(scene), method.law()
+        self._chain, self._gravity = scene.chain(), scene.pull()
+        observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
+        # Whole chunks, so that a thread observes what it has advanced.
+        self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
+        self._draws = math.ceil(n / self._size)
+        self._ticket = np.zeros(1, np.int64)
+        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
+        self._halt = np.full(1, blocks.NEVER)
+        self._done = np.zeros(n, np.bool_)
+        self._halted = lanes.nobody(len(self._owners))
+        self._cut_short = False
+        self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
+        self._threads = min(threads, self._draws)
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
+        self._pace = math.inf  # work of the last frame [s], over its span
+
+    def __enter__(self) -> "Run":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.halt()
+        self._pool.shutdown(wait=True)
+
+    def halt(self, passes: int = 0) -> None:
+        """Let each call of a kernel return after so many passes, before its frame is done; 0: at once.
+
+        It holds until `advance` returns. It never takes back a halt that comes sooner, not even one that a signal or
+        another thread asks for meanwhile: NumPy compares and writes under one hold of the interpreter's lock.
+        """
+        np.minimum(self._halt, passes, out=self._halt)
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
+
+        If not, `halt` was called, or `latest` has come [s of time.monotonic], and the next call goes on with the frame,
+        bit by bit as if it had not been cut short. `writing` a frame takes seconds.
+        """
+        if not self._cut_short:
+            self._done.fill(False)
+        status, particle = self._all_shares(span, writing, latest)
+        if status == Status.HARD_CONTACT:
+            self._hard = blocks.Hard(blocks.MOST_HITS)
+            status, particle = self._all_shares(span, writing, latest)
+        self._cut_short = status == Status.INTERRUPTED
+        self._halt[0] = blocks.NEVER
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
+            if status == Status.TOO_FAST:
+                told += f", {self._too_fast()}"
+            multipliers = self.state.multipliers
+            if status == Status.UNCONVERGED and multipliers is not None:
+                left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
+                told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
+            raise RunError(told)
+        return not self._cut_short
+
+    def share_done(self, span: float) -> float:
+        """How much of a frame that was cut short is done, on average over the particles."""
+        left = self._halted.rows[lanes.LEFT]
+        return float(self._done.sum() + (1.0 - left / span).sum()) / len(self._done)
+
+    def observe(self) -> None:
+        """Observe the start."""
+        self._done.fill(True)
+        self._all_shares(0.0)
+
+    def _all_shares(self, span: float, writing: float = 0.0, latest: float = math.inf) -> tuple[int, int]:
+        """Every particle that is not done by `span`, all threads: the worst (status, particle)."""
+        self._ticket[0] = 0
+        # The caller's thread is one of them, unless it has to be free.
+        work = self._pace * span if span > 0.0 else 0.0
+        helps = work < _SHORT_FRAME * self._threads
+        # A thread that writes for as long as one computes has a processor of its own: three that share two of them wait
+        # for one another.
+        threads = max(1, self._threads - (writing > _MUCH_WRITING * work))
+        others = threads - helps if work > _LITTLE_WORK else 0
+        began = time.perf_counter()
+        shares = [self._pool.submit(self._share, span) for _ in range(others)]
+        ends = [self._share(span)] if helps else []
+        if latest < math.inf and wait(shares, max(0.0, latest - time.monotonic())).not_done:
+            self.halt()
+        ends += [share.result() for share in shares]
+        status, particle, _ = max(ends, key=lambda end: end[:2])
+        if status == Status.INTERRUPTED:
+            self._keep([left for *_, left in ends if left is not None])
+        elif span > 0.0:
+            self._halted = lanes.nobody(len(self._owners))
+            self._pace = (time.perf_counter() - began) * (others + helps) / span
+        return status, particle
+
+    def _keep(self, left_behind: list[lanes.Halted]) -> None:
+        """What a halt left in the lanes, and what an earlier one left that no lane has picked up since."""
+        picked_up = np.concatenate([np.flatnonzero(self._done), *(left.particle for left in left_behind)])
+        waiting = ~np.isin(self._halted.particle, picked_up)
+        parts = [lanes.Halted(self._halted.particle[waiting], self._halted.rows[:, waiting]), *left_behind]
+        particle = np.concatenate([part.particle for part in parts])
+        order = np.argsort(particle)
+        rows = np.concatenate([part.rows for part in parts], axis=1)[:, order]
+        self._halted = lanes.Halted(particle[order], np.ascontiguousarray(rows))
+
+    def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
+        """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
+        mine = lanes.empty(len(self._owners))
+        draws = lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64))
+        # Without the compiler too, a division by zero is an infinity that a select throws away.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            status, particle, drawn = blocks.advance_block(
+                self._method, self._chain, self._gravity, self._hard, self.state, self._done, self._halted,
+                span, draws, self._halt, mine,
+            )  # fmt: skip
+            if status == Status.DONE:
+                drawn_here = draws.mine[:drawn]
+                observables.observe(
+                    self._law, self._chain, self._gravity, self.state, drawn_here, self._size, self._partial
+                )
+        if status != Status.INTERRUPTED:
+            return status, particle, None
+        live, particle = particle, 0
+        return status, particle, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All that `restore` needs for a run to go on bit by bit, not copied; between two calls of `advance`."""
+        arrays: dict[str, NDArray[Any]] = {"done": self._done, **_named("halted", self._halted)}
+        for name, array in self.state._asdict().items():
+            arrays |= _named(name, array) if isinstance(array, Multipliers) else {name: array}
+        return {name: array for name, array in arrays.items() if array is not None}
+
+    def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
+        """Be as the run was that gave these `arrays`, at a frame or, `cut_short`, on the way to the next."""
+        self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
+        for name, array in self.arrays().items():
+            np.copyto(array, arrays[name], casting="no")
+        self._cut_short = cut_short
+
+    def seen(self) -> dict[str, Any]:
+        """The observables of the last frame."""
+        seen = observables.summary(self._partial, self.state, self._owners)
+        escaped = 0
+        if self._far < math.inf:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self._faces, self.state))
+        return {**seen, "escaped": escaped}
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
+        # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
+        if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+            good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
+            raise RunError(
+                f"the frame at {moment:g} s failed at particle {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}"
+            )
+        if seen["max_penetration"] > self._deepest:
+            self._require_inside(moment)
+
+    def _require_inside(self, moment: float) -> None:
+        # Far out in an open scene a position is as exact as its own size.
+        distances = self._scene.distances_outside(self.state.position)
+        magnitude = np.maximum(np.abs(self.state.position).max(axis=0), self._scene.finite_size())
+        outside = distances > self._deepest / self._scene.finite_size() * magnitude
+        if outside.any():
+            wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
+            raise RunError(
+                f"the frame at {moment:g} s failed at particle {particle}: it is {distances[wall, particle]:.3g} m "
+                f"outside surfaces[{wall}] ({type(self._scene.surfaces[wall]).__name__})"
+            )
+
+
+def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
+    """The arrays of a NamedTuple under dotted names."""
+    return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
+
+
+def _no_sweeps(n: int) -> Multipliers:
+    counts = np.zeros((3, n), np.int64)
+    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))

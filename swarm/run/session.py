@@ -1,0 +1,217 @@
+"""One session of a run that may take several: what it takes up, when it saves, when it has to end."""
+
+import contextlib
+import dataclasses
+import math
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from .. import checks
+from ..errors import CompleteError, SceneError, WallTimeError
+from ..methods.base import Method
+from ..output import paths
+from ..particles import Particles
+from ..scene import Scene
+from ..version import VERSION
+from .engine import Run
+
+if TYPE_CHECKING:
+    from ..output.beside import Beside
+    from ..output.checkpoint import Arrays, Job
+    from ..output.storage import Storage
+
+
+# More often than this [s] a run would do little else.
+_OFTEN = 0.01
+
+
+class Session:
+    """From a start or a checkpoint to the end, a signal or the limit of wall time; no other holds the trajectory then.
+
+    Args:
+        trajectory: the file that is written, or None: then nothing can be saved.
+        every: seconds of wall time from one checkpoint to the next; None: no checkpoint.
+        resume: go on from the last checkpoint, if there is one.
+        limit: seconds of wall time after which it ends; None: never.
+    """
+
+    def __init__(self, trajectory: Path | None, every: float | None, resume: bool, limit: float | None) -> None:
+        self._began = time.monotonic()
+        self._every = math.inf if every is None else checks.at_least("checkpoint", every, _OFTEN)
+        self._saves, self._resumes = every is not None, resume
+        self._end = math.inf if limit is None else self._began + checks.positive("walltime", limit)
+        self._due = self._began + self._every
+        self._told_to_stop = False
+        self._trajectory, self._path = trajectory, None
+        if trajectory is not None:
+            self._path = paths.checkpoint_of(trajectory)
+        elif self._saves or resume:
+            raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
+        # A digest of the particles at the start, for the trajectory.
+        self.start = ""
+        self._job: Job | None = None
+        self._arrays: Arrays | None = None
+        self._held = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._held.close()
+
+    @property
+    def first(self) -> int:
+        """The first frame that this session writes."""
+        return 0 if self._arrays is None or self._job is None else self._job.frame + 1
+
+    def prepare(
+        self, scene: Scene, method: Method, storage: "Storage", particles: Particles, until: float, overwrite: bool
+    ) -> None:
+        """Where this session begins: with a new file, or, to resume, where the checkpoint is, if there is one.
+
+        Raises:
+            SceneError: the trajectory cannot become a new file; or it, or the checkpoint, is of another run, is damaged
+                or is missing.
+            CompleteError: nothing is left to do.
+            FileError: another run writes that trajectory.
+        """
+        if self._trajectory is None or self._path is None:
+            return
+        from ..output import checkpoint
+        from ..output.lock import only_writer
+        from ..output.writer import descriptions
+
+        paths.check_target(self._trajectory, overwrite or self._resumes)
+        self._held.enter_context(only_writer(self._trajectory))
+        if not self._resumes and os.path.lexists(self._path) and not checkpoint.is_one(self._path):
+            raise SceneError(
+                f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
+                "replace; move it away, or choose another name for the trajectory"
+            )
+        self.start = checkpoint.digest_of(particles)
+        texts: dict[str, Any] = {**descriptions(scene, method, storage)}
+        self._job = checkpoint.Job(VERSION, **texts, particles=len(particles), start=self.start)
+        if not self._resumes:
+            return
+        if self._path.exists():
+            self._take_up(self._trajectory, until)
+        elif self._trajectory.exists() and not overwrite:
+            self._refuse_to_begin_again(self._trajectory, until)
+
+    def _refuse_to_begin_again(self, trajectory: Path, until: float) -> None:
+        """Say what the trajectory of a run without checkpoint is."""
+        from ..output.trajectory import load
+
+        assert self._job is not None
+        with load(trajectory) as before:
+            texts: dict[str, Any] = before.descriptions
+            there = dataclasses.replace(self._job, **texts, particles=before.count, start=before.start)
+            frames, last = len(before), before.times[-1:]
+        if not there.start:
+            raise SceneError(
+                f"{trajectory} must say of which start it is, to be resumed or found complete, got one of a version "
+                "that did not store it; choose another name, or overwrite it with --overwrite"
+            )
+        there.require_same(self._job, trajectory)
+        if frames and last[0] >= until:
+            raise CompleteError(f"{trajectory} is complete: its last frame is at {last[0]:g} s")
+        raise SceneError(
+            f"{self._path} must be there to resume from, got none: the run would begin again at 0 s and replace the "
+            f"{frames} frames of {trajectory}; to do so, overwrite it with --overwrite"
+        )
+
+    def _take_up(self, trajectory: Path, until: float) -> None:
+        from ..output import checkpoint
+        from ..output.trajectory import load
+
+        assert self._job is not None
+        assert self._path is not None
+        saved, arrays = checkpoint.read(self._path)
+        saved.require_same(self._job, self._path)
+        if not trajectory.exists():
+            raise SceneError(
+                f"{self._path} needs its trajectory {trajectory}, which is gone; start afresh without resume"
+            )
+        with load(trajectory) as before:
+            before.require_index()
+            if len(before) <= saved.frame:
+                raise SceneError(
+                    f"{trajectory} must hold {saved.frame + 1} frames, as {self._path} says, got {len(before)}: it was "
+                    "changed since; remove both to start afresh"
+                )
+        if saved.time >= until:
+            raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
+        self._job, self._arrays = saved, arrays
+
+    def restore(self, run: Run) -> None:
+        """Let the run be where the checkpoint is."""
+        if self._arrays is not None and self._job is not None and self._path is not None:
+            from ..output.checkpoint import require_fit
+
+            require_fit(self._path, self._arrays, run.arrays())
+            run.restore(self._arrays, self._job.following is not None)
+            self._arrays = {}
+
+    def require_same_time(self, number: int, moment: float) -> None:
+        """Raise a SceneError if the frame of this number was, or was to be, at another time."""
+        job = self._job
+        if self._arrays is None or job is None:
+            return
+        for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
+            if number == frame and saved is not None and saved != moment:
+                raise SceneError(
+                    f"{self._path} is of another run: its frame {number} is at {saved:g} s, got {moment:g} s; leave "
+                    "until and every as they were, or make until later"
+                )
+
+    @property
+    def latest(self) -> float:
+        """When to look in again [s of time.monotonic]."""
+        return min(self._due, self._end)
+
+    def stop(self) -> None:
+        """Let the next look end the session."""
+        self._told_to_stop = True
+
+    def wall_time(self) -> float:
+        """Seconds of all sessions of the run."""
+        return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
+
+    def look(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+        """Save if it is time to, and end if it is: the last frame that is written, and the one under way.
+
+        Raises:
+            KeyboardInterrupt: somebody called `stop`.
+            WallTimeError: the limit is over.
+            FileError: the checkpoint cannot be written.
+        """
+        now = time.monotonic()
+        stops = self._told_to_stop or now >= self._end
+        if self._saves and (stops or now >= self._due):
+            self._save(run, writer, frame, moment, following)
+            self._due = time.monotonic() + self._every
+        if self._told_to_stop:
+            raise KeyboardInterrupt
+        if stops:
+            raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+
+    def _save(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+        from ..output import checkpoint
+
+        assert self._job is not None
+        assert self._path is not None
+        assert writer is not None
+        # A checkpoint is never ahead of the frames.
+        writer.drain()
+        job = dataclasses.replace(self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time())
+        checkpoint.save(self._path, job, run.arrays())
+
+    def finish(self) -> None:
+        """All frames are written: nothing is left to go on with."""
+        if self._path is not None and (self._saves or self._arrays is not None):
+            self._path.unlink(missing_ok=True)

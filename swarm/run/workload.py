@@ -1,0 +1,140 @@
+"""How many impacts a run will take, from the flights of a few particles: before it, in plain Python."""
+
+import logging
+import math
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..kernel.gravity import Gravity
+from ..methods.base import Method
+from ..particles import Particles
+from ..scene import Scene
+from ..surfaces import chain as walls
+from ..surfaces import flights
+from ..surfaces.chain import Chain
+
+_LOG = logging.getLogger("swarm")
+# A particle takes some 10 ns an impact: minutes a frame, in which nothing is seen; and days of a processor.
+_MOST_A_FRAME, _MANY = 1e10, 1e13
+# Particles whose flights are looked at, and parts of a fall until its hit is known.
+_PARTICLES, _PARTS = 8, 8
+# Chords of a walk through the volume, and how many of the last of them count.
+_CHORDS, _COUNTED = 60, 30
+
+
+class Flights(NamedTuple):
+    """Typical time from impact to impact [s], and the wall that is met most."""
+
+    between: float
+    wall: int
+
+
+def check(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
+    """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
+    impact = method.time_of_impact()
+    # Where energy is lost particles come to rest: what comes later is no part of the first flights.
+    if impact is None or scene.restitution() is not None:
+        return
+    with np.errstate(all="ignore"):
+        found = _of_particles(scene, particles, impact)
+        if not _is_much(found, particles, until, every):
+            return
+        # They may have started in a narrow corner, and leave it: what matters is the volume around.
+        found = max(found, _of_volume(scene, particles, impact))
+    if every > _MOST_A_FRAME * found.between:
+        i = scene.owners()[found.wall]
+        raise SceneError(
+            f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
+            f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
+            f"({type(scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, the "
+            f"particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
+        )
+    impacts = len(particles) * (until / found.between)
+    if impacts > _MANY:
+        _LOG.warning(
+            "the run will take about %.1e impacts, %.1e of each particle, which flies %.1e s from impact to impact",
+            impacts, until / found.between, found.between,
+        )  # fmt: skip
+
+
+def _is_much(found: Flights, particles: Particles, until: float, every: float) -> bool:
+    return every > _MOST_A_FRAME * found.between or len(particles) * until > _MANY * found.between
+
+
+def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
+    """Of the flights that some particles are on at the start, from their last impact to the next."""
+    chain, pull, seen = scene.chain(), scene.pull(), []
+    for i in _chosen(particles):
+        position, velocity = particles.position[:, i], particles.velocity[:, i]
+        until, wall = _hit(chain, pull, position, velocity)
+        since, _wall = _hit(chain, pull, position, -velocity)
+        # 0 is a particle that rests, or rolls along its wall.
+        if since + until > 0.0:
+            seen.append(Flights(impact + since + until, wall))
+    return _typical(seen)
+
+
+def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
+    """Of the chords of the volume around some particles: a walk from a random point of one to that of the next.
+
+    Between two of them it goes along the wall, which leads out of a narrow corner, but not of a narrow slit.
+    """
+    chain, random, seen = scene.chain(), np.random.default_rng(0), []
+    pull = math.hypot(*(scene.gravity or (0.0,)))
+    for i in _chosen(particles):
+        point, velocity = particles.position[:, i], particles.velocity[:, i]
+        for k in range(_CHORDS):
+            way = random.standard_normal(3)
+            way = way / math.sqrt(way @ way)
+            length, ahead, wall = _chord(chain, point, way)
+            if not length < math.inf:
+                return Flights(math.inf, -1)
+            normal = np.array(walls.unit_normal(chain, float(wall), *(point + ahead * way)))
+            point = point + (ahead - length * random.random()) * way
+            speed = math.sqrt(velocity @ velocity + pull * length)
+            if k >= _CHORDS - _COUNTED and length > 0.0 and speed > 0.0:
+                seen.append(Flights(impact + length / speed, wall))
+            way = way - (way @ normal) * normal
+            length, ahead, _wall = _chord(chain, point, way)
+            if length < math.inf:
+                point = point + (ahead - length * random.random()) * way
+    return _typical(seen)
+
+
+def _chord(chain: Chain | None, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
+    """The chord through a point, in units of the vector along it: its length, what is ahead, and the wall there."""
+    (ahead, wall), (behind, _wall) = _hit(chain, None, point, way), _hit(chain, None, point, -way)
+    return ahead + behind, ahead, wall
+
+
+def _chosen(particles: Particles) -> list[int]:
+    return sorted({round(k * (len(particles) - 1) / (_PARTICLES - 1)) for k in range(_PARTICLES)})
+
+
+def _hit(
+    chain: Chain | None, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> tuple[float, int]:
+    """The time to the first hit and its wall, infinite where it is not found soon."""
+    total = 0.0
+    gravity = np.zeros(3) if pull is None else np.array(pull)
+    for _part in range(_PARTS):
+        time, wall = flights.first_hit(chain, pull, *position, *velocity)
+        total += float(time)
+        if wall >= 0.0 or not time < math.inf:
+            return total, int(wall)
+        position = position + time * velocity + 0.5 * time * time * gravity
+        velocity = velocity + time * gravity
+    return math.inf, -1
+
+
+def _typical(seen: list[Flights]) -> Flights:
+    """Their median, and the wall of most of them."""
+    if not seen:
+        return Flights(math.inf, -1)
+    between = sorted(one.between for one in seen)[len(seen) // 2]
+    met = Counter(one.wall for one in seen if one.wall >= 0)
+    return Flights(between, met.most_common(1)[0][0] if met else -1)

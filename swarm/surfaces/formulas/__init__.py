@@ -1,0 +1,1 @@
+"""Surfaces by a formula or by a user's own functions."""

@@ -1,0 +1,195 @@
+"""phi in its own coordinates and a box around its surface: what can be checked of it, and how much it bends there."""
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Vector
+from ...errors import SceneError
+from .. import base
+from .owned import Bend
+
+# Central differences lose least at the cube root of round-off, relative to the length.
+_DIFFERENCE = 2.220446049250313e-16 ** (1.0 / 3.0)
+# Where second derivatives are only sampled: how many points, by how much their range is widened, and what they miss.
+_SAMPLES = 4096
+_SAFETY = 2.0
+_NOISE = 1e-6
+# Room around a solid, relative to its box's smallest width, within which the bound of the second derivatives holds.
+MARGIN = 0.25
+# Points of a check that are moved onto the surface, and the moves.
+_ONTO, _MOVES = 256, 60
+# A gradient this small, relative to |phi|/size in the bounds, is none; one this far from differences of phi is wrong.
+_FLAT, _WRONG = 1e-8, 1e-4
+_EPSILON = 2.220446049250313e-16
+
+Floats = NDArray[np.float64]
+_STRAIGHT = Bend.of_magnitude(0.0)
+
+
+@dataclass(frozen=True)
+class Form:
+    """phi in its own coordinates, its box, and how much it bends."""
+
+    kind: Any
+    parameters: tuple[float, ...]
+    box: base.Box | None
+    size: float
+    side: str
+    bend: Bend = _STRAIGHT
+
+    def bent(self, bend: Bend) -> "Form":
+        """The same with these bounds of the second derivatives."""
+        return replace(self, bend=bend)
+
+    def numbers(self, center: Vector) -> Any:
+        """What kernels take."""
+        low, high = self.box or base.UNBOUNDED
+        scale = self.size if math.isfinite(self.size) else 1.0
+        narrowest = min(b - a for a, b in zip(low, high, strict=True))
+        closed = 1.0 if self.box is not None and self.side == "outside" else 0.0
+        side = base.side_sign(self.side)
+        return self.kind(
+            *center, side, _DIFFERENCE * scale, scale, self.bend, low, high, closed, MARGIN * narrowest, self.parameters
+        )
+
+    def reach(self) -> float:
+        """How far the surface goes from its centre."""
+        if self.box is None:
+            return self.size if math.isfinite(self.size) else 1.0
+        return max(base.farthest(corner) for corner in self.box)
+
+    def domain(self) -> base.Box | None:
+        """The box, a solid's with the margin in which its bend must be known."""
+        if self.box is None:
+            return None
+        low, high = np.array(self.box)
+        room = 0.5 * self.outer_margin() * (high - low).min()
+        return tuple((low - room).tolist()), tuple((high + room).tolist())
+
+    @functools.cached_property
+    def encloses(self) -> bool:
+        """Whether phi is above 0 on the faces of the box."""
+        assert self.box is not None
+        (low, high), s = np.array(self.box), np.linspace(0.0, 1.0, 33)
+        u, v = (grid.ravel() for grid in np.meshgrid(s, s))
+        faces = [np.insert([u, v], axis, end, axis=0) for axis in range(3) for end in (0.0, 1.0)]
+        return bool((self.value(low[:, None] + (high - low)[:, None] * np.hstack(faces)) >= 0.0).all())
+
+    def bounds(self, center: Vector, rotation: Any) -> base.Box:
+        """`Surface.bounds`."""
+        if self.side == "outside" or self.box is None or not self.encloses:
+            return base.UNBOUNDED
+        low, high = (tuple(a + c for a, c in zip(corner, center, strict=True)) for corner in self.box)
+        return base.rotated_box(rotation, (low, high), center)  # type: ignore[arg-type]
+
+    def value(self, points: Floats) -> Floats:
+        """phi at points (3, N) relative to the centre."""
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(base.phi(self.numbers((0.0, 0.0, 0.0)), *points), points.shape[1:])
+
+    def slope(self, points: Floats) -> Floats:
+        """Its gradient."""
+        with np.errstate(all="ignore"):
+            parts = base.gradient(self.numbers((0.0, 0.0, 0.0)), *points)
+            return np.array(np.broadcast_arrays(*parts, points[0])[:3])
+
+    def points(self, n: int) -> Floats:
+        """Random points of the box, or about the centre where there is none."""
+        low, high = np.array(self.box or ((-self.reach(),) * 3, (self.reach(),) * 3))[:, :, None]
+        return np.asarray(low + (high - low) * np.random.default_rng(0).random((3, n)))
+
+    def check_gradient(self) -> None:
+        """Raise if the gradient is not that of phi."""
+        points = self.points(_ONTO)
+        step = _DIFFERENCE * self.reach()
+        ends = points[:, :, None, None] + step * np.eye(3)[:, None, :, None] * np.array([1.0, -1.0])
+        values = self.value(ends.reshape(3, -1)).reshape(_ONTO, 3, 2)
+        measured, said = (values[:, :, 0] - values[:, :, 1]).T / (2.0 * step), self.slope(points)
+        scale = np.abs(said).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
+        off = np.abs(measured - said).max(axis=0) > _WRONG * scale
+        # At a few points phi itself may have a kink.
+        if np.count_nonzero(off) > 0.1 * _ONTO:
+            i = int(np.argmax(off))
+            raise SceneError(
+                f"gradient must be the gradient of phi, got {_shown(said[:, i])} at {_shown(points[:, i])}, where "
+                f"differences of phi give {_shown(measured[:, i])}"
+            )
+
+    def check(self) -> None:
+        """Raise unless phi is finite in the box, and its surface is there and has a normal."""
+        points = self.points(_SAMPLES)
+        values = self.value(points)
+        wrong = ~np.isfinite(values)
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise SceneError(f"phi must be a finite number in the bounds, got {values[i]} at {_shown(points[:, i])}")
+        near = self._onto(points[:, np.argsort(np.abs(values))[:_ONTO]])
+        found = (values < 0.0).any() and (values > 0.0).any()
+        if not found and not (near.shape[1] and (self.value(near) <= 0.0).any() and (self.value(near) >= 0.0).any()):
+            sign = "below" if values[0] < 0.0 else "above"
+            raise SceneError(f"phi must be 0 somewhere in the bounds, got {sign} 0 everywhere in {self.box}")
+        slopes = np.sqrt((self.slope(near) ** 2).sum(axis=0))
+        flat = ~(slopes * self.size > _FLAT * np.abs(values).max())
+        if flat.any():
+            i = int(np.argmax(flat))
+            raise SceneError(
+                f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {_shown(near[:, i])}"
+            )
+
+    def check_bend(self) -> None:
+        """Raise if safe steps away from the wall may be as short as the round-off of a position."""
+        largest, most = np.abs(self.value(self.points(_SAMPLES))).max(), self.bend.most
+        if _EPSILON * most * self.size**2 > largest:
+            limit = 2.0 * largest / (_EPSILON * self.size**2)
+            raise SceneError(
+                f"phi must not bend more sharply than round-off resolves: with a size of {self.size:.3g} its second "
+                f"derivative must be below {limit:.3g}, got up to {2.0 * most:.3g}; where less is known, give curvature"
+            )
+
+    def _onto(self, points: Floats) -> Floats:
+        """Points moved onto the surface along the gradient; those that stay in the box."""
+        assert self.box is not None
+        low, high = np.array(self.box)[:, :, None]
+        start = np.abs(self.value(points)).max()
+        for _ in range(_MOVES):
+            slope = self.slope(points)
+            with np.errstate(all="ignore"):
+                points = points - self.value(points) / (slope**2).sum(axis=0) * slope
+        inside = ((points >= low) & (points <= high)).all(axis=0)
+        return points[:, inside & (np.abs(self.value(points)) <= 1e-6 * start)]
+
+    def sampled_bend(self) -> Bend:
+        """The bend by differences of the gradient at some points, its range doubled."""
+        assert self.box is not None
+        (low, high), points = np.array(self.box), self.points(_SAMPLES)
+        points = points + self.outer_margin() * (points - 0.5 * (low + high)[:, None])
+        side = base.side_sign(self.side)
+        # Flights are in the admissible part only.
+        points = points[:, side * self.value(points) <= 0.0]
+        step = _DIFFERENCE * self.size * np.eye(3)[:, :, None]
+        rows = [0.125 * side / step.max() * (self.slope(points + one) - self.slope(points - one)) for one in step]
+        entries = np.array([rows[i][j] + rows[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))])
+        if not entries.size or not np.isfinite(entries).all():
+            raise SceneError("curvature must be given: the gradient is not finite everywhere in the bounds")
+        least, most = entries.min(axis=1), entries.max(axis=1)
+        room = 0.5 * (_SAFETY - 1.0) * (most - least) + _NOISE * np.abs(entries).max()
+        # Of the eigenvalues at the points, too, which are closer together than those of any entries in these ranges.
+        bend, single = (
+            Bend.of_entries((least - room)[:, None], (most + room)[:, None]),
+            Bend.of_entries(entries, entries),
+        )
+        wider = 0.5 * (_SAFETY - 1.0) * (single.most - single.least) + _NOISE * np.abs(entries).max()
+        return bend._replace(least=float(single.least - wider), most=float(single.most + wider))
+
+    def outer_margin(self) -> float:
+        """How much larger than the box that one is in which the bend must be known, on each side, in half widths."""
+        return 2.0 * MARGIN if self.side == "outside" else 0.0
+
+
+def _shown(point: Any) -> str:
+    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"

@@ -1,0 +1,1 @@
+"""The surfaces with a name: one file a shape."""

@@ -1,0 +1,102 @@
+"""Box: one slab an axis, and a plane where one of its two faces is open."""
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from ...checks import Vector, length, one_of, vector
+from ...errors import SceneError
+from .. import base
+from .. import rotation as rotations
+from .plane import PlaneNumbers
+from .slab import slab_numbers
+from .solid import body
+
+FACES = tuple(sign + axis for axis, sign in itertools.product("xyz", "-+"))
+
+
+@dataclass(frozen=True, repr=False)
+class Box(base.Surface):
+    """A rectangular box; its cavity, of which faces may be open, or the space around the solid.
+
+    Args:
+        half_widths: three numbers > 0 [m], from the centre to the faces.
+        center: three numbers [m].
+        side: "inside" or "outside", the admissible part.
+        open: faces without a wall, of "-x", "+x", "-y", "+y", "-z", "+z"; for a cavity only, and not all of them.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Box(half_widths=(1.0, 1.0, 1.0), open=["+z"]).phi([[0.0, 0.0], [0.0, 0.0], [5.0, -1.5]])
+    array([-1. ,  0.5])
+    """
+
+    half_widths: Vector
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+    open: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        widths = vector("half_widths", self.half_widths)
+        object.__setattr__(self, "half_widths", tuple(length(f"half_widths[{i}]", w) for i, w in enumerate(widths)))
+        object.__setattr__(self, "open", _faces(self.open))
+        if self.open and self.side == "outside":
+            raise SceneError(f'open must be empty for side="outside", got {list(self.open)}')
+
+    def walls(self) -> tuple[Any, ...]:
+        sign = base.side_sign(self.side)
+        axes = rotations.matrix(self.rotation).T.tolist()
+        parts: list[Any] = []
+        for name, (x, y, z), half in zip("xyz", axes, self.half_widths, strict=True):
+            low, high = ("-" + name in self.open), ("+" + name in self.open)
+            if not (low or high):
+                parts.append(slab_numbers((x, y, z), half, self.center, sign))
+            elif not high:
+                parts.append(_face((x, y, z), half, self.center))
+            elif not low:
+                parts.append(_face((-x, -y, -z), half, self.center))
+        if self.side == "inside":
+            return tuple(parts)
+        return (body(parts, math.hypot(*self.center)),)
+
+    def open_faces(self) -> list[base.HalfSpace]:
+        axes = rotations.matrix(self.rotation).T
+        planes = []
+        for face in self.open:
+            i = "xyz".index(face[1])
+            x, y, z = (axes[i] if face[0] == "+" else -axes[i]).tolist()
+            planes.append(((x, y, z), _face((x, y, z), self.half_widths[i], self.center).offset))
+        return planes
+
+    def size(self) -> float:
+        return min(self.half_widths)
+
+    def bounds(self) -> base.Box:
+        low, high = base.box_around(self.center, self.half_widths, self.side)
+        lx, ly, lz = (-math.inf if "-" + name in self.open else low[i] for i, name in enumerate("xyz"))
+        hx, hy, hz = (math.inf if "+" + name in self.open else high[i] for i, name in enumerate("xyz"))
+        return base.rotated_box(self.rotation, ((lx, ly, lz), (hx, hy, hz)), self.center)
+
+    def extent(self) -> float:
+        return base.farthest(self.center) + math.hypot(*self.half_widths)
+
+
+def _face(normal: Vector, half: float, center: Vector) -> PlaneNumbers:
+    return PlaneNumbers(*normal, sum(n * c for n, c in zip(normal, center, strict=True)) + half)
+
+
+def _faces(value: Any) -> tuple[str, ...]:
+    """The argument `open`."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        raise SceneError(f"open must be a list of faces such as '+x', got {value!r}")
+    faces = tuple(one_of(f"open[{i}]", face, FACES) for i, face in enumerate(value))
+    for i, face in enumerate(faces):
+        if face in faces[:i]:
+            raise SceneError(f"open must name each face once, got {face!r} twice")
+    if len(faces) == len(FACES):
+        raise SceneError("open must leave a wall, got all six faces")
+    return faces

@@ -1,0 +1,91 @@
+"""Cone: phi = rho^2 cos^2 - z^2 sin^2 of one nappe, a quadric cut off by the plane through its apex."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ...checks import Vector, number
+from ...errors import SceneError
+from .. import base
+from .plane import PlaneNumbers
+from .quadratic import QuadricNumbers, quadric_numbers
+from .revolved import Revolved, tangents
+from .solid import body
+
+# A cone nearer to its tangent plane than this [rad] leaves it by round-off only.
+_FLATTEST = 1e-12
+
+
+@dataclass(frozen=True, repr=False)
+class Cone(Revolved):
+    """One nappe of a circular cone: the space in it, or around the solid.
+
+    phi is in m^2: the distance from the wall times that from the opposite wall, and below the apex the depth [m] if
+    that is more. The apex is a singular point, where the wall has no normal: nearer to it than 1e-8 of a flight's
+    length a hit is known to that distance only.
+
+    Args:
+        half_angle: between the axis and the wall, in (0, pi/2) [rad].
+        axis: three numbers, not all 0; from the apex into the cone.
+        center: the apex, three numbers [m].
+        side: "inside" or "outside", the admissible part.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Cone(half_angle=math.pi / 4).phi([[0.0, 0.0], [0.0, 0.0], [2.0, -1.0]]).round(12)
+    array([-2.,  1.])
+    """
+
+    half_angle: float
+    axis: Vector = (0.0, 0.0, 1.0)
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        angle = number("half_angle", self.half_angle, "a finite number of radians")
+        if not 0.0 < angle < 0.5 * math.pi:
+            raise SceneError(f"half_angle must be between 0 and pi/2 rad, got {angle:g}")
+        if angle > 0.5 * math.pi - _FLATTEST:
+            raise SceneError(
+                f"half_angle must be at most pi/2 - {_FLATTEST:g} rad, got pi/2 - {0.5 * math.pi - angle:.3g}: so "
+                "flat a cone is a plane to round-off; use Plane"
+            )
+        object.__setattr__(self, "half_angle", angle)
+
+    def numbers(self) -> QuadricNumbers:
+        """The numbers of both nappes in the frame in which their axis is z."""
+        a, b = math.cos(self.half_angle) ** 2, -(math.sin(self.half_angle) ** 2)
+        return quadric_numbers(self.own_center(), (a, a, b), (0.0,) * 3, 0.0, self.side)
+
+    def walls(self) -> tuple[Any, ...]:
+        x, y, z = self.direction()
+        offset = sum(n * c for n, c in zip((x, y, z), self.center, strict=True))
+        nappes = super().walls()[0]
+        if self.side == "inside":
+            # The plane first: a flight along the axis meets both at the apex, and the plane has a normal there.
+            return PlaneNumbers(-x, -y, -z, -offset), nappes
+        # As a solid, the half-space above the apex: what is admissible of it is below.
+        return (body((nappes, PlaneNumbers(x, y, z, offset)), math.hypot(*self.center)),)
+
+    def size(self) -> float:
+        return math.inf
+
+    def bounds(self) -> base.Box:
+        if self.side == "outside":
+            return base.UNBOUNDED
+        # A direction u meets the cone's end at the apex where the angle between u and the axis is pi/2 + half_angle.
+        steep = math.sin(self.half_angle)
+        around = list(zip(self.center, self.direction(), strict=True))
+        lx, ly, lz = (c if n >= steep else -math.inf for c, n in around)
+        hx, hy, hz = (c if -n >= steep else math.inf for c, n in around)
+        return (lx, ly, lz), (hx, hy, hz)
+
+    def half_spaces(self) -> list[base.HalfSpace]:
+        # rho cos <= z sin in every direction around the axis
+        lean = -math.tan(self.half_angle)
+        return [] if self.is_solid() else tangents(self.direction(), self.center, lean, 0.0)
+
+    def extent(self) -> float:
+        return base.farthest(self.center)

@@ -1,0 +1,77 @@
+"""Cylinder: phi = (rho^2 - R^2)/(2 R), the distance to first order; a quadric, and a slab where it has caps."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ...checks import Vector
+from ...checks import length as checked_length
+from .. import base
+from .. import rotation as rotations
+from .principal import extents
+from .quadratic import QuadricNumbers, quadric_numbers
+from .revolved import Revolved, tangents
+from .slab import SlabNumbers, slab_numbers
+from .solid import body
+
+
+@dataclass(frozen=True, repr=False)
+class Cylinder(Revolved):
+    """A circular cylinder, endless or capped; its cavity or the space around the solid.
+
+    Args:
+        radius: R > 0 [m].
+        axis: three numbers, not all 0.
+        length: None (endless), or the distance > 0 [m] between two caps, half on each side of the centre.
+        center: three numbers [m].
+        side: "inside" or "outside", the admissible part.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Cylinder(radius=0.5, length=2.0).phi([[0.5, 0.0], [0.0, 0.0], [0.0, 1.25]])
+    array([0.  , 0.25])
+    """
+
+    radius: float
+    axis: Vector = (0.0, 0.0, 1.0)
+    length: float | None = None
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "radius", checked_length("radius", self.radius))
+        if self.length is not None:
+            object.__setattr__(self, "length", checked_length("length", self.length))
+
+    def numbers(self) -> QuadricNumbers:
+        """The numbers of the endless cylinder in the frame in which its axis is z."""
+        a = 0.5 / self.radius
+        return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0,) * 3, 0.5 * self.radius, self.side)
+
+    def _caps(self, length: float) -> SlabNumbers:
+        return slab_numbers(self.direction(), 0.5 * length, self.center, base.side_sign(self.side))
+
+    def walls(self) -> tuple[Any, ...]:
+        around = super().walls()
+        if self.length is None:
+            return around
+        parts = (*around, self._caps(self.length))
+        return parts if self.side == "inside" else (body(parts, math.hypot(*self.center)),)
+
+    def size(self) -> float:
+        return self.radius if self.length is None else min(self.radius, 0.5 * self.length)
+
+    def bounds(self) -> base.Box:
+        half = math.inf if self.length is None else 0.5 * self.length
+        around = extents(rotations.matrix(self.turn()), (self.radius, self.radius, 0.0))
+        along = extents(rotations.matrix(self.turn()), (0.0, 0.0, half))
+        x, y, z = (a + b for a, b in zip(around, along, strict=True))
+        return base.box_around(self.center, (x, y, z), self.side)
+
+    def half_spaces(self) -> list[base.HalfSpace]:
+        return [] if self.is_solid() else tangents(self.direction(), self.center, 0.0, self.radius)
+
+    def extent(self) -> float:
+        return base.farthest(self.center) + math.hypot(self.radius, 0.5 * (self.length or 0.0))

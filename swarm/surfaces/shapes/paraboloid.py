@@ -1,0 +1,58 @@
+"""Paraboloid: phi = rho^2/(4 f) - z, a quadric with a linear term."""
+
+import itertools
+from dataclasses import dataclass
+
+from ...checks import Vector, length
+from .. import base
+from .quadratic import QuadricNumbers, quadric_numbers
+from .revolved import Revolved, tangents
+
+# Slopes of the tangent planes that stand in for the bowl.
+_SLOPES = (0.5, 2.0)
+
+
+@dataclass(frozen=True, repr=False)
+class Paraboloid(Revolved):
+    """A bowl of revolution: the space in the bowl, which is open above, or the space below it.
+
+    Args:
+        focal_length: f > 0 [m]; the vertex has the radius of curvature 2 f.
+        axis: three numbers, not all 0; from the vertex into the bowl.
+        center: the vertex, three numbers [m].
+        side: "inside" or "outside", the admissible part.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Paraboloid(focal_length=0.25).phi([[0.0, 1.0], [0.0, 0.0], [1.0, 1.0]])
+    array([-1.,  0.])
+    """
+
+    focal_length: float
+    axis: Vector = (0.0, 0.0, 1.0)
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "focal_length", length("focal_length", self.focal_length))
+
+    def numbers(self) -> QuadricNumbers:
+        a = 0.25 / self.focal_length
+        return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0, 0.0, -1.0), 0.0, self.side)
+
+    def size(self) -> float:
+        return 2.0 * self.focal_length
+
+    def bounds(self) -> base.Box:
+        return base.UNBOUNDED
+
+    def half_spaces(self) -> list[base.HalfSpace]:
+        # rho^2/(4 f) <= z is rho - z/s <= f s for every slope s
+        f = self.focal_length
+        planes = (tangents(self.direction(), self.center, -1.0 / s, f * s) for s in _SLOPES)
+        return [] if self.is_solid() else list(itertools.chain.from_iterable(planes))
+
+    def extent(self) -> float:
+        return base.farthest(self.center) + self.size()

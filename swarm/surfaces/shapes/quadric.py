@@ -1,0 +1,105 @@
+"""Quadric: phi = d.A d + b.d + c, in the units of its matrix; kernels see it in its principal frame."""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Vector, number, vector
+from ...errors import SceneError
+from .. import base
+from .. import rotation as rotations
+from .principal import Frame, extents, framed, principal_frame
+from .quadratic import QuadricNumbers, quadric_numbers
+
+# An asymmetry of this part of the largest entry is round-off.
+_ASYMMETRY = 1e-12
+
+Matrix = tuple[Vector, Vector, Vector]
+
+
+@dataclass(frozen=True, repr=False)
+class Quadric(base.Surface):
+    """The surface d.A d + b.d + c = 0 with d = r - center: phi is the left side, and below 0 is inside.
+
+    Args:
+        matrix: A, three rows of three numbers, symmetric.
+        vector: b, three numbers.
+        constant: c.
+        center: three numbers [m].
+        side: "inside" (phi <= 0) or "outside" (phi >= 0), the admissible part.
+
+    Raises:
+        SceneError: an argument is out of its range, A is not symmetric, or phi is nowhere 0 with a change of sign.
+
+    >>> Quadric(matrix=((1, 0, 0), (0, 1, 0), (0, 0, -1)), constant=-0.25).phi([[0.5], [0.0], [0.0]])
+    array([0.])
+    """
+
+    matrix: Matrix
+    vector: Vector = (0.0, 0.0, 0.0)
+    constant: float = 0.0
+    center: Vector = (0.0, 0.0, 0.0)
+    side: str = "inside"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "matrix", _symmetric(self.matrix))
+        object.__setattr__(self, "vector", vector("vector", self.vector))
+        object.__setattr__(self, "constant", number("constant", self.constant))
+        if not (any(map(any, self.matrix)) or any(self.vector)):
+            raise SceneError("matrix must not be all 0 where vector is, got both 0")
+        if self._frame.one_sign():
+            raise SceneError(
+                f"constant must leave a surface with an inside and an outside, got {self.constant:g}, "
+                "for which phi has the same sign everywhere"
+            )
+
+    @functools.cached_property
+    def _frame(self) -> Frame:
+        return principal_frame(np.array(self.matrix), np.array(self.vector), self.constant)
+
+    def _axes(self) -> NDArray[np.float64]:
+        """The principal axes in the scene, as columns."""
+        return rotations.matrix(self.rotation) @ self._frame.axes
+
+    def walls(self) -> tuple[Any]:
+        return (framed(self._axes(), self.numbers()),)
+
+    def own_center(self) -> Vector:
+        x, y, z = (self._axes().T @ np.array(self.center) + self._frame.shift).tolist()
+        return x, y, z
+
+    def numbers(self) -> QuadricNumbers:
+        frame = self._frame
+        return quadric_numbers(self.own_center(), frame.curvatures, frame.linear, frame.level, self.side)
+
+    def size(self) -> float:
+        return self._frame.size()
+
+    def bounds(self) -> base.Box:
+        if not self._frame.encloses(base.side_sign(self.side)):
+            return base.UNBOUNDED
+        x, y, z = (np.array(self.center) + self._axes() @ self._frame.middle).tolist()
+        return base.box_around((x, y, z), extents(self._axes(), self._frame.semi_axes()), "inside")
+
+    def extent(self) -> float:
+        lengths = [length for length in (*self._frame.semi_axes(), self.size()) if math.isfinite(length)]
+        return base.farthest(self.center) + math.hypot(*self._frame.middle) + max(lengths, default=0.0)
+
+
+def _symmetric(value: Any) -> Matrix:
+    """The argument `matrix` as three rows."""
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or len(value) != 3:
+        raise SceneError(f"matrix must be three rows of three numbers, got {value!r}")
+    a = np.array([vector(f"matrix[{i}]", row) for i, row in enumerate(value)])
+    for i, k in ((0, 1), (0, 2), (1, 2)):
+        if abs(a[i, k] - a[k, i]) > _ASYMMETRY * abs(a).max():
+            raise SceneError(
+                f"matrix must be symmetric, got matrix[{i}][{k}] = {a[i, k]:g} and matrix[{k}][{i}] = {a[k, i]:g}"
+            )
+    first, second, third = (tuple(row) for row in (0.5 * (a + a.T)).tolist())
+    return first, second, third

@@ -1,0 +1,49 @@
+"""What surfaces of revolution have in common: an axis."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...checks import Vector
+from .. import base
+from .. import rotation as rotations
+
+# Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
+_TANGENTS = 8
+
+
+class Revolved(base.Surface):
+    """A surface of revolution, which works in the frame in which its `axis` is z."""
+
+    axis: Vector
+    center: Vector
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "axis", rotations.unit("axis", self.axis))
+
+    def turn(self) -> rotations.Quaternion | None:
+        """From that frame to the scene's."""
+        return rotations.after(self.rotation, rotations.onto(self.axis))
+
+    def direction(self) -> Vector:
+        """The axis in the scene."""
+        return rotations.turned(self.rotation, self.axis)
+
+    def own_center(self) -> Vector:
+        return rotations.turned_back(self.turn(), self.center)
+
+    def walls(self) -> tuple[Any, ...]:
+        return (rotations.rotated(self.turn(), self.numbers()),)
+
+
+def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[base.HalfSpace]:
+    """Half-spaces (u + lean axis).(r - through) <= offset for directions u all around a unit vector."""
+    frame = rotations.matrix(rotations.onto(axis))
+    found = []
+    for angle in np.linspace(0.0, 2.0 * math.pi, _TANGENTS, endpoint=False):
+        normal = frame @ (math.cos(angle), math.sin(angle), lean)
+        x, y, z = (normal / math.hypot(1.0, lean)).tolist()
+        found.append(((x, y, z), offset / math.hypot(1.0, lean) + float(np.dot((x, y, z), through))))
+    return found
