@@ -1,8 +1,7 @@
 """The surfaces by their kind in a scene file."""
 
 # These only register their definitions.
-from . import smooth as _smooth  # noqa: F401
-from .base import Surface
+from .surface import Surface
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes import rotated as _rotated  # noqa: F401
