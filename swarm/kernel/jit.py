@@ -333,8 +333,8 @@ def _emit_index(context, builder, signature, args):
     return context.cast(builder, *args, *signature.args, signature.return_type)
 
 
-@inlined
-def kept(value: Any) -> Any:
+@by_type
+def kept(value):
     """A value from an array that a select may write back unchanged to its place.
 
     Of such a select LLVM makes a masked store, which costs AMD processors some ten times an ordinary one (measured: 18
