@@ -13,7 +13,7 @@ from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, square
 from ..surfaces import contract
-from ..surfaces.fold import Chain
+from ..surfaces.fold import Chain, of_wall
 from . import regularisation as law_of
 from .discrete_gradient import Reaction, illinois, narrowed, reaction
 from .force import NEEDS as FORCE_NEEDS
@@ -41,63 +41,38 @@ def _residual(law, surface, r, c, kappa):
     return kappa - c * strength(law, surface, contract.inner(surface, contract.resolve(surface, r, kappa)))
 
 
-@by_type
-def guess(chain, wall, law, r, c):
-    """kappa of a wall if it were flat and the spring linear."""
-    raise NotImplementedError
-
-
-@guess.register(Chain)
-def _(chain, wall, law, r, c):
-    surface = chain.first
+@inlined
+def _guess(surface, law, r, c):
+    """kappa if the wall were flat and the spring linear."""
     q = contract.inner(surface, r)
     g = contract.gap_of(surface, q)
     slope, _curvature = contract.gap_slope(surface, q, q)
-    d = contract.inner_gradient(surface, r, r)
     # g(s) = g - kappa g'(q) |grad q|^2 and V' = k g(s): kappa (1 + c k g'^2 |grad q|^2) = c k g' g
     stiff = c * law_of.stiffness(law, g) * slope
-    other = guess(chain.rest, wall - 1.0, law, r, c)
-    here = wall == 0.0
-    top = select(here & (g > 0.0), stiff * g, 0.0)
-    bottom = select(here, 1.0 + stiff * slope * square(d), 1.0)
-    return top / bottom + select(here, 0.0, other)
+    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(contract.inner_gradient(surface, r, r)))
 
 
-@guess.register(Nothing)
-def _(chain, wall, law, r, c):
-    return 0.0
-
-
-@by_type
-def improve(chain, wall, law, r, c, kappa):
-    """The Newton step of kappa for a wall, and whether it was so large that another is needed."""
-    raise NotImplementedError
-
-
-@improve.register(Chain)
-def _(chain, wall, law, r, c, kappa):
-    surface = chain.first
+@inlined
+def _improve(surface, law, r, c, kappa):
+    """The Newton step of kappa, and whether it was so large that another is needed."""
     f = _residual(law, surface, r, c, kappa)
     nudge = _NUDGE * kappa
     rise = _residual(law, surface, r, c, kappa + nudge) - f
     # Without a push there is nothing to solve.
     pushes = kappa != 0.0
     step = f * nudge / select(pushes, rise, 1.0)
-    other, more = improve(chain.rest, wall - 1.0, law, r, c, kappa)
-    here = wall == 0.0
     # True for NaN.
-    mine = pushes & (not (abs(step) <= _TOLERANCE * abs(kappa)))
-    return select(here, step, other), (here & mine) | ((not here) & more)
+    return step, pushes & (not (abs(step) <= _TOLERANCE * abs(kappa)))
 
 
-@improve.register(Nothing)
-def _(chain, wall, law, r, c, kappa):
-    return 0.0, False
+# Of all walls: (chain, wall, law, r, c) and (chain, wall, law, r, c, kappa).
+guess = of_wall(_guess, 0.0)
+improve = of_wall(_improve, (0.0, False))
 
 
 @by_type
 def reached(chain, wall, r, kappa):
-    """s"""
+    """s; r where there is no such wall."""
     raise NotImplementedError
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, outlined, select
 from ..surfaces import contract
-from ..surfaces.fold import Chain
+from ..surfaces.fold import of_wall
 from . import regularisation as law_of
 
 # A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
@@ -106,14 +106,29 @@ def _(multiplier, surface, r, q0):
 
 
 @by_type
-def guess(chain, wall, law, step):
-    """kappa of a wall if it were flat and the spring linear."""
+def loop_record(multiplier, law, g0, g1, g, factor):
+    """The `LoopRecord` of the step that ends at gap g; without a multiplier zeros.
+
+    dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
+    """
     raise NotImplementedError
 
 
-@guess.register(Chain)
-def _(chain, wall, law, step):
-    surface = chain.first
+@loop_record.register(Nothing)
+def _(multiplier, law, g0, g1, g, factor):
+    return LoopRecord(0.0, 0.0, 0.0)
+
+
+@loop_record.register(float)
+def _(multiplier, law, g0, g1, g, factor):
+    slope, _curvature = law_of.constraint_slope(law, g0, g1)
+    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
+    return LoopRecord(mean, law_of.stored_energy(law, g), factor * slope)
+
+
+@inlined
+def _guess(surface, law, step):
+    """kappa if the wall were flat and the spring linear."""
     q0 = contract.inner(surface, step.r)
     g0 = contract.gap_of(surface, q0)
     rise, drise = contract.rise(surface, step.r, step.p, 0.0)
@@ -134,30 +149,16 @@ def _(chain, wall, law, step):
     root = math.sqrt(select(square > 0.0, square, 0.0))
     entered = 0.5 * (total + root) * inverse
     g1 = select(entering, entered, select(staying > 0.0, staying, 0.5 * (total - root)))
-    other = guess(chain.rest, wall - 1.0, law, step)
-    # LLVM turns a select between a quotient and a constant into a branch, and then does not vectorise the lane loop.
-    here = wall == 0.0
-    return select(here, gf - g1, other) / select(here, e, 1.0)
+    return (gf - g1) / e
 
 
-@guess.register(Nothing)
-def _(chain, wall, law, step):
-    return 0.0
-
-
-@by_type
-def improve(chain, wall, law, multiplier, step, kappa):
-    """The `Newton` step of kappa of a wall.
+@inlined
+def _improve(surface, law, multiplier, step, kappa):
+    """The `Newton` step of kappa.
 
     What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1 is
     a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
     """
-    raise NotImplementedError
-
-
-@improve.register(Chain)
-def _(chain, wall, law, multiplier, step, kappa):
-    surface = chain.first
     start = start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
     f = _residual(law, multiplier, surface, step, start, kappa)
     change = f.value / f.slope
@@ -166,34 +167,12 @@ def _(chain, wall, law, multiplier, step, kappa):
     # True for NaN.
     more = not (abs(change * f.gap_slope) <= start.tolerance * depth + 2.0 * start.round_off)
     record = loop_record(multiplier, law, g0, g1, g1 - change * f.gap_slope, step.c * f.rise_slope / f.slope)
-    other = improve(chain.rest, wall - 1.0, law, multiplier, step, kappa)
-    return select(wall == 0.0, Newton(change, more, record), other)
+    return Newton(change, more, record)
 
 
-@improve.register(Nothing)
-def _(chain, wall, law, multiplier, step, kappa):
-    return Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0))
-
-
-@by_type
-def loop_record(multiplier, law, g0, g1, g, factor):
-    """The `LoopRecord` of the step that ends at gap g; without a multiplier zeros.
-
-    dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
-    """
-    raise NotImplementedError
-
-
-@loop_record.register(Nothing)
-def _(multiplier, law, g0, g1, g, factor):
-    return LoopRecord(0.0, 0.0, 0.0)
-
-
-@loop_record.register(float)
-def _(multiplier, law, g0, g1, g, factor):
-    slope, _curvature = law_of.constraint_slope(law, g0, g1)
-    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
-    return LoopRecord(mean, law_of.stored_energy(law, g), factor * slope)
+# Of all walls: (chain, wall, law, step) and (chain, wall, law, multiplier, step, kappa).
+guess = of_wall(_guess, 0.0)
+improve = of_wall(_improve, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)))
 
 
 @inlined

@@ -44,6 +44,33 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
 
 
 @inlined
+def _start_of(surface, r):
+    return impulse.start_gap(0.0, surface, r, contract.inner(surface, r))
+
+
+@inlined
+def _has_limit(surface, law, r):
+    """Whether the loop has a limit: State I with Phi'(0) > 0.
+
+    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
+    """
+    return (_start_of(surface, r).gap == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
+
+
+@inlined
+def _multiplier_of(surface, law, r, c, kappa):
+    """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
+    start = _start_of(surface, r)
+    slope, _curvature = contract.gap_slope(surface, start.q, start.q)
+    return select(start.gap == 0.0, kappa / (c * slope * law_of.constraint_gradient(law, 0.0)), 0.0)
+
+
+# Of all walls: (chain, wall, law, r) and (chain, wall, law, r, c, kappa).
+has_limit = walls.of_wall(_has_limit, False)
+multiplier_of = walls.of_wall(_multiplier_of, 0.0)
+
+
+@inlined
 def reflection(chain, wall, law, step):
     """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
     kappa = walls.chord_guess(chain, wall, step.r, step.p)
@@ -52,32 +79,6 @@ def reflection(chain, wall, law, step):
     multiplier = multiplier_of(chain, wall, law, step.r, step.c, kappa)
     good = (multiplier > 0.0) & (multiplier < math.inf)
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
-
-
-@inlined
-def _start_of(surface, r):
-    return impulse.start_gap(0.0, surface, r, contract.inner(surface, r))
-
-
-@by_type
-def has_limit(chain, wall, law, r):
-    """Whether the loop has a limit for a wall: State I with Phi'(0) > 0.
-
-    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
-    """
-    raise NotImplementedError
-
-
-@has_limit.register(walls.Chain)
-def _(chain, wall, law, r):
-    here = (_start_of(chain.first, r).gap == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
-    other = has_limit(chain.rest, wall - 1.0, law, r)
-    return ((wall == 0.0) & here) | ((wall != 0.0) & other)
-
-
-@has_limit.register(Nothing)
-def _(chain, wall, law, r):
-    return False
 
 
 @by_type
@@ -97,26 +98,6 @@ def _(chain, wall, law, r, p):
 @meets_later.register(Nothing)
 def _(chain, wall, law, r, p):
     return False
-
-
-@by_type
-def multiplier_of(chain, wall, law, r, c, kappa):
-    """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
-    raise NotImplementedError
-
-
-@multiplier_of.register(walls.Chain)
-def _(chain, wall, law, r, c, kappa):
-    start = _start_of(chain.first, r)
-    slope, _curvature = contract.gap_slope(chain.first, start.q, start.q)
-    multiplier = kappa / (c * slope * law_of.constraint_gradient(law, 0.0))
-    other = multiplier_of(chain.rest, wall - 1.0, law, r, c, kappa)
-    return select(wall == 0.0, select(start.gap == 0.0, multiplier, 0.0), other)
-
-
-@multiplier_of.register(Nothing)
-def _(chain, wall, law, r, c, kappa):
-    return 0.0
 
 
 class Before(NamedTuple):
