@@ -32,9 +32,7 @@ def _(unknown, method, chain, gravity, multipliers, lanes, live):
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if methods.turns(method):
         for i in range(live):
-            turned = methods.turn(
-                method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], lanes.kappa[i]
-            )
+            turned = methods.turn(method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], lanes.kappa[i])
             put(lanes.turned, 0, i, turned.v)
             lanes.turned[3, i] = turned.impulse
 

@@ -16,6 +16,7 @@ and one with a multiplier the three functions of Uzawa's loop. examples/own_meth
 
 from typing import Any, NamedTuple
 
+from ..contact.impulse import LoopRecord
 from ..contact.reflection import Turned
 from ..kernel.jit import by_type, by_type_outlined
 from ..kernel.vector import ZERO, Vec
@@ -50,14 +51,6 @@ class Solution(NamedTuple):
     kappa: float
     unsolved: bool
     turned: Turned
-
-
-class LoopRecord(NamedTuple):
-    """What the loop of a multiplier asks of a sweep of the solve: (Phi0 + Phi1)/2, V1, dkappa/dlambda."""
-
-    mean: float
-    stored: float
-    gain: float
 
 
 NO_RECORD = LoopRecord(0.0, 0.0, 0.0)
@@ -156,7 +149,7 @@ def most_sweeps(method, chain):
 @by_type
 def solves(method):
     """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
-    return None
+    return
 
 
 @guess.implies(solves)

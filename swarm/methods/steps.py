@@ -171,9 +171,7 @@ def _(method, chain, gravity, lane, hit):
     # A hit in the last instant of a frame is met again in the next one.
     met = met & (hit.wall >= 0.0) & (left > 0.0)
     wall = select(nested(method.form), contract.HARD - hit.wall, hit.wall)
-    return contract.Flight(
-        select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0)
-    )
+    return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
 
 
 @step_of.register(CutSteps)
