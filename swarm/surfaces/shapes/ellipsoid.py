@@ -9,10 +9,10 @@ from ...checks import Vector, length, vector
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
 from .. import contract
-from ..course import level_and_window
+from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
 from . import quadratic
-from .quadratic import ConvexQuadric, QuadricNumbers, form, turning, widths
+from .quadratic import QuadricNumbers, form, parabola, turning, widths
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,8 +62,8 @@ class EllipsoidNumbers(QuadricNumbers):
     """A quadric without a linear term, of level 1."""
 
 
-class EllipsoidCavity(EllipsoidNumbers, ConvexQuadric):
-    """A cavity: no flight in it is far from its wall."""
+class EllipsoidCavity(EllipsoidNumbers):
+    """A cavity: every flight in it meets the wall."""
 
 
 @quadratic.linear.register(EllipsoidNumbers)
@@ -78,6 +78,12 @@ def _(surface, u, k):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
+
+
+@contract.first_hit.register(EllipsoidCavity)
+def _(surface, r, v):
+    c, b, a = parabola(surface, r, v)
+    return rise_time_inside(c, b, a), True
 
 
 @quadratic.discriminant.register(EllipsoidNumbers)

@@ -124,7 +124,7 @@ def _(surface, r):
 
 
 @inlined
-def _parabola(surface, r, v):
+def parabola(surface, r, v):
     """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
     b = form(surface.a, r - surface.center, v) + 0.5 * linear(surface, v)
     return contract.phi(surface, r), b, form(surface.a, v, v)
@@ -132,13 +132,13 @@ def _parabola(surface, r, v):
 
 @contract.first_hit.register(ConvexQuadric)
 def _(surface, r, v):
-    c, b, a = _parabola(surface, r, v)
+    c, b, a = parabola(surface, r, v)
     return rise_time_inside(surface.side * c, surface.side * b, surface.side * a), True
 
 
 @contract.first_hit.register(QuadricNumbers)
 def _(surface, r, v):
-    c, b, a = _parabola(surface, r, v)
+    c, b, a = parabola(surface, r, v)
     d = discriminant(surface, r - surface.center, v, c, b, a)
     return rise_time_by(surface.side * c, surface.side * b, surface.side * a, d), True
 
@@ -166,7 +166,7 @@ def turning(a, w):
 def _(surface, r, v, pull):
     # phi(r + v t + G t^2/2), a quartic in t
     d, side = r - surface.center, surface.side
-    c, b, a = _parabola(surface, r, v)
+    c, b, a = parabola(surface, r, v)
     a2 = a + form(surface.a, d, pull) + 0.5 * linear(surface, pull)
     a3, a4 = form(surface.a, v, pull), 0.25 * form(surface.a, pull, pull)
     c, window = level_window(surface, c, d, v, pull)
