@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.surfaces import rotation
-from swarm.surfaces.chain import chain_of
 from swarm.surfaces.flights import first_hit
+from swarm.surfaces.fold import chain_of
 from swarm.surfaces.shapes.plane import PlaneNumbers
 from swarm.surfaces.shapes.slab import SlabNumbers
 

@@ -87,6 +87,7 @@ def _(surface, r):
 
 
 @contract.gradient.register(QuadricNumbers)
+@contract.slope.register(QuadricNumbers)
 def _(surface, r):
     return tilted(surface, times(2.0 * surface.a, r - surface.center), 1.0)
 
