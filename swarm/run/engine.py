@@ -64,7 +64,7 @@ class Run:
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._halt = np.full(1, blocks.NEVER)
         self._done = np.zeros(n, np.bool_)
-        self._halted = lanes.nobody(len(self._owners))
+        self._halted = lanes.none_halted(len(self._owners))
         self._cut_short = False
         self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
@@ -141,7 +141,7 @@ class Run:
         if status == Status.INTERRUPTED:
             self._keep([left for *_, left in ends if left is not None])
         elif span > 0.0:
-            self._halted = lanes.nobody(len(self._owners))
+            self._halted = lanes.none_halted(len(self._owners))
             self._pace = (time.perf_counter() - began) * (others + helps) / span
         return status, particle
 
@@ -161,10 +161,10 @@ class Run:
         draws = lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64))
         # Without the compiler too, a division by zero is an infinity that a select throws away.
         with np.errstate(divide="ignore", invalid="ignore"):
+            share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
             status, particle, drawn = blocks.advance_block(
-                self._method, self._chain, self._gravity, self._hard, self.state, self._done, self._halted,
-                span, draws, self._halt, mine,
-            )  # fmt: skip
+                self._method, self._chain, self._gravity, self._hard, share, mine
+            )
             if status == Status.DONE:
                 drawn_here = draws.mine[:drawn]
                 observables.observe(

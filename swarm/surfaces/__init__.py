@@ -1,8 +1,6 @@
 """The surfaces by their kind in a scene file."""
 
 # These only register their definitions.
-from . import smooth as _smooth  # noqa: F401
-from .base import Surface
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes import rotated as _rotated  # noqa: F401
@@ -17,6 +15,7 @@ from .shapes.quadric import Quadric
 from .shapes.slab import Slab
 from .shapes.sphere import Sphere
 from .shapes.torus import Torus
+from .surface import Surface
 
 __all__ = [
     "ALL_SURFACES",

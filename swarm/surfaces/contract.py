@@ -20,7 +20,7 @@ an inner function other than phi registers `inner`, `slope`, `gap_of`, `level_of
 import math
 
 from ..kernel.jit import by_type, inlined, outlined, select
-from ..kernel.vector import Symmetric, Vec, absolute, dot, largest, norm, square, times, total
+from ..kernel.vector import Vec, absolute, dot, largest, norm, square, times, total
 from .course import Quartic, first_rise, rise_time, safe_rise_time
 
 _EPSILON = 2.220446049250313e-16
