@@ -68,8 +68,8 @@ def _sweep(chain, form, law, multipliers, k, step, reactions):
 @_sweep.register(Chain)
 def _(chain, form, law, multipliers, k, step, reactions):
     reactions[k] = 0.0
-    rest = Step(step.r, step.p - total(reactions), step.c)
-    found = reaction(form, law, multiplier_of(multipliers, k), chain.first, rest)
+    remaining = Step(step.r, step.p - total(reactions), step.c)
+    found = reaction(form, law, multiplier_of(multipliers, k), chain.first, remaining)
     held = found.vector
     reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = held.x, held.y, held.z, found.constraint
     return _sweep(chain.rest, form, law, multipliers, k + 1, step, reactions) and found.solved

@@ -159,7 +159,7 @@ def _(form, law, multiplier, surface, step):
                 break
             low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
     # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
-    # identity asks for along grad q(r_beta) meets it whatever beta is.
+    # identity requires along grad q(r_beta) meets it whatever beta is.
     r, change = _balanced(law, multiplier, surface, step, beta, kappa)
     return Reaction(r, _constraint(law, surface, step.r + step.p - r), found and change <= _NEARLY)
 

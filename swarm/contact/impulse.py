@@ -234,7 +234,7 @@ def _(multiplier, size, df):
 
 @_first_push.register(float)
 def _(multiplier, size, df):
-    # The right side of (K) jumps where a multiplier lets go; Newton's step is no guide to that.
+    # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to that.
     return size
 
 

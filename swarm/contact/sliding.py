@@ -1,4 +1,4 @@
-"""Impacts that follow one another too quickly to be told apart: grazing, rolling along a wall, resting, corners, cusps.
+"""Impacts that follow one another too quickly to be resolved: grazing, rolling along a wall, resting, corners, cusps.
 
 A sliding step of length h holds the particle on every wall it touches: with w0 = v0 + h G/2 and P the projection of
 w0 on the directions that no touched wall forbids, r1 = r0 + h P and w1 = 2 P - w0. P and w0 - P are orthogonal
