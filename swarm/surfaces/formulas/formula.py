@@ -103,6 +103,7 @@ class Formula(base.Surface):
         if size is None:
             size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
         kind = own.code_of(_Flat(values), code.phi, code.gradient, code.hessian)
+        kind.same_in_python = all(part.same_in_python for part in (code.phi, code.gradient, code.hessian))
         form = Form(kind, values, box, size, self.side)
         if box is not None:
             form.check()
