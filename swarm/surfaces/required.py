@@ -92,7 +92,7 @@ def _names_in(definition: types.FunctionType) -> Iterator[str]:
         called = getattr(contract, name, None)
         is_helper = isinstance(called, types.FunctionType) and not hasattr(called, "dispatch")
         if is_helper and called.__module__ == contract.__name__:
-            yield from _names_in(called)
+            yield from _names_in(called)  # type: ignore[arg-type]
 
 
 def _gives(wall: Any, function: Any) -> bool:
