@@ -151,7 +151,7 @@ def start(method, law, chain, step, multipliers):
     """The multipliers that the loop starts from."""
     multipliers[:] = 0.0
     touched = walls.touched(chain, step.r, step.p)
-    if method.acceleration == REFLECTION and touched.count == 1.0:
+    if method.acceleration == REFLECTION and touched.number == 1.0:
         _kappa, multiplier = reflection(chain, touched.wall, law, step)
         multipliers[int(touched.wall)] = multiplier
 

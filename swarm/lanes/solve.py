@@ -5,6 +5,8 @@ Each sweep is one loop over all lanes without branches; lanes that are solved st
 
 import numpy as np
 
+from ..contact.impulse import LoopRecord
+from ..contact.reflection import Turned
 from ..contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, kept, select
@@ -52,7 +54,7 @@ def solution(unknown, method, lanes, i):
 def _(unknown, method, lanes, i):
     turned = methods.NOT_TURNED
     if methods.turns(method):
-        turned = methods.Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
+        turned = Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
     return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
 
@@ -102,7 +104,7 @@ def _update_multipliers(method, lanes, live):
         old = kept(record[MULTIPLIER, i])
         new, miss, more = methods.next_multiplier(
             method, lanes.rows[LEFT, i], record[ACCELERATION, i], old,
-            methods.LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
+            LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
             methods.Sweep(record[BEFORE, i], record[MISS, i]),
         )  # fmt: skip
         going = sweeping[i]

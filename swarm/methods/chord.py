@@ -1,4 +1,4 @@
-"""The contact step of `Impact`: a chord of the surface, of a length chosen by the user, and what follows short flights."""
+"""The contact step of `Impact`, a chord of the surface, and what follows short flights."""
 
 from typing import NamedTuple
 

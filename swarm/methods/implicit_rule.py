@@ -80,7 +80,7 @@ def _(method, chain, gravity, lane):
     touched = walls.touched(chain, start.r, reach(method.rule, method.dt, method.law, chain, gravity, free))
     # Several walls at once: the careful way.
     p = displacement(gravity, start.v, method.dt)
-    return fixed_step.before_step(method, start, touched, touched.count <= 1.0, p)
+    return fixed_step.before_step(method, start, touched, touched.number <= 1.0, p)
 
 
 @contract.most_sweeps.register(RuleNumbers)

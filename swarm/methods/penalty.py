@@ -35,10 +35,10 @@ class Penalty(fixed_step.SoftWalls):
 
     Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt: a contact step counts only
     if its energy balances, and one that cannot be solved (a step longer than the cavity into several walls at once)
-    ends the run with an error. Walls are compliant: a particle is up to |v| sqrt(m/alpha) deep in one for a = 1. Order: 2 in dt. Cost: free
-    steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps look at the gap at their
-    ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the edge of a solid that is
-    shorter than |v| dt.
+    ends the run with an error. Walls are compliant: for a = 1 a particle is up to |v| sqrt(m/alpha) deep in one.
+    Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
+    look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
+    edge of a solid that is shorter than |v| dt.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
@@ -103,7 +103,7 @@ def _(method, chain, gravity, lane):
     p = displacement(gravity, start.v, method.dt)
     touched = walls.touched(chain, start.r, p)
     # Several walls at once, or nested solves: the careful way.
-    alone = (touched.count <= 1.0) & (not nested(method.form))
+    alone = (touched.number <= 1.0) & (not nested(method.form))
     return fixed_step.before_step(method, start, touched, alone, p)
 
 

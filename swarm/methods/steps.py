@@ -112,11 +112,11 @@ def _(method, chain, gravity, lane):
     start = fixed_step.free_steps(chain, gravity, method.dt, lane)
     p = displacement(gravity, start.v, method.dt)
     touched = walls.touched(chain, start.r, p)
-    alone = (touched.count <= 1.0) & (not nested(method.form))
+    alone = (touched.number <= 1.0) & (not nested(method.form))
     end = fixed_step.before_step(method, start, touched, alone, p)
     # A step that touches nothing is no contact.
     jumps = fixed_step.too_fast(method.longest, p)
-    return contract.Flight(end.r, end.v, end.left, select((touched.count > 0.0) | jumps, end.wall, -1.0))
+    return contract.Flight(end.r, end.v, end.left, select((touched.number > 0.0) | jumps, end.wall, -1.0))
 
 
 @step_of.register(FixedSteps)

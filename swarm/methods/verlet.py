@@ -82,7 +82,7 @@ def _(method, chain, gravity, lane):
     p = displacement(gravity, start.v, method.dt)
     touched = walls.touched(chain, start.r, p)
     # Impulses of several walls at once: one by one.
-    return fixed_step.before_step(method, start, touched, touched.count <= 1.0, p)
+    return fixed_step.before_step(method, start, touched, touched.number <= 1.0, p)
 
 
 class VerletStep(NamedTuple):

@@ -195,7 +195,7 @@ class Touched(NamedTuple):
     """The first wall that a step is in contact with, or -1, and how many there are."""
 
     wall: float
-    count: float
+    number: float
 
 
 @by_type
@@ -211,8 +211,8 @@ def _(chain, r, p):
     after = contract.level_of(surface, contract.inner(surface, r + p))
     contact = (before > 0.0) | (after > 0.0)
     rest = touched(chain.rest, r, p)
-    later = select(rest.count > 0.0, rest.wall + 1.0, -1.0)
-    return Touched(select(contact, 0.0, later), rest.count + select(contact, 1.0, 0.0))
+    later = select(rest.number > 0.0, rest.wall + 1.0, -1.0)
+    return Touched(select(contact, 0.0, later), rest.number + select(contact, 1.0, 0.0))
 
 
 @touched.register(Nothing)

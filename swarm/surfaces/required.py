@@ -90,13 +90,13 @@ def _names_in(definition: types.FunctionType) -> Iterator[str]:
     for name in definition.__code__.co_names:
         yield name
         called = getattr(contract, name, None)
-        if isinstance(called, types.FunctionType) and called.__module__ == contract.__name__:
-            if not hasattr(called, "dispatch"):
-                yield from _names_in(called)
+        is_helper = isinstance(called, types.FunctionType) and not hasattr(called, "dispatch")
+        if is_helper and called.__module__ == contract.__name__:
+            yield from _names_in(called)  # type: ignore[arg-type]
 
 
 def _gives(wall: Any, function: Any) -> bool:
-    return function.dispatch(type(wall)).__module__ != contract.__name__
+    return bool(function.dispatch(type(wall)).__module__ != contract.__name__)
 
 
 def _named(function: Any) -> str:

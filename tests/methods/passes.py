@@ -7,13 +7,11 @@ import numpy as np
 from conftest import call
 
 import swarm
-from swarm import observables
 from swarm.contact import energy as energies
 from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
 from swarm.kernel.gravity import potential
 from swarm.kernel.vector import vec
-from swarm.lanes import block as blocks
 from swarm.methods import contract
 from swarm.status import Status
 from swarm.surfaces import flights
@@ -101,15 +99,4 @@ def run(method, scene, position, velocity, left, mass=1.0, restores=True):
 
 def simulate(scene, particles, method, until, every=None):
     """`swarm.simulate` without the compiler."""
-    with (
-        mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
-        mock.patch.multiple(
-            observables, start_energies=_plain(observables.start_energies), observe=_plain(observables.observe)
-        ),
-        np.errstate(all="ignore"),
-    ):
-        return swarm.simulate(scene, particles, method, until=until, every=every, threads=1)
-
-
-def _plain(kernel):
-    return getattr(kernel, "py_func", kernel)
+    return swarm.simulate(scene, particles, method, until=until, every=every, compile="never")

@@ -16,7 +16,7 @@ from conftest import call
 
 import swarm
 from swarm import tables
-from swarm.kernel import jit as _jit
+from swarm.kernel import cache
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
 from swarm.surfaces import contract
@@ -503,8 +503,8 @@ def test_processes_that_share_a_cache_do_not_break_one_another(run):
 SIMULATE = """
 particles = swarm.Particles([[0.1], [0.2], [0.05]], [[0.3], [-0.2], [0.1]])
 result = swarm.simulate(swarm.Scene([surface]), particles, swarm.Impact(), until=20.0)
-from swarm.lanes import block
-stats = block.advance_block.stats
+from swarm.lanes import block as blocks
+stats = blocks.advance_block.stats
 print(result.particles.position[0, 0], sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 sys.exit()
 """
@@ -530,4 +530,4 @@ def test_sympy_is_loaded_only_for_a_formula():
 
 def test_kernels_of_the_package_are_known_by_its_folder():
     assert "swarm" in code._VERSIONS
-    assert _jit.cache_folder().name == _jit._source_hash()
+    assert cache.cache_folder().name == cache._source_hash()

@@ -160,6 +160,7 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
     lines = [f"def {name}(p, x, y, z):", *writer.lines, f"return {results}"]
     scope: dict[str, Any] = {"np": np, "__name__": __name__}
     exec("\n    ".join(lines), scope)
+    scope[name].same_in_python = writer.same_in_python
     return scope[name]
 
 
@@ -167,6 +168,8 @@ class _Writer:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.known: dict[Any, str] = {}
+        # Whether there is only + - * / and sqrt.
+        self.same_in_python = True
 
     def name_of(self, expression: Any) -> str:
         """The name that holds an expression, or the number itself."""
@@ -190,6 +193,7 @@ class _Writer:
             return self._product(expression)
         if expression.is_Pow:
             return self._power(self.name_of(expression.base), expression.exp)
+        self.same_in_python = False
         return self._assign(f"np.{expression.func.__name__}({self.name_of(expression.args[0])})")
 
     def _product(self, expression: Any) -> str:
@@ -205,6 +209,7 @@ class _Writer:
         if exponent < 0:
             return self._assign(f"1.0 / {self._power(base, -exponent)}")
         if not (2 * exponent).is_Integer:
+            self.same_in_python = False
             return self._assign(f"{base} ** {_literal(exponent)}")
         factors = [self._assign(f"np.sqrt({base})")] if not exponent.is_Integer else []
         n, square = int(exponent), base

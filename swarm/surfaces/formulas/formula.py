@@ -76,8 +76,10 @@ class Formula(FormSurface):
         box, size = self.box or exact.found_box(), self.length
         if size is None:
             size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
-        parameters = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])(*values)  # type: ignore[misc]
-        form = Form(class_of(parameters, *code.functions), values, box, size, self.side)
+        make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
+        kind = class_of(make(*values), *code.functions)
+        kind.same_in_python = all(part.same_in_python for part in code.functions)
+        form = Form(kind, values, box, size, self.side)
         if box is not None:
             form.check()
         exact.check(form, needs_box=self.curvature is None)
