@@ -1,6 +1,7 @@
 """Formulas against the surfaces they describe, and the bounds that make their first hits sure."""
 
 import math
+import types
 
 import numpy as np
 import pytest
@@ -47,14 +48,14 @@ def test_derivatives(text):
 
 def test_small_powers_are_products(monkeypatch):
     written = []
-    monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_none()))
+    monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_functions()))
     derivatives.derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
     assert written
     assert not any("**" in text for text in written)
 
 
-def _none():
-    return dict.fromkeys(("phi", "gradient", "hessian"))
+def _functions():
+    return {name: types.SimpleNamespace() for name in ("phi", "gradient", "hessian")}
 
 
 # --- Against the surfaces with a closed form -------------------------------------------------------------

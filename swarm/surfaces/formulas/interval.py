@@ -129,7 +129,6 @@ def _bounds_of(expression: Any, known: dict[Any, Interval]) -> Interval:
         return getattr(first, name)()  # type: ignore[no-any-return]
     if name == "log":
         return first.above_zero(np.log)
-    # exp is a function here, and a power for SymPy only where its exponent is a number.
     assert name in ("exp", "sinh", "cosh", "tanh"), name
     return first.monotonic(getattr(np, name), bottom=1.0 if name == "cosh" else None)
 

@@ -97,9 +97,9 @@ class OwnSurface(FormSurface):
         return {"kind": "own", **{key: value for key, value in given.items() if value is not None}}
 
 
-# --- Whether it compiles ---------------------------------------------------------------------------------
+# --- Does it compile? ---------------------------------------------------------------------------------
 
-# Lines of Numba's errors that say where it was, not what the matter is.
+# Lines of Numba's errors that tell the place, not the cause.
 _WHERE = re.compile(
     r"\s*(>>>|There (are|is) |- |Overload |Intrinsic |With argument|Rejected|During|raised from|File |No match|"
     r"<source|Enable|$)|.*(Failed in nopython|No implementation of function)"
@@ -117,7 +117,7 @@ def _compiled_gradient(surface, r):
 
 
 def require_compiled(surfaces: Sequence[Surface]) -> None:
-    """Raise a `SceneError` where Numba cannot compile a function: in a moment, before half a minute of a kernel."""
+    """Raise a `SceneError` where Numba cannot compile a function: sooner than a kernel, which takes half a minute."""
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return
     for surface in surfaces:
@@ -134,9 +134,9 @@ def require_compiled(surfaces: Sequence[Surface]) -> None:
 
 
 def _not_compiled(name: str, message: str) -> SceneError:
-    """The error about a function of that name, with the first line of Numba's message that says what the matter is."""
+    """The error about a function of that name, with the first line of Numba's message that tells the cause."""
     lines = [line.strip() for line in message.splitlines() if not _WHERE.match(line)]
-    matter = lines[0] if lines else message.strip().splitlines()[0]
-    if "NRT required" in matter or "Only accept returning of array" in matter:
-        matter = "it makes a list or an array, for which kernels have no memory"
-    return SceneError(f"{name} must be a function of numbers that Numba can compile, got one that it cannot: {matter}")
+    cause = lines[0] if lines else message.strip().splitlines()[0]
+    if "NRT required" in cause or "Only accept returning of array" in cause:
+        cause = "it makes a list or an array, for which kernels have no memory"
+    return SceneError(f"{name} must be a function of numbers that Numba can compile, got one that it cannot: {cause}")
