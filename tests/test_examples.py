@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 from conftest import METHODS
 
@@ -77,6 +78,44 @@ def test_it_prints_energy_drift_and_impacts():
     impacts, drift = (float(part.split()[0]) for part in printed.replace("energy drift", "").split(","))
     assert impacts > 10
     assert drift < 1e-14
+
+
+KERNEL = """
+from own_surface import Superellipsoid
+from swarm.kernel.jit import kernel
+from swarm.kernel.vector import Vec
+from swarm.surfaces import contract
+
+@kernel
+def time_of_hit(surface, r, v):
+    return contract.first_hit(surface, r, v)[0]
+
+numbers = Superellipsoid((0.3, 0.4, 0.5)).numbers()
+print(time_of_hit(numbers, Vec(0.0, 0.0, 0.0), Vec(1.0, 0.0, 0.0)), sum(time_of_hit.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
+def test_a_kernel_of_an_edited_surface_is_never_an_old_one(tmp_path):
+    """The cache of the package's kernels knows the definitions outside of it, their helpers too."""
+    text = FILE.read_text()
+    (tmp_path / "main.py").write_text(KERNEL)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
+
+    def run(old="", new=""):
+        (tmp_path / "own_surface.py").write_text(text.replace(old, new))
+        command = [sys.executable, str(tmp_path / "main.py")]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[-3000:]
+        time, hits = done.stdout.split()
+        return pytest.approx(float(time), rel=1e-12), int(hits)
+
+    assert run() == (0.3, 0)
+    assert run() == (0.3, 1)
+    assert run("0.0)) - 1.0", "0.0)) - 16.0") == (0.6, 0)
+    assert run("(r.x / a.x)", "(0.5 * r.x / a.x)") == (0.6, 0)
+    assert run() == (0.3, 1)
 
 
 def test_it_is_short():

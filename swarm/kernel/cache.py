@@ -9,12 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba import types
 from numba.core import event
+from numba.core.caching import FunctionCache
 
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
 _COMPILING = "compiling kernels for this scene, once: {}"
 _kernels: list[Any] = []
+# The definitions that code outside of this package has registered, by their class.
+_outside: dict[Any, list[Callable[..., Any]]] = {}
 
 
 def _source_hash() -> str:
@@ -47,10 +51,38 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     _CONFIG.CACHE_DIR = str(_CACHE)
     try:
         made = numba.njit(cache=True, **flags)(function)
+        if made is not function:
+            made._cache = _Cache(function)
     finally:
         _CONFIG.CACHE_DIR = previous
     _kernels.append(made)
     return made
+
+
+def registered(kind: Any, definition: Callable[..., Any]) -> None:
+    """Note a definition for a class: the folder's name covers no code outside of this package."""
+    if str(definition.__module__).partition(".")[0] != "swarm":
+        _outside.setdefault(kind, []).append(definition)
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """A kernel of a class with such definitions is found only where they are the same."""
+
+    def _index_key(self, kinds: Any, codegen: Any) -> Any:
+        return (*super()._index_key(kinds, codegen), *_digests(kinds))
+
+
+def _digests(kinds: Any) -> Iterator[str]:
+    from .frozen import Frozen  # which uses the compiler, which uses this module
+
+    for kind in kinds:
+        if isinstance(kind, types.BaseTuple):
+            frozen = Frozen()
+            for parent in getattr(kind, "instance_class", tuple).__mro__:
+                for definition in _outside.get(parent, ()):
+                    frozen.value(definition)
+                    yield frozen.digest()
+            yield from _digests(kind.types)  # type: ignore[attr-defined]
 
 
 def in_python(kernel: Any) -> Any:

@@ -125,6 +125,7 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
                 f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
             )
         known(kind, definition)
+        cache.registered(kind, made)
         for other, derived in implied:
             if kind is not object and other.dispatch(kind) is other.dispatch(object):
                 other.register(kind, derived)

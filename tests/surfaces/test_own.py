@@ -16,7 +16,7 @@ from conftest import call
 
 import swarm
 from swarm import tables
-from swarm.kernel import cache
+from swarm.kernel import cache, frozen
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
 from swarm.surfaces import contract
@@ -275,7 +275,7 @@ def test_what_numba_cannot_compile_is_one_sentence(functions, parts, tmp_path):
 
 
 def digest(function):
-    found = code.Frozen()
+    found = frozen.Frozen()
     found.function(function)
     return found.digest()
 
@@ -529,5 +529,5 @@ def test_sympy_is_loaded_only_for_a_formula():
 
 
 def test_kernels_of_the_package_are_known_by_its_folder():
-    assert "swarm" in code._VERSIONS
+    assert "swarm" in frozen._VERSIONS
     assert cache.cache_folder().name == cache._source_hash()

@@ -1,0 +1,130 @@
+"""A function that is not of this package, frozen: a copy of it and of all it refers to, and a digest of the two.
+
+What is compiled is the copy, so code that is found again by its digest is the code that was digested: after an edit
+anywhere, or when a global changes, the digest is another one.
+"""
+
+import builtins
+import contextlib
+import dis
+import hashlib
+import operator
+import os
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numba
+import numpy as np
+
+from .jit import inlined
+
+Function = Callable[..., Any]
+_PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
+# Modules that are known by their version; any other is known by what the function takes from it. The cache folder is
+# named by a hash of this package.
+_VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__, "swarm": ""}
+_CODE = operator.attrgetter(
+    "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
+    "co_kwonlyargcount", "co_posonlyargcount",
+)  # fmt: skip
+
+
+class Frozen:
+    """Copies of functions and of everything they refer to, and the digest of all of them together."""
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+        self._copies: dict[Function, Function] = {}
+
+    def digest(self) -> str:
+        """16 hexadecimal digits of what was frozen so far."""
+        return self._hash.hexdigest()[:16]
+
+    def function(self, function: Function) -> Function:
+        """A copy of a function, which kernels can call."""
+        function = getattr(function, "py_func", function)
+        assert isinstance(function, types.FunctionType)
+        if function in self._copies:
+            self._add("again", list(self._copies).index(function))
+            return self._copies[function]
+        code = function.__code__
+        # Numba finds the module of a function again by this name when it loads a kernel.
+        scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
+        cells = tuple(types.CellType() for _ in code.co_freevars)
+        copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
+        for part in _parts(code):
+            constants = [one for one in part.co_consts if not isinstance(one, types.CodeType)]
+            self._add(*_CODE(part))
+            self._add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
+        copy.__defaults__ = self.value(function.__defaults__)
+        self._add(*sorted((function.__kwdefaults__ or {}).items()))
+        copy.__kwdefaults__ = function.__kwdefaults__
+        for cell, original in zip(cells, function.__closure__ or (), strict=True):
+            # A cell is empty where the name has no value yet: its use fails as it would have.
+            with contextlib.suppress(ValueError):
+                cell.cell_contents = self.value(original.cell_contents, code)
+        # The names in the code alone are those of attributes too.
+        instructions = (one for part in _parts(code) for one in dis.get_instructions(part))
+        for name in sorted({one.argval for one in instructions if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}):
+            self._add("global", name)
+            if name in function.__globals__:
+                scope[name] = self.value(function.__globals__[name], code)
+        return inlined(copy)
+
+    def value(self, value: Any, code: types.CodeType | None = None) -> Any:
+        """A copy of what a function refers to; `code` says which of a module's names it takes."""
+        if type(value) in _PLAIN or isinstance(value, np.generic):
+            self._add(type(value).__name__, value)
+        elif isinstance(value, tuple) and (type(value) is tuple or hasattr(value, "_fields")):
+            self._add(type(value).__name__, getattr(value, "_fields", None), len(value))
+            parts = [self.value(part, code) for part in value]
+            return tuple(parts) if type(value) is tuple else type(value)(*parts)
+        elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
+            self._add("array", value.dtype.str, value.shape, value.strides, value.tobytes())
+            return value.copy(order="K")
+        elif _root(value) in _VERSIONS:
+            self._add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS[_root(value)])
+        elif isinstance(getattr(value, "py_func", value), types.FunctionType):
+            return self.function(value)
+        elif isinstance(value, types.ModuleType) and code is not None:
+            return self._module(value, code)
+        else:
+            # Nothing is known of what it does: never the same again.
+            self._add("unknown", os.urandom(16))
+        return value
+
+    def _module(self, module: types.ModuleType, code: types.CodeType) -> types.ModuleType:
+        copy = types.ModuleType(module.__name__)
+        self._add("module", module.__name__)
+        for name in sorted({name for part in _parts(code) for name in part.co_names}):
+            if hasattr(module, name):
+                self._add(name)
+                setattr(copy, name, self.value(getattr(module, name), code))
+        return copy
+
+    def _add(self, *parts: Any) -> None:
+        # The length of each, so that two parts are never taken for one.
+        for part in parts:
+            text = repr(part).encode()
+            self._hash.update(b"%d:" % len(text) + text)
+
+
+def _parts(code: types.CodeType) -> Iterator[types.CodeType]:
+    """The code and that of the functions inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _parts(constant)
+
+
+def _root(value: Any) -> str:
+    """The top module that something comes from."""
+    if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
+        return "numpy"
+    if isinstance(value, types.ModuleType):
+        return value.__name__.split(".")[0]
+    # Where an instance comes from says nothing about its value; NumPy's functions have a class of their own.
+    named = isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType))
+    named = named or (callable(value) and type(value).__module__.split(".")[0] == "numpy")
+    return str(getattr(value, "__module__", "")).split(".")[0] if named else ""
