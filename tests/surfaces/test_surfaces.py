@@ -1,4 +1,4 @@
-"""What every surface must be, whatever its formula: each fact runs over the table of conftest.py."""
+"""What every surface must be, whatever its formula: each fact runs over the table of walls.py."""
 
 import math
 import tomllib
@@ -7,29 +7,17 @@ import mpmath as mp
 import numpy as np
 import pytest
 import tomli_w
-from conftest import (
-    EPSILON,
-    QUADRICS,
-    SURFACES,
-    call,
-    chord_of,
-    directions,
-    every_surface,
-    gap,
-    numbers_of,
-    scales,
-    side_of,
-    vectors,
-    wall_point,
-)
+from conftest import EPSILON, call, chord_of, directions, gap, scales, side_of, vectors, wall_point
 from exact import exact, level_along, noise, steepness, surface_size
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from walls import QUADRIC_WALLS, QUADRICS, WALLS, depths, every_wall, flights, numbers_of, start
 
 import swarm
 from swarm import tables
 from swarm.kernel.vector import vec
 from swarm.surfaces import ALL_SURFACES, contract
+from swarm.surfaces.rotation import Rotated
 
 unit = st.floats(0.0, 1.0, allow_subnormal=False)
 
@@ -45,28 +33,41 @@ unit = st.floats(0.0, 1.0, allow_subnormal=False)
         (swarm.Ellipsoid((1.0, 2.0, 4.0), (0.0, 0.0, 1.0)), (1.0, 2.0, 5.0), 2.0),
         (swarm.Ellipsoid((1.0, 2.0, 4.0), (0.0, 0.0, 1.0), side="outside"), (0.0, 0.0, 1.0), -1.0),
         (swarm.Plane((0.0, 3.0, 4.0), 2.0), (7.0, 5.0, 5.0), 5.0),
+        (swarm.Slab((0, 0, 2), 0.5, (0, 0, 1)), (7.0, 8.0, 2.0), 0.5),
+        (swarm.Slab((0, 0, 2), 0.5, (0, 0, 1), "outside"), (7.0, 8.0, 0.75), -0.25),
+        (swarm.Cylinder(2.0, center=(1, 0, 0)), (1.0, 4.0, 99.0), 3.0),
+        (swarm.Cylinder(2.0, axis=(3, 0, 0)), (9.0, 0.0, 1.0), -0.75),
+        (swarm.Cylinder(2.0, length=4.0), (0.0, 0.0, 3.0), 1.0),
+        (swarm.Paraboloid(0.25, center=(0, 0, 1)), (1.0, 1.0, 2.0), 1.0),
+        (swarm.Paraboloid(0.25, axis=(0, -1, 0)), (0.0, -3.0, 0.0), -3.0),
+        (swarm.Cone(math.pi / 4), (1.0, 0.0, 2.0), -1.5),
+        (swarm.Cone(math.pi / 4, axis=(1, 0, 0)), (-2.0, 1.0, 0.0), 2.0),
+        (swarm.Quadric(((1, 2, 0), (2, 0, 0), (0, 0, 0)), (0, 0, 3), 4.0, (1, 0, 0)), (2.0, 1.0, -1.0), 6.0),
+        (swarm.Box((1.0, 2.0, 3.0)), (0.5, 0.0, 0.0), -0.5),
+        (swarm.Box((1.0, 2.0, 3.0), rotation={"axis": (0, 0, 1), "angle": math.pi / 2}), (0.0, 1.5, 0.0), 0.5),
     ],
     ids=repr,
 )
 def test_phi_by_hand(surface, point, phi):
     """Below 0 inside, above 0 outside, whichever side is admissible."""
-    assert surface.phi(np.array(point)[:, None]) == pytest.approx([phi], abs=1e-15)
+    turned = any(isinstance(wall, Rotated) for wall in surface.walls())
+    assert surface.phi(np.array(point)[:, None]) == pytest.approx([phi], abs=4e-15 if turned else 1e-15)
 
 
-# Surfaces of the quadrics' table, or made of surfaces of these tables: test_quadrics.py, test_bodies.py.
-ELSEWHERE = {"box", "cone", "cylinder", "paraboloid", "quadric", "slab"}
+# Made of several walls: test_bodies.py.
+ELSEWHERE = {"box", "cone"}
 
 
 def test_the_table_holds_every_surface():
-    here = {type(make()) for make in SURFACES.values()}
+    here = {type(make()) for make in WALLS.values()}
     assert here == {kind for name, kind in ALL_SURFACES.items() if name not in ELSEWHERE}
 
 
-@every_surface
+@every_wall
 def test_arrays_agree_with_points(name):
     """`phi` and `gradient` of the description take (3, N); kernels take one point."""
     points = np.random.default_rng(1).normal(size=(3, 7))
-    surface, numbers = SURFACES[name](), numbers_of(name)
+    surface, numbers = WALLS[name](), numbers_of(name)
     phi, gradient = surface.phi(points), surface.gradient(points)
     assert phi.shape == (7,)
     assert gradient.shape == (3, 7)
@@ -75,7 +76,7 @@ def test_arrays_agree_with_points(name):
         assert gradient[:, k] == pytest.approx(call(contract.gradient, numbers, points[:, k]), rel=1e-14)
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales)
 def test_gradient_is_the_slope_of_phi(name, point, scale):
     surface, point = numbers_of(name, scale), scale * point
@@ -83,10 +84,13 @@ def test_gradient_is_the_slope_of_phi(name, point, scale):
     for axis, slope in enumerate(gradient):
         step = np.eye(3)[axis] * 1e-5 * scale
         rise = call(contract.phi, surface, point + step) - call(contract.phi, surface, point - step)
-        assert rise / (2e-5 * scale) == pytest.approx(slope, abs=1e-4 * np.linalg.norm(gradient))
+        assert rise / (2e-5 * scale) == pytest.approx(slope, abs=1e-6 * np.linalg.norm(gradient))
+    if name in QUADRIC_WALLS:
+        normal = side_of(surface) * np.array(gradient) / np.linalg.norm(gradient)
+        assert call(contract.unit_normal, surface, point) == pytest.approx(normal, abs=1e-14)
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales)
 def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
     surface = numbers_of(name, scale)
@@ -99,7 +103,7 @@ def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
     assert normal == pytest.approx(side * gradient / np.linalg.norm(gradient), abs=8 * EPSILON)
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales)
 def test_level_and_phi_have_the_sign_of_the_gap(name, point, scale):
     surface, point = numbers_of(name, scale), scale * point
@@ -111,7 +115,7 @@ def test_level_and_phi_have_the_sign_of_the_gap(name, point, scale):
         assert np.sign(call(contract.level_of, surface, q)) == np.sign(g)
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales, off=st.floats(-1e-7, 1e-7))
 def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
     surface = numbers_of(name, scale)
@@ -124,32 +128,6 @@ def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
-
-# Where a flight starts relative to the wall, in units of its size: inside, next to it, on it, an ulp or two off.
-depths = st.one_of(st.floats(1e-3, 0.3), st.sampled_from([0.0, 0.0, 1e-15, -1e-15, 1e-9, 1e-12]))
-# How it leaves: part of the velocity along the normal, out of the wall or into it; 0 grazes.
-leans = st.one_of(st.floats(-1.0, 1.0), st.sampled_from([0.0, 1e-15, -1e-15, 1e-9, -1e-9, 1e-5, -1e-5, 1.0, -1.0]))
-
-
-def start(name, point, direction, depth, lean, scale, speed):
-    """A start near the wall: position, and velocity with this part along the normal."""
-    surface = numbers_of(name, scale)
-    wall = wall_point(surface, scale * point)
-    normal = np.array(call(contract.unit_normal, surface, wall))
-    along = direction - (direction @ normal) * normal
-    along /= max(np.linalg.norm(along), 1e-3)
-    velocity = speed * scale * (lean * normal + math.sqrt(1.0 - lean * lean) * along)
-    return surface, wall - depth * scale * normal, velocity
-
-
-flights = {
-    "point": directions,
-    "direction": directions,
-    "depth": depths,
-    "lean": leans,
-    "scale": scales,
-    "speed": st.sampled_from([1e-6, 1.0, 1e6]),
-}
 
 
 def check_hit(surface, position, velocity, pull, time, found, horizon):
@@ -179,13 +157,14 @@ def check_hit(surface, position, velocity, pull, time, found, horizon):
         assert abs(root - now) <= 2 * slack / slope + 1e-12 * crossing * bool(any(pull))
 
 
-@every_surface
+@every_wall
+@settings(max_examples=100)
 @given(**flights)
 def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
     """Against the exact polynomial."""
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
     horizon = 1e3 * scale / np.linalg.norm(velocity)
-    for _ask in range(100):
+    for _ask in range(1 if name in QUADRICS else 100):
         time, found = call(contract.first_hit, surface, position, velocity)
         check_hit(surface, position, velocity, np.zeros(3), time, found, horizon)
         if found:
@@ -194,7 +173,7 @@ def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, 
     raise AssertionError("not found")
 
 
-@every_surface
+@every_wall
 @given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
 def test_falling_hits_lead_to_the_exact_first_root(name, point, direction, depth, lean, scale, speed, pull, heavy):
     """Asked again from where the last answer ended: never past the exit, and there in the end."""
@@ -213,7 +192,7 @@ def test_falling_hits_lead_to_the_exact_first_root(name, point, direction, depth
         assert asked < 500
 
 
-@every_surface
+@every_wall
 @pytest.mark.parametrize("depth", [0.0, 2e-16, -2e-16])
 def test_falling_from_the_wall_the_direction_decides(name, depth):
     """Outward: now. Inward: not now. Resting: now where gravity presses, not now where it pulls off the wall."""
@@ -226,7 +205,7 @@ def test_falling_from_the_wall_the_direction_decides(name, depth):
         assert call(contract.falling_hit, surface, position, -velocity, pull)[0] > 0.1
 
 
-@every_surface
+@every_wall
 def test_at_rest_on_the_wall_gravity_decides(name):
     """It presses: a hit now, up to the fall through round-off. It pulls off the wall: no hit."""
     surface, position, _ = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), 0.0, 0.6, 1.0, 1.0)
@@ -238,7 +217,7 @@ def test_at_rest_on_the_wall_gravity_decides(name):
     assert call(contract.falling_hit, surface, position, at_rest, -normal)[0] > 0.1
 
 
-@every_surface
+@every_wall
 @pytest.mark.parametrize("off", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_a_parabola_that_just_touches(name, off, scale):
@@ -265,7 +244,7 @@ def test_a_parabola_that_just_touches(name, off, scale):
         assert hit == (off > 0.0)
 
 
-@every_surface
+@every_wall
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("speed", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("depth", [1e-9, 1e-3, 0.1])
@@ -281,14 +260,15 @@ def test_head_on_the_hit_is_at_depth_over_speed(name, scale, speed, depth):
     assert grazing * speed >= 0.9 * depth
 
 
-@every_surface
+@every_wall
 @given(point=directions, depth=depths)
 def test_at_rest_there_is_no_hit(name, point, depth):
     surface, position, _ = start(name, point, point, depth, 0.0, 1.0, 1.0)
     assert call(contract.first_hit, surface, position, np.zeros(3)) == (math.inf, True)
+    assert call(contract.falling_hit, surface, position, np.zeros(3), np.zeros(3))[0] == math.inf
 
 
-@every_surface
+@every_wall
 @pytest.mark.parametrize("depth", [0.0, 2e-16, -2e-16])
 def test_from_the_wall_the_direction_decides(name, depth):
     """Outward: now. Inward: not now, and not an instant after."""
@@ -299,7 +279,7 @@ def test_from_the_wall_the_direction_decides(name, depth):
     assert call(contract.first_hit, surface, position, -velocity)[0] > 0.1
 
 
-@every_surface
+@every_wall
 @given(**flights, pull=vectors, heavy=st.sampled_from([1e-6, 1.0, 1e3]))
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
@@ -318,7 +298,7 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
         assert time > 0.0
 
 
-@every_surface
+@every_wall
 @settings(max_examples=10)
 @given(point=directions, direction=directions, pull=directions, lean=st.floats(0.3, 1.0))
 def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
@@ -339,7 +319,7 @@ def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
-@every_surface
+@every_wall
 @given(first=directions, second=directions, scale=scales)
 def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
     """D.(r1 - r0) = q1 - q0."""
@@ -351,7 +331,7 @@ def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
     assert abs(exact(discrete) @ (end - start) - rise) <= 16 * EPSILON * slope * scale
 
 
-@every_surface
+@every_wall
 @given(first=directions, second=directions, scale=scales)
 def test_gap_slope_is_the_divided_difference_of_the_gap(name, first, second, scale):
     surface = numbers_of(name, scale)
@@ -365,7 +345,7 @@ def test_gap_slope_is_the_divided_difference_of_the_gap(name, first, second, sca
     assert rise / (2.0 * step) == pytest.approx(curvature, rel=1e-7, abs=1e-9 * abs(slope / q1))
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales, near=st.sampled_from([0.0, 1e-15, -1e-12, 1e-9]))
 def test_chain_rule_of_gap_and_inner(name, point, scale, near):
     """g[q, q] grad q = grad g, and no cancellation where q1 is next to q0."""
@@ -389,7 +369,7 @@ def pushed_step(name, point, free, strength, scale):
     return surface, point, 0.5 * scale * free, 0.2 * strength * scale / slope
 
 
-@every_surface
+@every_wall
 @given(**pushes)
 def test_push_solves_its_equation(name, point, free, strength, scale):
     """r1 = r0 + p - kappa D(r0, r1)."""
@@ -399,7 +379,7 @@ def test_push_solves_its_equation(name, point, free, strength, scale):
     assert end == pytest.approx(point + free - kappa * discrete, abs=16 * EPSILON * scale)
 
 
-@every_surface
+@every_wall
 @given(**pushes)
 def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     """q1 - q0 = D.(r1 - r0), whose error is relative to D.p and not to q."""
@@ -411,7 +391,9 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     assert rise == pytest.approx(q1 - q0, abs=32 * EPSILON * (abs(q0) + abs(q1) + steep * scale))
     discrete = np.array(call(contract.inner_gradient, surface, point, end))
     terms = abs(discrete) @ abs(free) + abs(kappa) * discrete @ discrete
-    assert abs(rise - discrete @ (free - kappa * discrete)) <= 32 * EPSILON * terms
+    # The end has the round-off of its coordinates, by which D tilts.
+    tilted = 64 * EPSILON * scale * np.abs(discrete).max() if name in QUADRIC_WALLS else 0.0
+    assert abs(rise - discrete @ (free - kappa * discrete)) <= 32 * EPSILON * terms + tilted
     if name not in QUADRICS:
         return  # there the derivative is that of a D that does not turn
     step = 1e-6 * scale / steep
@@ -420,13 +402,13 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     assert change / (2.0 * step) == pytest.approx(slope, rel=1e-6, abs=1e-6 * steep * steep)
 
 
-@every_surface
+@every_wall
 @given(point=directions, direction=directions, length=st.floats(1e-9, 1.0), scale=scales)
 def test_chord_normal_reflects_along_a_chord(name, point, direction, length, scale):
     """From the wall a step with the mean of the old and the reflected velocity ends on the wall; |v| is kept."""
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
-    size = min(SURFACES[name](scale).size(), scale)
+    size = min(WALLS[name](scale).size(), scale)
     # Newton's method finds the chord of a step that is well below the size, a chord into the depth least of all.
     size *= 0.6 if name in QUADRICS else 0.3
     free = length * size * direction / np.linalg.norm(direction)
@@ -441,7 +423,7 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
     assert abs(call(contract.phi, surface, end)) <= round_off * slope * scale
 
 
-@every_surface
+@every_wall
 @given(point=directions, scale=scales)
 def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
     surface = numbers_of(name, scale)
@@ -456,6 +438,9 @@ def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
 def test_a_normal_of_any_length_is_scaled_to_one():
     for length in (1e-320, 1e-200, 1.0, 1.7e308):
         assert swarm.Plane((length, 0.0, -length)).normal == pytest.approx((0.5**0.5, 0.0, -(0.5**0.5)), rel=1e-3)
+
+
+ONE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 @pytest.mark.parametrize(
@@ -478,6 +463,37 @@ def test_a_normal_of_any_length_is_scaled_to_one():
         (lambda: swarm.Sphere(1.0).phi(np.zeros((2, 3))), ["points", "(3, N)", "(2, 3)"]),
         (lambda: swarm.Sphere(1.0).phi("abc"), ["points", "array of numbers", "got str"]),
         (lambda: swarm.Plane((0, 0, 1)).gradient(np.zeros((5, 3))), ["points", "(3, N)", "(5, 3)"]),
+        (lambda: swarm.Torus(1.0, 1.0), ["minor_radius", "below major_radius = 1", "got 1"]),
+        (lambda: swarm.Torus(0.0, 1.0), ["major_radius", "above 0", "got 0"]),
+        (lambda: swarm.Torus(1.0, 0.5, side="in"), ["side", "did you mean 'inside'?"]),
+        (
+            lambda: swarm.Quadric(((1, 2, 0), (3, 1, 0), (0, 0, 1))),
+            ["matrix must be symmetric", "matrix[0][1] = 2", "matrix[1][0] = 3"],
+        ),
+        (lambda: swarm.Quadric(((1, 0, 0), (0, 1, 0))), ["matrix", "three rows"]),
+        (lambda: swarm.Quadric(1.0), ["matrix", "three rows", "1.0"]),
+        (lambda: swarm.Quadric(((1, 0, 0), (0, math.nan, 0), (0, 0, 1))), ["matrix[1][1]", "finite", "nan"]),
+        (lambda: swarm.Quadric(np.zeros((3, 3))), ["matrix", "all 0", "vector"]),
+        (lambda: swarm.Quadric(ONE, vector=(0, math.inf, 0)), ["vector[1]", "finite"]),
+        (lambda: swarm.Quadric(ONE, constant="x"), ["constant", "finite number"]),
+        (lambda: swarm.Quadric(ONE, constant=1.0), ["constant", "same sign", "got 1"]),
+        (lambda: swarm.Quadric(np.diag([1, 0, 0])), ["constant", "same sign", "got 0"]),
+        (lambda: swarm.Quadric(ONE, constant=-1, side="in"), ["side", "did you mean 'inside'?"]),
+        (lambda: swarm.Slab((0, 0, 0), 1.0), ["normal", "length 0"]),
+        (lambda: swarm.Slab((0, 0, 1), -1.0), ["half_width", "above 0", "got -1"]),
+        (lambda: swarm.Cylinder(0.0), ["radius", "above 0", "got 0"]),
+        (lambda: swarm.Cylinder(1.0, length=0.0), ["length", "above 0", "got 0"]),
+        (lambda: swarm.Cylinder(1.0, axis=(0, 0, 0)), ["axis", "length 0"]),
+        (lambda: swarm.Cone(0.0), ["half_angle", "between 0 and pi/2", "got 0"]),
+        (lambda: swarm.Cone(math.pi / 2), ["half_angle", "between 0 and pi/2", "got 1.5708"]),
+        (lambda: swarm.Paraboloid(-0.5), ["focal_length", "above 0", "got -0.5"]),
+        (lambda: swarm.Box((1.0, 0.0, 1.0)), ["half_widths[1]", "above 0", "got 0"]),
+        (lambda: swarm.Box((1.0, 1.0)), ["half_widths", "three numbers", "got 2"]),
+        (lambda: swarm.Box((1, 1, 1), open=["+w"]), ["open[0]", "'+x'", "got '+w'"]),
+        (lambda: swarm.Box((1, 1, 1), open=["+x", "-y", "+x"]), ["open", "'+x' twice"]),
+        (lambda: swarm.Box((1, 1, 1), open="+x"), ["open", "list of faces", "'+x'"]),
+        (lambda: swarm.Box((1, 1, 1), open=["-x", "+x", "-y", "+y", "-z", "+z"]), ["open", "all six"]),
+        (lambda: swarm.Box((1, 1, 1), side="outside", open=["+x"]), ["open", "outside", "['+x']"]),
     ],
 )
 def test_errors_name_the_argument(build, parts):
@@ -486,18 +502,20 @@ def test_errors_name_the_argument(build, parts):
     assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
-@every_surface
+@every_wall
 def test_bounds_hold_the_admissible_side(name):
     """Random points, those of the admissible side all in the box; a solid and a plane bound nothing."""
     points = np.random.default_rng(2).uniform(-2.0, 2.0, (3, 4000))
-    surface = SURFACES[name]()
+    surface = WALLS[name]()
     side = side_of(numbers_of(name))
     low, high = (np.array(corner)[:, None] for corner in surface.bounds())
     admissible = points[:, side * surface.phi(points) <= 0.0]
     assert admissible.shape[1] > 10
     assert ((admissible >= low) & (admissible <= high)).all()
-    assert np.isfinite(high - low).all() == (side > 0.0 and name != "plane")
-    assert np.isfinite(surface.size()) == (name != "plane")
+    bounded = "egg" in name if name in QUADRIC_WALLS else side > 0.0 and name != "plane"
+    assert np.isfinite(high - low).all() == bounded
+    assert np.isfinite(surface.size()) == (name not in {"plane", "nappes", "wall"})
+    assert np.isfinite(surface.extent())
 
 
 # --- The same surface again ------------------------------------------------------------------------------
@@ -529,9 +547,9 @@ def is_made_again(surface):
         assert [wall[1:] for wall in again.walls()] == [wall[1:] for wall in surface.walls()]
 
 
-@every_surface
+@every_wall
 def test_a_surface_is_made_again_by_its_repr_and_by_its_table(name):
-    is_made_again(SURFACES[name]())
+    is_made_again(WALLS[name]())
 
 
 @pytest.mark.parametrize("name", TURNED)

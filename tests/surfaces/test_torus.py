@@ -102,17 +102,3 @@ def test_a_point_on_the_axis_is_admissible_outside_the_ring():
     across, found = call(contract.first_hit, numbers, np.array([-0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert found
     assert across == pytest.approx(1.25, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("build", "parts"),
-    [
-        (lambda: swarm.Torus(1.0, 1.0), ["minor_radius", "below major_radius = 1", "got 1"]),
-        (lambda: swarm.Torus(0.0, 1.0), ["major_radius", "above 0", "got 0"]),
-        (lambda: swarm.Torus(1.0, 0.5, side="in"), ["side", "did you mean 'inside'?"]),
-    ],
-)
-def test_errors_name_the_argument(build, parts):
-    with pytest.raises(swarm.SceneError) as caught:
-        build()
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
