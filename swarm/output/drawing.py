@@ -22,6 +22,8 @@ MAP = ListedColormap(colours.table(), name="swarm")
 GROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _DPI = 100
+# Matplotlib leaves room around 3-D axes: this much larger they fill their cell.
+_ZOOM = 1.3
 
 
 def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
@@ -32,11 +34,14 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
 def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]]) -> None:
     """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale."""
     points = np.asarray(positions)
+    axes.computed_zorder = False  # the particles would hide the solids among them
     for solid, curves in wires:
-        lines = Line3DCollection(curves, colors=_SOLID_WIRE if solid else _WIRE, linewidths=0.5, alpha=0.7)
-        axes.add_collection3d(lines, autolim=False)
+        style = (
+            {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
+        )
+        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, **style), autolim=False)
     size = float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
-    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False)
+    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False, zorder=2)
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
@@ -50,7 +55,7 @@ def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bo
     axes.set_xlabel("x [m]", labelpad=-4, fontsize=8)
     axes.set_ylabel("y [m]", labelpad=-4, fontsize=8)
     axes.set_zlabel("z [m]", labelpad=-4, fontsize=8)
-    axes.set_aspect("equal")
+    axes.set_box_aspect(high - low, zoom=_ZOOM)
     axes.grid(False)
     axes.set_facecolor(GROUND)
 
