@@ -283,7 +283,7 @@ def test_what_is_missing_or_damaged_is_said(tmp_path):
     position = checkpoint.read(saved)[1]["position"].tobytes()
     for spoiled in (whole[: len(whole) // 2], whole.replace(position, position[1:] + b"?"), b"", b"text"):
         saved.write_bytes(spoiled)
-        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start afresh"):
+        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start again"):
             run(path, resume=True)
     saved.write_bytes(whole)
     path.unlink()
