@@ -229,7 +229,7 @@ cli.main()
 
 @pytest.mark.parametrize("options", [[], ["--resume"], ["--overwrite"], ["--resume", "--overwrite"]])
 def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, options):
-    """What was there before is not this run's, and there is nothing to go on from."""
+    """What was there before is not this run's, and there is nothing to resume from."""
     if "--overwrite" in options:
         assert command("run", "scene.toml", cwd=folder).returncode == 0
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -369,7 +369,7 @@ def test_interrupt_keeps_finished_frames(folder, request):
 
 
 def test_wall_time_and_resume(folder):
-    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits. A nanosecond is over at the
+    """Exit code 0 and how to resume; then the same frames as in one go, in all their bits. A nanosecond is over at the
     first frame."""
     text = GOOD.replace("until = 1.0", "until = 8e4").replace("every = 0.5", "every = 2e4")
     (folder / "scene.toml").write_text(text)
