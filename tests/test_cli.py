@@ -67,7 +67,7 @@ def test_record_view_plot_and_info(folder):
     for picture in ("sheet.png", "scene.png"):
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")
     refused = command("record", "scene.h5", "-o", "scene.h5", "--overwrite", cwd=folder)
-    assert (refused.returncode, "recording: scene.h5 is the trajectory too" in refused.stderr) == (2, True)
+    assert (refused.returncode, "recording: scene.h5 is also the trajectory" in refused.stderr) == (2, True)
     refused = command("run", "scene.toml", "--resume", "--record", "more.rrd", cwd=folder)
     assert refused.returncode == 2
     assert "recording and live cannot go on with a run that was stopped" in refused.stderr
@@ -111,13 +111,13 @@ def test_results_do_not_depend_on_threads(folder):
             "count = 10",
             "count = 1_000_000_000_000",
             [],
-            "count must be particles that fit in memory, got 1e+12, which take 146 TB",
+            "count must fit in memory, got 1e+12 particles, which take 146 TB",
         ),
         (
             "count = 10",
             f"count = {10**19}",
             [],
-            "count must be particles that fit in memory, got 1e+19, which take 1.46e+03 EB",
+            "count must fit in memory, got 1e+19 particles, which take 1.46e+03 EB",
         ),
         ("count = 10", f"count = {10**400}", [], "count"),
         ("count = 10", f"count = {'9' * 5000}", [], "cannot read the scene file scene.toml"),
@@ -136,9 +136,9 @@ def test_results_do_not_depend_on_threads(folder):
             [],
             "scene.toml: its arrays or tables are nested too deeply",
         ),
-        ("", "", ["-o", "scene.toml", "--overwrite"], "trajectory: scene.toml is the scene file too"),
-        ("", "", ["--record", "./scene.toml", "--overwrite"], "recording: scene.toml is the scene file too"),
-        ("", "", ["-o", "a.h5", "--record", "a.h5"], "recording: a.h5 is the trajectory too"),
+        ("", "", ["-o", "scene.toml", "--overwrite"], "trajectory: scene.toml is also the scene file"),
+        ("", "", ["--record", "./scene.toml", "--overwrite"], "recording: scene.toml is also the scene file"),
+        ("", "", ["-o", "a.h5", "--record", "a.h5"], "recording: a.h5 is also the trajectory"),
         (
             "",
             "",
@@ -166,7 +166,7 @@ def test_the_file_of_the_start_is_no_output(folder):
     text = re.sub(r"(?s)\[particles\].*?\n\n", '[particles]\nfrom = "start.csv"\n\n', GOOD, count=1)
     (folder / "scene.toml").write_text(text)
     done = command("run", "scene.toml", "-o", "start.csv", "--overwrite", cwd=folder)
-    assert (done.returncode, "start.csv is the file of the particles too" in done.stderr) == (2, True), done.stderr
+    assert (done.returncode, "start.csv is also the file of the particles" in done.stderr) == (2, True), done.stderr
 
 
 def test_a_scene_file_with_a_byte_order_mark(folder):
@@ -223,14 +223,14 @@ cli.main()
     told = json.loads(done.stdout)
     assert (done.returncode, told["status"], told["frames"]) == (130, "interrupted", 2)
     assert told["resume"] == "swarm run scene.toml --json --resume"
-    assert "go on with\n  swarm run scene.toml --json --resume" in done.stderr
+    assert "resume with\n  swarm run scene.toml --json --resume" in done.stderr
     done = command(*told["resume"].split()[1:], cwd=folder)
     assert (done.returncode, json.loads(done.stdout)["frames"]) == (0, 3)
 
 
 @pytest.mark.parametrize("options", [[], ["--resume"], ["--overwrite"], ["--resume", "--overwrite"]])
 def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, options):
-    """What was there before is not this run's, and there is nothing to go on from."""
+    """What was there before is not this run's, and there is nothing to resume from."""
     if "--overwrite" in options:
         assert command("run", "scene.toml", cwd=folder).returncode == 0
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -372,14 +372,14 @@ def test_interrupt_keeps_finished_frames(folder, request):
 
 
 def test_wall_time_and_resume(folder):
-    """Exit code 0 and how to go on; then the same frames as in one go, in all their bits. A nanosecond is over at the
+    """Exit code 0 and how to resume; then the same frames as in one go, in all their bits. A nanosecond is over at the
     first frame."""
     text = GOOD.replace("until = 1.0", "until = 8e4").replace("every = 0.5", "every = 2e4")
     (folder / "scene.toml").write_text(text)
     limit = "0.000000001s"
     first = command("run", "scene.toml", "--walltime", limit, "--json", cwd=folder)
     assert first.returncode == 0
-    assert "the wall time is over" in first.stderr
+    assert "the wall time limit is reached" in first.stderr
     told = json.loads(first.stdout)
     assert told["status"] == "walltime"
     assert told["resume"] == f"swarm run scene.toml --walltime {limit} --json --resume"

@@ -20,7 +20,7 @@ from swarm.contact import regularisation
 from swarm.kernel import cache
 from swarm.kernel import jit as _jit
 from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
-from swarm.surfaces import contract, flights
+from swarm.surfaces import flights
 from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent

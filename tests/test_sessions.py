@@ -283,7 +283,7 @@ def test_what_is_missing_or_damaged_is_said(tmp_path):
     position = checkpoint.read(saved)[1]["position"].tobytes()
     for spoiled in (whole[: len(whole) // 2], whole.replace(position, position[1:] + b"?"), b"", b"text"):
         saved.write_bytes(spoiled)
-        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start afresh"):
+        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start again"):
             run(path, resume=True)
     saved.write_bytes(whole)
     path.unlink()
@@ -341,7 +341,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monke
     monkeypatch.setattr(checkpoint.np, "savez", full)
     clock = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: clock[-1])
-    with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the one before it"):
+    with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the previous checkpoint"):
         run(path, checkpoint=600.0, progress=lambda frame: clock.append(clock[-1] + 600.0))
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.h5", "run.h5.checkpoint"]
     assert json.loads(saved[-1])["frame"] == 1
