@@ -20,7 +20,9 @@ from swarm.contact import regularisation
 from swarm.kernel import cache
 from swarm.kernel import jit as _jit
 from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
-from swarm.surfaces import flights
+from swarm.kernel.jit import kept, select
+from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
+from swarm.surfaces import contract, flights
 from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent
@@ -33,43 +35,51 @@ compiled = numba.njit(error_model="numpy")
 # --- The same in Python and in kernels -------------------------------------------------------------------
 
 
-def every_function_of_a_surface(surface, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
-    q0, q1 = base.inner(surface, x, y, z), base.inner(surface, vx, vy, vz)
+def every_function_of_a_surface(surface, r, v, pull, kappa):
+    q0, q1 = contract.inner(surface, r), contract.inner(surface, v)
     return (
-        base.phi(surface, x, y, z),
-        base.gradient(surface, x, y, z),
-        base.first_hit(surface, x, y, z, vx, vy, vz),
-        base.first_hit(surface, x, y, z, 0.0 * vx, 0.0 * vy, 0.0 * vz),
-        base.safe_time(surface, x, y, z, vx, vy, vz, gx, gy, gz),
-        base.unit_normal(surface, x, y, z),
-        base.chord_normal(surface, x, y, z, 0.1 * vx, 0.1 * vy, 0.1 * vz, kappa),
-        (q0, q1, base.gap_of(surface, q0), base.level_of(surface, q1)),
-        base.gap_slope(surface, q0, q1),
-        base.inner_gradient(surface, x, y, z, vx, vy, vz),
-        base.push(surface, x, y, z, vx, vy, vz, kappa),
-        base.rise(surface, x, y, z, vx, vy, vz, kappa),
-        base.settle(surface, x, y, z),
+        contract.phi(surface, r),
+        contract.gradient(surface, r),
+        contract.first_hit(surface, r, v),
+        contract.first_hit(surface, r, 0.0 * v),
+        contract.safe_time(surface, r, v, pull),
+        contract.unit_normal(surface, r),
+        contract.chord_normal(surface, r, 0.1 * v, kappa),
+        (q0, q1, contract.gap_of(surface, q0), contract.level_of(surface, q1)),
+        contract.gap_slope(surface, q0, q1),
+        contract.inner_gradient(surface, r, v),
+        contract.push(surface, r, v, kappa),
+        contract.rise(surface, r, v, kappa),
+        contract.settle(surface, r),
     )
 
 
-def every_function_of_a_chain(whole, x, y, z, vx, vy, vz, gx, gy, gz, kappa):
+def every_function_of_a_chain(whole, r, v, pull, kappa):
     return (
         chain.length(whole),
-        flights.first_hit(whole, None, x, y, z, vx, vy, vz),
-        flights.first_hit(whole, Gravity(gx, gy, gz), x, y, z, vx, vy, vz),
-        flights.hit_of(whole, None, 1.0, x, y, z, vx, vy, vz),
-        flights.other_hit(whole, 0.0, x, y, z, vx, vy, vz),
-        chain.unit_normal(whole, 2.0, x, y, z),
-        chain.outside(whole, 1.0, x, y, z),
-        chain.push(whole, 1.0, x, y, z, vx, vy, vz, kappa),
-        flights.free_time(None, whole, x, y, z, vx, vy, vz),
-        flights.free_time(Gravity(gx, gy, gz), whole, x, y, z, vx, vy, vz),
-        chain.touched(whole, x, y, z, vx, vy, vz),
+        flights.first_hit(whole, None, r, v),
+        flights.first_hit(whole, Gravity(pull.x, pull.y, pull.z), r, v),
+        flights.hit_of(whole, None, 1.0, r, v),
+        flights.other_hit(whole, 0.0, r, v),
+        chain.unit_normal(whole, 2.0, r),
+        chain.outside(whole, 1.0, r),
+        chain.push(whole, 1.0, r, v, kappa),
+        flights.free_time(None, whole, r, v),
+        flights.free_time(Gravity(pull.x, pull.y, pull.z), whole, r, v),
+        chain.touched(whole, r, v),
     )
 
 
-def every_function_of_gravity(pull, x, y, z, t):
-    return displacement(pull, x, y, z, t), accelerated(pull, x, y, z, t), potential(pull, x, y, z)
+def every_function_of_gravity(pull, r, t):
+    return displacement(pull, r, t), accelerated(pull, r, t), potential(pull, r)
+
+
+def every_function_of_a_vector(a, b, k):
+    return (
+        (a + b, a - b, k * a, b * k, a / k, times(a, b), cross(a, b), absolute(a)),
+        (dot(a, b), square(a), norm(a), total(a), largest(a), moves(a)),
+        (select(k > 0.0, a, b), select(k < 0.0, a, b), kept(a)),
+    )
 
 
 def every_function_of_a_law(law, g0, g1):
@@ -88,11 +98,11 @@ def flat(nested):
 
 def assert_the_same(function, first, *arguments):
     """Bit for bit: strict arithmetic has one answer."""
-    in_kernel, in_python = compiled(function)(first, *map(float, arguments)), call(function, first, *arguments)
+    in_kernel, in_python = compiled(function)(first, *arguments), call(function, first, *arguments)
     assert flat(in_kernel) == flat(in_python)
 
 
-NUMBERS = (0.3, -0.1, 0.4, 0.5, -0.7, 0.2, 0.1, -0.3, 0.9, 0.02)
+NUMBERS = (Vec(0.3, -0.1, 0.4), Vec(0.5, -0.7, 0.2), Vec(0.1, -0.3, 0.9), 0.02)
 
 
 @compiled_only
@@ -109,7 +119,12 @@ def test_chains_are_the_same_compiled():
 @compiled_only
 @pytest.mark.parametrize("pull", [None, Gravity(0.1, -0.2, 0.3)], ids=["none", "some"])
 def test_gravity_is_the_same_compiled(pull):
-    assert_the_same(every_function_of_gravity, pull, *NUMBERS[:4])
+    assert_the_same(every_function_of_gravity, pull, NUMBERS[0], 0.5)
+
+
+@compiled_only
+def test_vectors_are_the_same_compiled():
+    assert_the_same(every_function_of_a_vector, *NUMBERS[:2], 0.02)
 
 
 @compiled_only
