@@ -13,6 +13,8 @@ from numba import types
 from numba.core import event
 from numba.core.caching import FunctionCache
 
+from .frozen import Frozen
+
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
 _COMPILING = "compiling kernels for this scene, once: {}"
@@ -73,8 +75,6 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 def _digests(kinds: Any) -> Iterator[str]:
-    from .frozen import Frozen  # which uses the compiler, which uses this module
-
     for kind in kinds:
         if isinstance(kind, types.BaseTuple):
             frozen = Frozen()

@@ -10,7 +10,7 @@ from conftest import METHODS, SURFACES, call
 
 import swarm
 from swarm import observables
-from swarm.kernel.vector import Symmetric, dot, square
+from swarm.kernel.vector import ZERO, Symmetric, dot, square
 from swarm.lanes import block as blocks
 from swarm.methods import base as methods
 from swarm.surfaces import contract, rotation
@@ -352,9 +352,9 @@ def test_registration_is_that_of_singledispatch():
     class Numbers(NamedTuple):
         r: float
 
-    def right(surface, x, y, z):
+    def right(surface, r):
         return 3.0
 
     assert contract.phi.register(Numbers, right) is right
     assert contract.phi.registry[Numbers] is right
-    assert contract.phi(Numbers(1.0), 0.0, 0.0, 0.0) == 3.0
+    assert contract.phi(Numbers(1.0), ZERO) == 3.0
