@@ -137,9 +137,9 @@ def test_a_halt_and_a_hard_contact_in_one_frame(threads):
     start = swarm.fill(SPHERE, 600, speed=1.0, seed=6)
     start.position[:, 300], start.velocity[:, 300] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
     method = swarm.Impact(shortest_flight=1e-2)
-    with Run(SPHERE, start, method, threads, None) as whole:
+    with Run(SPHERE, start.copy(), method, threads, None) as whole:
         assert whole.advance(3.0, 3.0)
-    with Run(SPHERE, start, method, threads, None) as run:
+    with Run(SPHERE, start.copy(), method, threads, None) as run:
         assert run._hard is None
         run.halt()
         assert not run.advance(3.0, 3.0)

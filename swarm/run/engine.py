@@ -35,7 +35,7 @@ _MUCH_WRITING = 1.0 / 3.0
 
 
 class Run:
-    """The state of a run and the threads that advance it."""
+    """The state of a run and the threads that advance it; the arrays of the particles become a part of the state."""
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
@@ -43,9 +43,9 @@ class Run:
     ) -> None:  # fmt: skip
         n = len(particles)
         self.state = State(
-            particles.position.copy(),
-            particles.velocity.copy(),
-            particles.mass.copy(),
+            particles.position,
+            particles.velocity,
+            particles.mass,
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
