@@ -44,9 +44,10 @@ def test_no_two_threads_draw_the_same():
 def test_every_particle_that_is_not_done_follows_once(n, size):
     done = np.random.default_rng(n).random(n) < 0.4
     draws = lanes.Draws(np.zeros(1, np.int64), size, np.empty(-(-n // size), np.int64))
+    share = lanes.Share(None, done, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0)
     i, stop, drawn, found = 0, 0, 0, []
     while True:
-        i, stop, drawn = lanes.following_particle(draws, done, i, stop, drawn)
+        i, stop, drawn = lanes.following_particle(share, i, stop, drawn)
         if i == stop:
             break
         found.append(i)
