@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from .errors import SceneError
 from .kernel.gravity import Gravity
-from .surfaces import base, required
-from .surfaces.base import Box, Surface
-from .surfaces.chain import Chain, chain_of
+from .surfaces import required
+from .surfaces.fold import Chain, chain_of
+from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
@@ -197,10 +197,10 @@ class Scene:
 
 
 def _side(surface: Surface) -> float:
-    return base.SIDES[getattr(surface, "side", "inside")]
+    return SIDES[getattr(surface, "side", "inside")]
 
 
-def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
+def _polyhedron_bounds(planes: list[HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
     """Bounds of the half-spaces' intersection with a box, from its vertices."""
     finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(offset) for _normal, offset in planes]
     scale = max(finite, default=0.0) or 1.0
@@ -216,7 +216,7 @@ def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tup
 
 
 def _closed_bounds(
-    planes: list[base.HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
+    planes: list[HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
 ) -> tuple[Any, Any, bool, bool]:
     """Bounds from the vertices within a far box; whether the box cuts the volume, and whether a vertex was too flat."""
     box_low, box_high = np.maximum(low, -far), np.minimum(high, far)

@@ -23,7 +23,7 @@ def command(*args, cwd, **more):
     )
     # Whether it compiles depends on what ran before.
     lines = done.stderr.splitlines(keepends=True)
-    done.stderr = "".join(line for line in lines if not line.startswith("compiling a kernel"))
+    done.stderr = "".join(line for line in lines if not line.startswith("compiling"))
     return done
 
 
@@ -205,7 +205,8 @@ def test_json_of_a_run_that_is_interrupted(folder, options):
         assert command("run", "scene.toml", cwd=folder).returncode == 0
     code = """
 import signal, sys
-from swarm import cli, frames, simulation
+from swarm import cli
+from swarm.run import simulation
 def frame(number, *more, real=simulation.Frame):
     if number == {at}:
         signal.raise_signal(signal.SIGINT)
@@ -235,7 +236,8 @@ def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, option
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     code = """
 import signal, sys
-from swarm import cli, simulation
+from swarm import cli
+from swarm.run import simulation
 def interrupted(*about):
     signal.raise_signal(signal.SIGINT)
     raise KeyboardInterrupt
@@ -281,7 +283,8 @@ def test_a_second_interrupt_ends_at_once_without_a_traceback(folder):
     code = INTERRUPTED.format(name="nothing").replace(
         "from swarm.__main__",
         """
-from swarm import cli, simulation
+from swarm import cli
+from swarm.run import simulation
 real = simulation.Frame
 def frame(*about):
     signal.raise_signal(signal.SIGINT)
@@ -306,7 +309,7 @@ def test_what_compiles_is_said(folder):
             cwd=folder, capture_output=True, text=True, timeout=600, env=environment,
         )  # fmt: skip
         assert done.returncode == 0
-        assert ("compiling a kernel for this kind of scene (advance_block), once" in done.stderr) == expected
+        assert ("compiling kernels for this scene, once: advance_block" in done.stderr) == expected
 
 
 def test_existing_output_asks_for_overwrite(folder):

@@ -17,9 +17,11 @@ from conftest import LAWS, call, every_surface, numbers_of, scene_of
 
 import swarm
 from swarm.contact import regularisation
+from swarm.kernel import cache
 from swarm.kernel import jit as _jit
 from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
-from swarm.surfaces import base, chain, flights
+from swarm.surfaces import contract, flights
+from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(
@@ -204,9 +206,9 @@ def test_kernels_count_no_references_and_are_vectors(tmp_path):
     """The compiled text of a sphere's kernel: no call that counts, and the square root of a hit for several lanes."""
     code = """
 import re, swarm
-from swarm import blocks
+from swarm.lanes import block as blocks
 scene = swarm.Scene([swarm.Sphere(0.5)])
-swarm.simulate(scene, swarm.fill(scene, 9, speed=1.0, seed=1), swarm.Impact(), until=1.0, threads=1)
+swarm.simulate(scene, swarm.fill(scene, 9, speed=1.0, seed=1), swarm.Impact(), until=1.0, compile="always")
 (kernel,) = (blocks.advance_block.inspect_llvm(signature) for signature in blocks.advance_block.signatures)
 assert not re.search(r"call[^\\n]*NRT_", kernel)
 assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
@@ -219,12 +221,12 @@ assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
-    """A copy of the package, and the cache folder that its `_jit` names."""
+    """A copy of the package, and the cache folder that its `cache` names."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
 
     def folder():
-        spec = importlib.util.spec_from_file_location("copied_jit", tmp_path / "swarm" / "kernel" / "jit.py")
+        spec = importlib.util.spec_from_file_location("copied_cache", tmp_path / "swarm" / "kernel" / "cache.py")
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         return module.cache_folder()
@@ -257,10 +259,10 @@ def test_a_new_and_a_renamed_file_name_another_cache(copied):
 
 def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
-    assert _jit.cache_folder().parent == tmp_path / "numba"
+    assert cache.cache_folder().parent == tmp_path / "numba"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert _jit.cache_folder().parent == tmp_path / "xdg" / "swarm"
+    assert cache.cache_folder().parent == tmp_path / "xdg" / "swarm"
 
 
 # --- The start -------------------------------------------------------------------------------------------
@@ -272,16 +274,16 @@ def one_more(x):
 
 @compiled_only
 def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(_jit, "_CACHE", tmp_path)
+    monkeypatch.setattr(cache, "_CACHE", tmp_path)
     told = []
-    with caplog.at_level("INFO", "swarm"), _jit.kernels_compiled(told.append):
+    with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(told.append):
         first = _jit.kernel(one_more)
         assert first(1.0) == first(1.0) == 2.0
         numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
-    sentence = "compiling a kernel for this kind of scene (one_more), once: the next run finds it"
+    sentence = "compiling kernels for this scene, once: one_more"
     assert told == caplog.messages == [sentence]
     first(1)  # nobody listens
-    with _jit.kernels_compiled(told.append):
+    with cache.kernels_compiled(told.append):
         assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
     assert told == [sentence]
 

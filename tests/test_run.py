@@ -2,12 +2,12 @@
 
 import threading
 
+import numba
 import numpy as np
 import pytest
 
 import swarm
 from swarm import observables
-from swarm.kernel import jit as _jit
 from swarm.kernel.jit import kernel, next_of
 from swarm.lanes import arrays as lanes
 from swarm.run.engine import Run
@@ -27,7 +27,7 @@ def draw_all(ticket, most, seen):
 
 
 def test_no_two_threads_draw_the_same():
-    most = 2_000 if _jit.numba.config.DISABLE_JIT else 2_000_000
+    most = 2_000 if numba.config.DISABLE_JIT else 2_000_000
     ticket, seen = np.zeros(1, np.int64), [np.zeros(most, np.int64) for _ in range(3)]
     draw_all(ticket.copy(), 0, seen[0])  # compiled before the threads race
     threads = [threading.Thread(target=draw_all, args=(ticket, most, one)) for one in seen]

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ..contact.regularisation import stored_energy
 from ..errors import SceneError
+from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Floats, Particles
 from ..scene import Scene
-from ..surfaces import base
+from ..surfaces import contract
+from ..surfaces.surface import side_sign
 
 BY = ("speed", "energy-error")
 
@@ -102,9 +104,9 @@ def _energies(scene: Scene, method: Method, start: Particles) -> tuple[Values, F
         total = np.zeros(len(mass))
         if law is not None:
             for surface in scene.surfaces:
-                side = base.side_sign(getattr(surface, "side", "inside"))
+                side = side_sign(getattr(surface, "side", "inside"))
                 for wall in surface.walls():
-                    gap = side * base.phi(wall, *position)
+                    gap = side * contract.phi(wall, vec(position))
                     # Few particles are in a wall, and the law takes one number.
                     for i in np.flatnonzero(gap > 0.0):
                         total[i] += stored_energy(law, float(gap[i])) / mass[i]

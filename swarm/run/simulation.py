@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from .. import checks, interrupt
 from ..errors import SceneError
 from ..frames import Frame, FrameTimes
-from ..kernel.jit import kernels_compiled
+from ..kernel.cache import kernels_compiled
 from ..methods.base import Method, check_surfaces
 from ..output import paths
 from ..output.storage import Storage
 from ..particles import Multipliers, Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
-from . import workload
+from . import tiers, workload
 from .engine import Run
 from .session import Session
 
@@ -79,6 +79,7 @@ def simulate(
     checkpoint: float | None = None,
     resume: bool = False,
     walltime: float | None = None,
+    compile: str = "auto",
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
@@ -115,6 +116,9 @@ def simulate(
         resume: go on from that checkpoint, with the same bits as if the run had never stopped; begin where there is
             neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops.
+        compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
+            and what is not done after about a second goes on compiled. "always": compiled from the start. "never":
+            plain Python only.
 
     Returns:
         A `Result`.
@@ -142,7 +146,8 @@ def simulate(
     threads = _threads(threads)
     if block_size is not None:
         checks.count("block_size", block_size)
-    particles = _checked(scene, particles, method, times)
+    checks.one_of("compile", compile, tiers.CHOICES)
+    particles = _checked(scene, particles, method, times, compile)
 
     if scene.is_open():
         _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
@@ -164,7 +169,7 @@ def simulate(
         numbers = storage.bytes_of(len(particles))
         times.require_room(session.first, target, numbers, len(scene.surfaces), storage.compression != "none")
 
-        run = Run(scene, particles, method, threads, block_size)
+        run = Run(scene, particles, method, threads, block_size, compile)
         runs.append(run)
         session.restore(run)
         history: list[dict[str, Any]] = []
@@ -233,7 +238,7 @@ def _threads(threads: int | None) -> int:
     return cores if threads is None else checks.count("threads", threads)
 
 
-def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTimes) -> Particles:
+def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTimes, compile: str) -> Particles:
     """The particles as they will run, all arguments being right."""
     for name, value, kind in (("scene", scene, Scene), ("particles", particles, Particles), ("method", method, Method)):
         if not isinstance(value, kind):
@@ -241,7 +246,8 @@ def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTim
     # The arrays of Particles may have been changed since it checked them.
     particles = particles.checked()
     check_surfaces(method, scene)
-    require_compiled(scene.surfaces)
+    if compile != "never":
+        require_compiled(scene.surfaces)
     method.check(scene, particles)
     assert times.every is not None
     method.span("until", times.until)

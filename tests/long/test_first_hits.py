@@ -22,14 +22,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from roots import EARLY, EXACT, MISSED, TOUCHED, Course, Exact, Terms, exact_course, judge, judge_all
+from swarm.surfaces.chain import chain_of
+from swarm.surfaces.formulas.owned import OwnNumbers
 
 import swarm
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.surfaces import base
-from swarm.surfaces.chain import chain_of
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.formulas.owned import OwnNumbers
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
 from swarm.surfaces.shapes.rotated import _own
