@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..errors import RunError
-from ..kernel.jit import Array
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..methods.base import Method
@@ -172,7 +171,7 @@ class Run:
             self._halt, mine,
         )  # fmt: skip
 
-    def _observing(self, drawn: Array) -> tuple[Any, ...]:
+    def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
         return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
 

@@ -20,7 +20,7 @@ from ...kernel.jit import inlined
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
 # Modules that are known by their version; any other is known by what the function takes from it.
 _VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__}
-# The cache folder is named by a hash of this package.
+# The cache folder is named by the code of this package's kernels.
 _VERSIONS["swarm"] = ""
 
 
