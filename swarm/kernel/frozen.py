@@ -20,7 +20,7 @@ import numpy as np
 Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
 # Modules that are known by their version; any other is known by what the function takes from it. The cache folder is
-# named by a hash of this package.
+# named by the code of this package's kernels.
 _VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__, "swarm": ""}
 _CODE = operator.attrgetter(
     "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",

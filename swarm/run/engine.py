@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..errors import RunError
-from ..kernel.jit import Array
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..methods.base import Method
@@ -170,7 +169,7 @@ class Run:
         share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
         return self._method, self._chain, self._gravity, self._hard, share, mine
 
-    def _observing(self, drawn: Array) -> tuple[Any, ...]:
+    def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
         return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
 
