@@ -69,7 +69,7 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="How it ended as JSON, however it ends.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
-    # What an exception does in the midst of an import nobody knows; nothing is open yet.
+    # An exception during an import may be lost; nothing is open yet.
     with interrupt.at_once():
         from . import scene_file as files
         from .checks import duration
@@ -77,7 +77,7 @@ def run(
         from .run.simulation import carry_out
         from .summary import numbers, of_result
 
-    def told(status: str, written: Path | None = None, **more: Any) -> None:
+    def report(status: str, written: Path | None = None, **more: Any) -> None:
         if as_json:
             print(json.dumps({"status": status, **(numbers(written) if written else {}), **more}, indent=2))
 
@@ -115,18 +115,18 @@ def run(
             began = target.exists() and (goes_on or paths.identity(target) != before)
             again = _stopped(status, target, began)
             if began:
-                told(status, target, resume=again)
+                report(status, target, resume=again)
             else:
-                told(status, frames=0, resume=again)
+                report(status, frames=0, resume=again)
         raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
-        told("complete", target)
+        report("complete", target)
         return
     except SwarmError as error:
-        told("failed", error=str(error))
+        report("failed", error=str(error))
         raise
-    told("complete", target, wall_time=result.wall_time)
+    report("complete", target, wall_time=result.wall_time)
     if not (quiet or as_json):
         _table(of_result(result, particles.volume))
 
@@ -250,7 +250,7 @@ def plot(
 
 
 def _check_picture(target: Path, source: Path) -> None:
-    """A picture is made again in no time: an old one is replaced."""
+    """A picture is cheap to redraw, so an old one is overwritten."""
     from .output.paths import check_distinct, check_target
 
     check_distinct({"picture": target}, {"file that it is drawn from": source})
