@@ -32,7 +32,7 @@ class Session:
         self._every = math.inf if options.checkpoint is None else options.checkpoint
         self._end = math.inf if options.walltime is None else self._began + options.walltime
         self._due = self._began + self._every
-        self._told_to_stop = False
+        self._stops = False
         self._trajectory, self._path = options.trajectory, options.checkpoint_file()
         # A digest of the particles at the start, for the trajectory.
         self.start = ""
@@ -159,7 +159,7 @@ class Session:
 
     def stop(self) -> None:
         """Let the next look end the session."""
-        self._told_to_stop = True
+        self._stops = True
 
     def wall_time(self) -> float:
         """Seconds of all sessions of the run."""
@@ -169,16 +169,16 @@ class Session:
         """Save if it is time to, and end if it is: the last frame that is written, and the one under way.
 
         Raises:
-            KeyboardInterrupt: somebody called `stop`.
+            KeyboardInterrupt: `stop` was called.
             WallTimeError: the limit is over.
             FileError: the checkpoint cannot be written.
         """
         now = time.monotonic()
-        stops = self._told_to_stop or now >= self._end
+        stops = self._stops or now >= self._end
         if self._saves and (stops or now >= self._due):
             self._save(run, writer, frame, moment, following)
             self._due = time.monotonic() + self._every
-        if self._told_to_stop:
+        if self._stops:
             raise KeyboardInterrupt
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")

@@ -1,4 +1,4 @@
-"""From a scene to frames: the loop over frames, and who is told of them."""
+"""From a scene to frames: the loop over frames, and their observers."""
 
 import contextlib
 import logging
@@ -82,7 +82,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         check everything
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
-            observe; stop if a number is not finite, or a particle outside rigid walls
+            observe; fail if a number is not finite, or a particle outside rigid walls
             copy the frame; a thread beside writes and flushes it
             tell the progress display
             save a checkpoint if one is due (within a long frame too)
