@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import swarm
 from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
-from swarm.kernel.vector import vec
+from swarm.kernel.vector import Vec, vec
 from swarm.surfaces import contract
 from swarm.surfaces.fold import Chain
 from swarm.surfaces.rotation import Rotated
@@ -118,6 +118,8 @@ def call(function, *arguments):
 def _as_kernels_take_it(value):
     if isinstance(value, np.ndarray) and value.shape == (3,):
         return vec(map(np.float64, value))
+    if isinstance(value, Vec):
+        return type(value)(*map(np.float64, value))
     return np.float64(value) if isinstance(value, (float, int)) and not isinstance(value, bool) else value
 
 
