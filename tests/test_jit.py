@@ -356,7 +356,7 @@ def test_an_edit_of_words_compiles_nothing_and_one_of_code_does(copied):
     package, _folder = copied
     file, told = package / "observables.py", []
     source = file.read_text()
-    for text in (source, "# edited\n\n" + source, source.replace("kinetic = 0.5 * (", "kinetic = 1.5 * (")):
+    for text in (source, "# edited\n\n" + source, source.replace("0.5 * square(v)", "1.5 * square(v)")):
         file.write_text(text)
         done = subprocess.run(
             [sys.executable, "-c", EDITED.format(root=str(package.parent))],
