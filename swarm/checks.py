@@ -14,7 +14,7 @@ from .errors import SceneError
 Vector = tuple[float, float, float]
 # Magnitudes whose squares and inverse squares are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
-# Bytes of a particle in a run (`python -m bench bars`); so few of them fit everywhere.
+# Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
 _PARTICLE, _FEW = 146, 1_000_000
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
@@ -22,7 +22,7 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
     """`value` as a finite float."""
     try:
-        # NumPy makes a number of the last two: without the imaginary part, and without the mask.
+        # float() takes the last two, without the imaginary part and without the mask.
         if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
             raise TypeError
         result = float(value)
@@ -50,7 +50,7 @@ def at_least(name: str, value: Any, bound: float) -> float:
 
 
 def length(name: str, value: Any) -> float:
-    """`value` as a length [m] above zero whose square is a number too."""
+    """`value` as a length [m] above zero whose square is finite and not zero."""
     result = positive(name, value)
     if not SMALLEST <= result <= LARGEST:
         raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
@@ -58,7 +58,7 @@ def length(name: str, value: Any) -> float:
 
 
 def magnitude(name: str, value: Any) -> float:
-    """`value` as a number from 0 on whose square is a number too."""
+    """`value` as a number, 0 or more, whose square is finite."""
     result = at_least(name, value, 0.0)
     if result > LARGEST:
         raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
@@ -76,14 +76,14 @@ def count(name: str, value: Any, least: int = 1) -> int:
 
 
 def memory() -> int:
-    """Bytes of memory that this machine has."""
+    """Memory of this machine [bytes]."""
     import psutil
 
     return int(psutil.virtual_memory().total)
 
 
 def in_bytes(size: float) -> str:
-    """A number of bytes as people read it.
+    """A number of bytes in a unit that suits it.
 
     >>> in_bytes(1.46e14)
     '146 TB'
@@ -95,13 +95,13 @@ def in_bytes(size: float) -> str:
 
 
 def particles_fit(name: str, count: int) -> None:
-    """Raise a SceneError if so many particles do not fit this machine's memory."""
-    count = min(count, 10**300)  # of which a float can be made
+    """Raise a SceneError if so many particles do not fit into the memory of this machine."""
+    count = min(count, 10**300)  # which float() can convert
     size = _PARTICLE * count
     if count > _FEW and size > memory():
         raise SceneError(
-            f"{name} must be particles that fit in memory, got {count:.6g}, which take {in_bytes(size)} where there "
-            f"are {in_bytes(memory())}"
+            f"{name} must fit in memory, got {count:.6g} particles, which take {in_bytes(size)}; this machine has "
+            f"{in_bytes(memory())}"
         )
 
 
@@ -139,7 +139,7 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """`value` as an array of floats."""
     parts = value if isinstance(value, (list, tuple)) else (value,)
     if any(isinstance(part, np.ma.MaskedArray) for part in parts):
-        raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill what is masked")
+        raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill the masked entries")
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "iufO":

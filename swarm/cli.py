@@ -1,5 +1,6 @@
 """The commands. No physics, and no heavy import before it is needed: --help must be fast."""
 
+import dataclasses
 import itertools
 import json
 import shlex
@@ -42,7 +43,7 @@ def _options(
 
 
 @app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")
-def run(
+def run(  # noqa: PLR0913  one argument an option
     scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene, the method and the run.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
@@ -51,30 +52,32 @@ def run(
         int | None, typer.Option(help="Threads [default: all cores]; results do not depend on it.")
     ] = None,
     recording: Annotated[
-        Path | None, typer.Option("--record", metavar="OUT.rrd", help="Record it for Rerun and swarm view.")
+        Path | None, typer.Option("--record", metavar="OUT.rrd", help="Recording for Rerun and swarm view.")
     ] = None,
-    live: Annotated[bool, typer.Option("--live", help="Show it in a Rerun viewer while it runs.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Show the run in a Rerun viewer.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on from the last checkpoint of a run that was stopped.")
+        bool, typer.Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
     ] = False,
     walltime: Annotated[
         str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="How it ended as JSON, however it ends.")] = False,
+    compile: Annotated[
+        str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print how the run ended as JSON, also if it fails.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
-    # What an exception does in the midst of an import nobody knows; nothing is open yet.
+    # An exception in the middle of an import may be lost; nothing is open yet.
     with interrupt.at_once():
         from . import scene_file as files
         from .checks import duration
         from .output import paths
-        from .output.storage import Storage
-        from .run.simulation import simulate
+        from .run.simulation import carry_out
         from .summary import numbers, of_result
 
-    def told(status: str, written: Path | None = None, **more: Any) -> None:
+    def report(status: str, written: Path | None = None, **more: Any) -> None:
         if as_json:
             print(json.dumps({"status": status, **(numbers(written) if written else {}), **more}, indent=2))
 
@@ -83,83 +86,70 @@ def run(
             job = files.read(scene_file)
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
             target = paths.target_of("trajectory", output or stored)
-            limit = None if walltime is None else duration("--walltime", walltime)
-            named = recording or (None if resume else job.run.recording)
-            shown = None if named is None else paths.target_of("recording", named)
+            options = dataclasses.replace(
+                job.run,
+                trajectory=target,
+                recording=recording or (None if resume else job.run.recording),
+                live=live,
+                threads=job.run.threads if threads is None else threads,
+                progress=not quiet,
+                overwrite=overwrite,
+                scene_text=job.text,
+                resume=resume,
+                walltime=None if walltime is None else duration("--walltime", walltime),
+                compile=compile or job.run.compile,
+            )
             # Before particles are made and kernels compiled.
-            Storage(job.run.frames, job.run.precision, job.run.compression)
-            outputs = {"trajectory": target, "checkpoint": paths.checkpoint_of(target), "recording": shown}
-            paths.check_distinct(outputs, {"scene file": scene_file, "file of the particles": job.start_file()})
+            inputs = {"scene file": scene_file, "file of the particles": job.start_file()}
+            paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
             paths.check_target(target, overwrite or resume)
-            if shown is not None:
-                paths.check_target(shown, overwrite, "recording")
+            if options.recording is not None:
+                paths.check_target(options.recording, overwrite, "recording")
             before, particles = paths.identity(target), job.particles()
-            goes_on = resume and paths.checkpoint_of(target).exists()
-        result = simulate(
-            job.scene,
-            particles,
-            job.method,
-            until=job.run.until,
-            every=job.run.every,
-            trajectory=target,
-            recording=shown,
-            record_particles=job.run.record_particles,
-            record_color=job.run.record_color,
-            record_megabytes=job.run.record_megabytes,
-            live=live,
-            threads=threads if threads is not None else job.run.threads,
-            progress=not quiet,
-            overwrite=overwrite,
-            scene_text=job.text,
-            frames=job.run.frames,
-            precision=job.run.precision,
-            compression=job.run.compression,
-            checkpoint=job.run.checkpoint,
-            resume=resume,
-            walltime=limit,
-        )
+            resumes = resume and paths.checkpoint_of(target).exists()
+        result = carry_out(job.scene, particles, job.method, options)
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
-        # A second signal ends what follows: the files are closed.
+        # A second signal may end the process here: the files are closed.
         with interrupt.at_once():
-            began = target.exists() and (goes_on or paths.identity(target) != before)
-            again = _stopped(status, target, began)
-            if began:
-                told(status, target, resume=again)
+            has_frames = target.exists() and (resumes or paths.identity(target) != before)
+            again = _stopped(status, target, has_frames)
+            if has_frames:
+                report(status, target, resume=again)
             else:
-                told(status, frames=0, resume=again)
+                report(status, frames=0, resume=again)
         raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
-        told("complete", target)
+        report("complete", target)
         return
     except SwarmError as error:
-        told("failed", error=str(error))
+        report("failed", error=str(error))
         raise
-    told("complete", target, wall_time=result.wall_time)
+    report("complete", target, wall_time=result.wall_time)
     if not (quiet or as_json):
         _table(of_result(result, particles.volume))
 
 
-def _stopped(status: str, target: Path, began: bool) -> str | None:
-    """Say how to go on with a run that was stopped: the command, or None where there is nothing to go on from."""
+def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
+    """Say how to resume a run that was stopped: the command, or None if there is nothing to resume from."""
     from .output import paths
 
-    reason = "interrupted" if status == "interrupted" else "the wall time is over"
-    if not began:
+    reason = "interrupted" if status == "interrupted" else "the wall time limit is reached"
+    if not has_frames:
         print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
         return None
     held = f"{reason}: {target} holds the frames that were finished"
     if not paths.checkpoint_of(target).exists():
-        print(f"{held}; there was no time for a checkpoint to go on from", file=sys.stderr)
+        print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
         return None
     command = shlex.join(["swarm", *_words_again(sys.argv[1:]), "--resume"])
-    print(f"{held}; go on with\n  {command}", file=sys.stderr)
+    print(f"{held}; resume with\n  {command}", file=sys.stderr)
     return command
 
 
 def _words_again(words: list[str]) -> list[str]:
-    """What was typed, but for what a resumed run cannot do."""
+    """The arguments of this command, without those that a resumed run cannot have."""
     again: list[str] = []
     for before, word in itertools.pairwise(["", *words]):
         name = word.partition("=")[0]
@@ -171,9 +161,11 @@ def _words_again(words: list[str]) -> list[str]:
 @app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")
 def info(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A trajectory (.h5) or a recording (.rrd).")],
-    repair: Annotated[bool, typer.Option("--repair", help="Mend a recording that a crash cut off, in place.")] = False,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Repair a recording that a crash truncated, in place.")
+    ] = False,
 ) -> None:
-    """Say what a trajectory or a recording holds."""
+    """Show what a trajectory or a recording holds."""
     from . import summary
 
     if file.suffix == ".rrd":
@@ -190,9 +182,9 @@ def record(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
     ] = None,
-    particles: Annotated[int, typer.Option(help="Record at most so many, evenly chosen.")] = 5000,
-    color: Annotated[str, typer.Option(help="What colours them: speed or energy-error.")] = "speed",
-    megabytes: Annotated[float, typer.Option(help="Record every k-th frame where it would be larger.")] = 100.0,
+    particles: Annotated[int, typer.Option(help="Most particles recorded, evenly chosen.")] = 5000,
+    color: Annotated[str, typer.Option(help="Colour by speed or energy-error.")] = "speed",
+    megabytes: Annotated[float, typer.Option(help="Largest size; if needed, every k-th frame is recorded.")] = 100.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
 ) -> None:
     """Make a Rerun recording of a trajectory."""
@@ -221,7 +213,9 @@ def view(
     ] = None,
     viewer: Annotated[
         bool | None,
-        typer.Option("--viewer/--no-viewer", help="By the Rerun viewer or matplotlib [default: what is there]."),
+        typer.Option(
+            "--viewer/--no-viewer", help="By the Rerun viewer or by matplotlib [default: the viewer if it can]."
+        ),
     ] = None,
 ) -> None:
     """Draw a contact sheet of a recording; no screen and no GPU are needed."""
@@ -260,7 +254,7 @@ def plot(
 
 
 def _check_picture(target: Path, source: Path) -> None:
-    """A picture is made again in no time: an old one is replaced."""
+    """Raise a SceneError if the picture cannot be written; an old one is cheap to redraw, so overwritten."""
     from .output.paths import check_distinct, check_target
 
     check_distinct({"picture": target}, {"file that it is drawn from": source})
@@ -270,11 +264,11 @@ def _check_picture(target: Path, source: Path) -> None:
 
 
 def _numbers(name: str, text: str) -> list[float]:
-    """Numbers with commas between them."""
+    """Comma-separated numbers."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise SceneError(f"{name} must be numbers with commas between them, got {text!r}") from None
+        raise SceneError(f"{name} must be comma-separated numbers, got {text!r}") from None
 
 
 def _table(rows: dict[str, str]) -> None:

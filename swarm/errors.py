@@ -1,4 +1,4 @@
-"""What goes wrong, as sentences: what was expected, what came, where, and how to mend it."""
+"""Errors: each message says what was expected, what was given, where, and how to fix it."""
 
 
 class SwarmError(Exception):
@@ -10,7 +10,7 @@ class SceneError(SwarmError, ValueError):
 
 
 class CompleteError(SceneError):
-    """A run that cannot be resumed because nothing of it is left to do."""
+    """A run that cannot be resumed because it is complete."""
 
 
 class FileError(SwarmError, OSError):
@@ -18,8 +18,8 @@ class FileError(SwarmError, OSError):
 
 
 class WallTimeError(SwarmError):
-    """A run that stopped at its limit of wall time, with a checkpoint if it makes any; resume goes on with it."""
+    """A run that stopped at its wall time limit; if it makes checkpoints, it can be resumed."""
 
 
 class RunError(SwarmError, RuntimeError):
-    """A run that could not go on; every finished frame is kept."""
+    """A run that failed; every finished frame is kept."""

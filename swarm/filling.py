@@ -1,4 +1,4 @@
-"""Particles at random, uniform in the admissible volume of a scene."""
+"""Random particles, uniform in the admissible volume of a scene."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +9,7 @@ from .particles import Floats, Particles
 from .scene import Scene
 
 _BATCH = 1 << 18
-# Give up when so many points were tried and fewer than one in a million was admissible.
+# The search ends after so many points if fewer than one in a million was admissible.
 _TRIES = 20_000_000
 
 
@@ -33,11 +33,11 @@ def fill(
         seed: the same seed gives the same particles.
 
     Returns:
-        The particles; their `volume` is the admissible volume [m^3] as the random points found it.
+        The particles; their `volume` is the admissible volume [m^3], estimated from the random points.
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
-            volume is open, or so thin that random points do not find it.
+            volume is open, or too thin for random points to find it.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -68,7 +68,7 @@ def fill(
 
 
 def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
-    """Points, and the volume that the share of random points of the box which were admissible stands for."""
+    """Admissible points, and the volume from their share of the random points of the bounding box."""
     low, high = (np.array(corner)[:, None] for corner in scene.bounds())
     if not np.isfinite(high - low).all():
         raise SceneError(

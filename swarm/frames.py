@@ -1,4 +1,4 @@
-"""The frames of a run: when they are, how much they take, and what is told of each."""
+"""The frames of a run: their times, their size, and what a progress display gets of each."""
 
 import copy
 import logging
@@ -13,26 +13,26 @@ from . import checks
 from .errors import SceneError
 
 _LOG = logging.getLogger("swarm")
-# Frames nearer to `until` than this part of `every` are `until`.
+# A frame nearer to `until` than this fraction of `every` is the last one.
 _SAME_TIME = 1e-9
-# More frames than any run has, but a number.
+# More frames than any run has, but finite.
 _MOST = 1e300
-# Bytes of a frame's observables: numbers in a file, Python's objects for them in memory; and of one surface more.
+# Bytes of a frame's observables: numbers in a file, Python objects in memory; and what each surface adds.
 _NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 8
 
 
 @dataclass(frozen=True)
 class Frame:
-    """What is known when a frame is done: for progress displays."""
+    """A finished frame, for progress displays."""
 
     number: int
     time: float
     until: float
     observables: dict[str, Any]
-    written: int = 0  # frames that the trajectory holds for sure
+    written: int = 0  # frames that are in the trajectory
 
     def apart(self) -> "Frame":
-        """The same with observables of its own: who is given it may change them."""
+        """A copy with observables of its own, which its receiver may change."""
         return replace(self, observables=copy.deepcopy(self.observables))
 
 
@@ -66,7 +66,7 @@ class FrameTimes:
 
     @property
     def count(self) -> int:
-        """How many there are: more than `len` may return, if `every` is tiny."""
+        """Number of frames; it may be more than `len` can return."""
         assert self.every is not None
         return 1 + max(1, math.ceil(min(self.until / self.every, _MOST) - _SAME_TIME))
 
@@ -79,14 +79,14 @@ class FrameTimes:
         yield self.count - 1, before, self.until
 
     def require_room(self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool) -> None:
-        """Raise a SceneError if the frames from `first` on fit neither the disk nor, without a file, the memory.
+        """Raise a SceneError if the frames from `first` on do not fit on the disk or, without a file, in memory.
 
         Args:
-            first: number of the first frame that is to be kept.
+            first: number of the first frame that is kept.
             target: the trajectory, or None.
             numbers: bytes of the particles in a frame.
-            surfaces: how many there are.
-            packed: whether these are compressed: nobody knows how small they become, but observables never are.
+            surfaces: their number.
+            packed: whether these are compressed, so that their size is unknown; observables never are.
         """
         frames = self.count - first
         if target is None:
@@ -98,10 +98,10 @@ class FrameTimes:
             least = least if packed else size
             there = target.stat().st_size if target.exists() else 0
             room, where = shutil.disk_usage(target.parent).free + there, f"what is free in {target.parent.resolve()}"
-        told = f"{frames} frames, {'at most ' * packed}{checks.in_bytes(size)}"
+        needed = f"{frames} frames, {'at most ' * packed}{checks.in_bytes(size)}"
         if least > room:
             raise SceneError(
-                f"every must leave frames that fit, got {self.every:g} s until {self.until:g} s: {told}, and {where} "
+                f"every must leave frames that fit, got {self.every:g} s until {self.until:g} s: {needed}, and {where} "
                 f"is {checks.in_bytes(room)}; make every longer"
             )
-        _LOG.info("the run has %s", told)
+        _LOG.info("the run has %s", needed)

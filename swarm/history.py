@@ -1,22 +1,24 @@
 """The iteration of one particle's one contact step, sweep by sweep: for looking at a method, not for running it."""
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact import corner, reflection, uzawa
+from .contact.records import Step
 from .contact.regularisation import regularisation
 from .errors import RunError, SceneError
 from .kernel.gravity import accelerated, displacement
+from .kernel.vector import Vec, vec
 from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles
 from .scene import Scene
 from .status import Status
-from .surfaces import chain as walls
 from .surfaces import flights
+from .surfaces import fold as walls
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +94,7 @@ def contact_history(
     check_surfaces(method, scene)
     method.check(scene, particle)
     # Plain Python runs the functions that kernels are made of; with NumPy's numbers 1/0 is an infinity there too.
-    start = [*particle.position[:, 0], *particle.velocity[:, 0]]
+    start = Start(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
             if method.adaptive:
@@ -105,22 +107,28 @@ def contact_history(
     raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
 
 
+class Start(NamedTuple):
+    """The particle before its step."""
+
+    r: Vec
+    v: Vec
+
+
 class _Rows:
     """The entries of a history, collected sweep by sweep."""
 
-    def __init__(self, scene: Scene, start: list[float], mass: float, h: float) -> None:
+    def __init__(self, scene: Scene, start: Start, mass: float, h: float) -> None:
         self._scene, self._start, self._mass, self._h = scene, start, mass, h
-        self.free = displacement(scene.pull(), *start[3:], h)
-        self.c = np.float64(h * h / (2.0 * mass))
+        self.step = Step(start.r, displacement(scene.pull(), start.v, h), np.float64(h * h / (2.0 * mass)))
         self._rows: list[tuple[Any, ...]] = []
 
     def add(self, multiplier: Floats, mean: Floats, reactions: Floats, stored: float) -> None:
         """One sweep: lambda, alpha Phi_mean, and c D (alpha Phi_mean + lambda) and Phi1 of each wall."""
         reactions, constraint = reactions[:, :3], reactions[:, 3].copy()
         total = reactions.sum(axis=0)
-        r1 = np.array(self._start[:3]) + (np.array(self.free) - total)
-        v1 = np.array(accelerated(self._scene.pull(), *self._start[3:], self._h)) - 2.0 / self._h * total
-        force, strength = np.sqrt((reactions**2).sum(axis=1)) / self.c, multiplier + mean
+        r1 = np.array(self.step.r) + (np.array(self.step.p) - total)
+        v1 = np.array(accelerated(self._scene.pull(), self._start.v, self._h)) - 2.0 / self._h * total
+        force, strength = np.sqrt((reactions**2).sum(axis=1)) / self.step.c, multiplier + mean
         slope = np.divide(force, strength, out=np.zeros_like(force), where=strength != 0.0)
         kinetic = 0.5 * self._mass * float(v1 @ v1)
         self._rows.append((multiplier, multiplier * slope, mean * slope, constraint, kinetic, r1, v1, stored))
@@ -132,67 +140,55 @@ class _Rows:
         return ContactHistory(*columns, *[converged])
 
 
-def _at_the_wall(scene: Scene, start: list[float]) -> list[float]:
+def _at_the_wall(scene: Scene, start: Start) -> Start:
     """Position and velocity at the next impact."""
     chain = scene.chain()
-    time, surface = flights.first_hit(chain, None, *start)
-    if not np.isfinite(time):
-        raise SceneError(f"velocity must lead to a surface, got {tuple(start[3:])}, which never does")
-    place = [r + time * v for r, v in zip(start[:3], start[3:], strict=True)]
-    return [*walls.settle(chain, surface, *place), *start[3:]]
+    hit = flights.first_hit(chain, None, start.r, start.v)
+    if not np.isfinite(hit.time):
+        raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
+    return Start(walls.settle(chain, hit.wall, start.r + hit.time * start.v), start.v)
 
 
-def _uzawa(scene: Scene, start: list[float], mass: float, method: AugmentedLagrangian) -> ContactHistory:
+def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
     numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
     rows = _Rows(scene, start, mass, method.dt)
-    # Arguments as kernels take them: one number each.
-    step: Any = (*start[:3], *rows.free, rows.c)
-    multipliers, before, misses = np.zeros(count), np.zeros(count), np.zeros(count)
-    reactions = np.zeros((count, 4))
-    uzawa.start(numbers, numbers.law, chain, *step, *[multipliers])
+    multipliers, reactions = np.zeros(count), np.zeros((count, 4))
+    before = uzawa.Before(np.zeros(count), np.zeros(count))
+    uzawa.start(numbers, numbers.law, chain, rows.step, multipliers)
     for sweep in range(method.max_sweeps):
-        *_r1, stored, solved = uzawa.sweep_all(
-            numbers, numbers.law, chain, *step, *[multipliers, before, misses, sweep, reactions]
-        )
-        _require(solved, sweep)
-        rows.add(before.copy(), misses.copy(), reactions, float(stored))
-        if stored <= method.tolerance:
+        end = uzawa.sweep_all(numbers, numbers.law, chain, rows.step, multipliers, before, sweep, reactions)
+        _require(end.solved, sweep)
+        rows.add(before.multipliers.copy(), before.misses.copy(), reactions, float(end.stored))
+        if end.stored <= method.tolerance:
             return rows.history(True)
     return rows.history(False)
 
 
-def _penalty(scene: Scene, start: list[float], mass: float, method: Penalty) -> ContactHistory:
+def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> ContactHistory:
     numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
-    rows, r0, reactions = _Rows(scene, start, mass, method.dt), start[:3], np.zeros((count, 4))
-    step: Any = (*r0, *rows.free, rows.c)
-    *_r1, solved = corner.hold(numbers.form, numbers.law, None, chain, *step, *[reactions])
-    _require(solved, 0)
-    first, last = _constraints(numbers.law, chain, *r0), reactions[:, 3]
+    rows, reactions = _Rows(scene, start, mass, method.dt), np.zeros((count, 4))
+    _require(corner.hold(numbers.form, numbers.law, None, chain, rows.step, reactions).solved, 0)
+    first, last = np.zeros(count), reactions[:, 3]
+    corner.constraints(chain, numbers.law, 0, start.r, first)
     stored = 0.5 * method.penalty * float(last @ last)
     rows.add(np.zeros(count), 0.5 * method.penalty * (first + last), reactions, stored)
     return rows.history(True)
 
 
-def _impact(scene: Scene, start: list[float], mass: float, method: Impact) -> ContactHistory:
+def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactHistory:
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
     chain, count = scene.chain(), len(scene.owners())
-    rows, r0 = _Rows(scene, start, mass, method.contact_step), start[:3]
-    _time, index = flights.first_hit(chain, None, *start)
-    kappa = reflection.chord(chain, index, *r0, *rows.free)
-    r1 = walls.push(chain, index, *r0, *rows.free, kappa)
+    rows, r0 = _Rows(scene, start, mass, method.contact_step), start.r
+    wall = flights.first_hit(chain, None, r0, start.v).wall
+    kappa = reflection.chord(chain, wall, r0, rows.step.p)
+    r1 = walls.push(chain, wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
-    reactions[int(index), :3] = kappa * np.array(walls.inner_gradient(chain, index, *r0, *r1))
+    reactions[int(wall), :3] = kappa * np.array(walls.inner_gradient(chain, wall, r0, r1))
     # What Uzawa's loop with exponent 1 tends to.
-    multiplier[int(index)] = uzawa.multiplier_of(chain, index, regularisation(1.0, 1.0), *r0, rows.c, kappa)
+    multiplier[int(wall)] = uzawa.multiplier_of(chain, wall, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
     rows.add(multiplier, np.zeros(count), reactions, 0.0)
     return rows.history(True)
-
-
-def _constraints(law: Any, chain: Any, x: float, y: float, z: float) -> Floats:
-    found = np.zeros(walls.length(chain))
-    corner.constraints(chain, law, 0, x, y, z, found)
-    return found
 
 
 def _require(solved: bool, sweep: int) -> None:

@@ -3,7 +3,7 @@
 Sums run over fixed chunks of particles in a fixed order, so they have the same bits for any number of threads.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from .contact.energy import contact_energy
 from .kernel.gravity import Nothing, potential
 from .kernel.jit import by_type, inlined, kernel, scratch, select
+from .kernel.vector import Vec, column, cross, dot, square
 from .particles import State
-from .surfaces import base as surfaces
-from .surfaces import chain as walls
+from .surfaces import contract as surfaces
 from .surfaces import flights
+from .surfaces import fold as walls
 
 # Particles a partial sum: a constant of the results, unlike the block size.
 CHUNK = 256
@@ -27,43 +28,46 @@ Floats = NDArray[np.float64]
 
 
 @by_type
-def penetration(chain, x, y, z):
-    """Largest distance outside, max(g, 0)/|grad g|, over all surfaces."""
+def penetration(chain, r):
+    """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
     raise NotImplementedError
 
 
 @penetration.register(walls.Chain)
-def _(chain, x, y, z):
-    distance = surfaces.distance(chain.first, x, y, z)
-    other = penetration(chain.rest, x, y, z)
+def _(chain, r):
+    distance = surfaces.distance(chain.first, r)
+    other = penetration(chain.rest, r)
     return select(distance > other, distance, other)
 
 
 @penetration.register(Nothing)
-def _(chain, x, y, z):
+def _(chain, r):
     return 0.0
 
 
-@inlined
-def _energy(law, chain, gravity, m, x, y, z, vx, vy, vz):
+class Energies(NamedTuple):
     """Kinetic, potential and contact energy per mass of one particle."""
-    kinetic = 0.5 * (vx * vx + vy * vy + vz * vz)
-    return kinetic, potential(gravity, x, y, z), contact_energy(law, chain, 1.0 / m, x, y, z)
+
+    kinetic: float
+    fall: float
+    stored: float
+
+
+@inlined
+def _energies(law, chain, gravity, m, r, v):
+    return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, chain, 1.0 / m, r))
 
 
 @kernel
 def start_energies(law, chain, gravity, size, state):
     """Fill `energy` and `inverse_scale`: energy errors are relative to kinetic + contact + m |G| size at the start."""
-    position, velocity, mass = state.position, state.velocity, state.mass
-    weight = abs(potential(gravity, size, 0.0, 0.0)) + abs(potential(gravity, 0.0, size, 0.0))
-    weight += abs(potential(gravity, 0.0, 0.0, size))
+    mass = state.mass
+    weight = abs(potential(gravity, Vec(size, 0.0, 0.0))) + abs(potential(gravity, Vec(0.0, size, 0.0)))
+    weight += abs(potential(gravity, Vec(0.0, 0.0, size)))
     for i in range(mass.size):
-        kinetic, fall, stored = _energy(
-            law, chain, gravity, mass[i],
-            position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i],
-        )  # fmt: skip
-        state.energy[i] = kinetic + fall + stored
-        scale = kinetic + stored + weight
+        e = _energies(law, chain, gravity, mass[i], column(state.position, 0, i), column(state.velocity, 0, i))
+        state.energy[i] = e.kinetic + e.fall + e.stored
+        scale = e.kinetic + e.stored + weight
         state.inverse_scale[i] = 1.0 / scale if scale > 0.0 else 0.0
 
 
@@ -83,21 +87,21 @@ def observe(law, chain, gravity, state, drawn, size, partial):
             for left in range(begin, end, _COLUMNS):
                 for j in range(min(_COLUMNS, end - left)):
                     i = left + j
-                    m, x, y, z = mass[i], position[0, i], position[1, i], position[2, i]
-                    vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
-                    kinetic, fall, stored = _energy(law, chain, gravity, m, x, y, z, vx, vy, vz)
-                    px, py, pz = m * vx, m * vy, m * vz
-                    error = abs(kinetic + fall + stored - energy[i]) * inverse_scale[i]
-                    depth = penetration(chain, x, y, z)
-                    sums[_KINETIC, j] += m * kinetic
-                    sums[_POTENTIAL, j] += m * fall
-                    sums[_CONTACT, j] += m * stored
-                    sums[_PX, j] += px
-                    sums[_PY, j] += py
-                    sums[_PZ, j] += pz
-                    sums[_LX, j] += y * pz - z * py
-                    sums[_LY, j] += z * px - x * pz
-                    sums[_LZ, j] += x * py - y * px
+                    m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
+                    e = _energies(law, chain, gravity, m, r, v)
+                    p = m * v
+                    error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
+                    depth = penetration(chain, r)
+                    sums[_KINETIC, j] += m * e.kinetic
+                    sums[_POTENTIAL, j] += m * e.fall
+                    sums[_CONTACT, j] += m * e.stored
+                    spin = cross(r, p)
+                    sums[_PX, j] += p.x
+                    sums[_PY, j] += p.y
+                    sums[_PZ, j] += p.z
+                    sums[_LX, j] += spin.x
+                    sums[_LY, j] += spin.y
+                    sums[_LZ, j] += spin.z
                     sums[_ENERGY_ERROR, j] = select(error > sums[_ENERGY_ERROR, j], error, sums[_ENERGY_ERROR, j])
                     sums[_PENETRATION, j] = select(depth > sums[_PENETRATION, j], depth, sums[_PENETRATION, j])
             # Pairwise over the columns.
@@ -122,26 +126,24 @@ def count_escaped(chain, gravity, far, faces, state):
     """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(position.shape[1]):
-        x, y, z = position[0, i], position[1, i], position[2, i]
-        vx, vy, vz = velocity[0, i], velocity[1, i], velocity[2, i]
-        out = x * x + y * y + z * z > far * far
+        r, v = column(position, 0, i), column(velocity, 0, i)
+        out = square(r) > far * far
         for k in range(faces.shape[0]):
-            nx, ny, nz = faces[k, 0], faces[k, 1], faces[k, 2]
-            out |= (nx * x + ny * y + nz * z > faces[k, 3]) & (nx * vx + ny * vy + nz * vz > 0.0)
-        count += out or _escapes(gravity, chain, x, y, z, vx, vy, vz)
+            n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
+            out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
+        count += out or _escapes(gravity, chain, r, v)
     return count
 
 
 @by_type
-def _escapes(gravity, chain, x, y, z, vx, vy, vz):
+def _escapes(gravity, chain, r, v):
     """Gravity brings particles back, or not: only their distance tells."""
     return False
 
 
 @_escapes.register(Nothing)
-def _(gravity, chain, x, y, z, vx, vy, vz):
-    time, _wall = flights.first_hit(chain, gravity, x, y, z, vx, vy, vz)
-    return (time == np.inf) & (vx * vx + vy * vy + vz * vz > 0.0)
+def _(gravity, chain, r, v):
+    return (flights.first_hit(chain, gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
 def drift(seen: dict[str, Any]) -> float:

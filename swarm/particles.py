@@ -1,4 +1,4 @@
-"""Particles: struct-of-arrays state, one row a component."""
+"""Particles: arrays with one row per component."""
 
 import csv
 import re
@@ -25,8 +25,8 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
 
-    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Whatever is assigned
-    to them later is checked when a run takes them, and converted as it is here.
+    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. What is assigned to
+    them later is checked and converted in the same way when a run begins.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass not from 1e-100 to
@@ -42,19 +42,9 @@ class Particles:
         checked = _checked(position, velocity, mass)
         self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
 
-    def checked(self) -> "Particles":
-        """The same particles, checked again; arrays that kernels can take as they are are shared, not copied."""
-        particles = Particles.__new__(Particles)
-        checked = _checked(self.position, self.velocity, self.mass)
-        particles.position, particles.velocity, particles.mass = map(np.ascontiguousarray, checked)
-        return particles
-
-    @classmethod
-    def of(cls, state: "State") -> "Particles":
-        """The particles of a run that has ended: its own arrays, which kernels have kept in order, not copied."""
-        particles = cls.__new__(cls)
-        particles.position, particles.velocity, particles.mass = state.position, state.velocity, state.mass
-        return particles
+    def copy(self) -> "Particles":
+        """The same particles, checked again, with arrays of their own."""
+        return Particles(self.position, self.velocity, self.mass)
 
     def __len__(self) -> int:
         return int(self.position.shape[1])
@@ -98,14 +88,14 @@ class Particles:
 
 
 class Multipliers(NamedTuple):
-    """What a method with multipliers tells of each particle's Uzawa loops, since the start.
+    """Statistics of each particle's Uzawa loops since the start, from methods with multipliers.
 
     Attributes:
         sweeps: (N,) sweeps of all its contact steps together.
         contacts: (N,) contact steps.
         unconverged: (N,) contact steps whose loop did not reach the tolerance.
         stored_energy: (N,) the largest V that a loop left [J].
-        left: (N,) what was left of the frame, in the method's unit, where a loop failed.
+        left: (N,) the rest of the frame, in the method's unit, where a loop failed.
     """
 
     sweeps: NDArray[np.int64]
@@ -118,7 +108,7 @@ class Multipliers(NamedTuple):
 class State(NamedTuple):
     """The arrays that kernels advance.
 
-    Energies are per mass, so that the mass of a particle does not change a bit of its flight.
+    Energies are per mass, so that the mass of a particle does not change the bits of its flight.
     """
 
     position: Floats  # (3, N)
@@ -128,7 +118,7 @@ class State(NamedTuple):
     inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
     impacts: NDArray[np.int64]  # (N,) since the start
     impulse: Floats  # (walls, N) normal impulse since the start [N s]
-    dissipated: Floats  # (N,) energy lost since the start [J]; without entries where none can be
+    dissipated: Floats  # (N,) energy lost since the start [J]; empty if no wall dissipates
     multipliers: Multipliers | None
 
 
@@ -137,7 +127,7 @@ def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str])
         raise SceneError(f"{path}, row {number}: expected {len(header)} cells, got {len(cells)}")
     values = []
     for name, cell in zip(header, cells, strict=True):
-        # Python's float takes more than other programs write: 1_0, and the digits of all scripts.
+        # float() also takes what other programs do not write: 1_0, and the digits of all scripts.
         value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
         if not np.isfinite(value):
             raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell[:40]!r}")
@@ -156,7 +146,7 @@ def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple
     if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
         raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
     masses = np.broadcast_to(masses, (n,))
-    # Not finite compares as false.
+    # NaN compares as false.
     if not (masses.min() >= checks.SMALLEST and masses.max() <= checks.LARGEST):
         first = int(np.argmin((masses >= checks.SMALLEST) & (masses <= checks.LARGEST)))
         raise SceneError(
@@ -175,7 +165,7 @@ def _rows(name: str, value: ArrayLike) -> Floats:
         raise SceneError(f"{name} must have shape (3, N), rows x, y, z, got {rows.shape}{hint}")
     if rows.shape[1] == 0:
         raise SceneError(f"{name} must hold at least one particle, got shape {rows.shape}")
-    # Not finite compares as false. Beyond the limit the kinetic energy is no number, nor what phi computes.
+    # NaN compares as false. Beyond the limit the kinetic energy and phi overflow.
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)
         first = int(np.argmin(good))

@@ -1,4 +1,4 @@
-"""The scene: surfaces and gravity; what volume they leave."""
+"""The scene: surfaces, gravity, and the volume that the surfaces leave."""
 
 import itertools
 import math
@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from .errors import SceneError
 from .kernel.gravity import Gravity
-from .surfaces import base, required
-from .surfaces.base import Box, Surface
-from .surfaces.chain import Chain, chain_of
+from .surfaces import required
+from .surfaces.fold import Chain, chain_of
+from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
-# Walls that kernels can be compiled for: of 24 with `contact_step` it takes three minutes, of 28 it fails.
+# Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
 # The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
 _STARTS = 512
@@ -30,7 +30,7 @@ _PAST = 1.05
 _BATCH = 4096
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6
-# What is cut off there is looked at again this far out, with the round-off of a vertex that is there.
+# If that cuts the volume, it is bounded again at this distance, with the round-off of a vertex there.
 _FARTHEST, _ROUND_OFF = 1e15, 1e-14
 # Determinants of three normals: below the first they meet in a flat corner, below the second in none.
 _FLAT, _PARALLEL = 1e-12, 1e-15
@@ -73,8 +73,8 @@ class Scene:
         if walls > MOST_WALLS:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all, got {walls} of {len(surfaces)} surfaces: each "
-                "wall is compiled into the kernels, and of more the compiler runs out of its stack; leave some out (a "
-                "box has 3 walls, a capped cylinder 2, most others 1)"
+                "wall is compiled into the kernels, and with more the compiler runs out of stack; remove some (a box "
+                "has 3 walls, a capped cylinder 2, most others 1)"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
         if not self._has_volume():
@@ -128,9 +128,9 @@ class Scene:
         return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
     def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-        """Which of the points (3, N) are farther outside than this distance [m], or where phi is no number."""
+        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
         found = []
-        # Few at once, so that what NumPy has computed is still in the processor's cache.
+        # In batches, so that NumPy's intermediate results stay in the processor's cache.
         for begin in range(0, points.shape[1], _BATCH):
             batch = points[:, begin : begin + _BATCH]
             suspects = np.flatnonzero(~(self.gaps(batch) <= 0.0).all(axis=0))
@@ -144,7 +144,7 @@ class Scene:
         return not np.isfinite(self.bounds()).all()
 
     def open_faces(self) -> NDArray[np.float64]:
-        """Faces without a wall that gravity pulls nothing back through, rows (n, offset): beyond is n.r > offset."""
+        """Open faces through which gravity pulls no particle back: rows (n, offset), beyond is n.r > offset."""
         faces = [(*n, offset) for surface in self.surfaces for n, offset in surface.open_faces()]
         rows = np.array(faces).reshape(-1, 4)
         return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]
@@ -178,7 +178,7 @@ class Scene:
                 points[:, outside] -= _PAST * gaps[i, outside] / slope * gradient
         points = points[:, np.argsort(self.gaps(points).max(axis=0))[:_NEAREST]]
         for _ in range(_STEPS):
-            # One surface after the other creeps along a sharp edge; Newton's step for all that are near does not.
+            # One surface after the other converges slowly along a sharp edge; a Newton step for all near ones does not.
             gradients = np.array([_side(surface) * surface.gradient(points) for surface in self.surfaces])
             lengths = np.maximum(np.sqrt((gradients**2).sum(axis=1)), np.finfo(np.float64).tiny)
             gaps = self.gaps(points) / lengths
@@ -197,10 +197,10 @@ class Scene:
 
 
 def _side(surface: Surface) -> float:
-    return base.SIDES[getattr(surface, "side", "inside")]
+    return SIDES[getattr(surface, "side", "inside")]
 
 
-def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
+def _polyhedron_bounds(planes: list[HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
     """Bounds of the half-spaces' intersection with a box, from its vertices."""
     finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(offset) for _normal, offset in planes]
     scale = max(finite, default=0.0) or 1.0
@@ -210,15 +210,15 @@ def _polyhedron_bounds(planes: list[base.HalfSpace], low: Any, high: Any) -> tup
     far_low, far_high, is_open, _is_flat = _closed_bounds(planes, low, high, _FARTHEST * scale, 0.0, _ROUND_OFF)
     if is_open:
         return new_low, new_high
-    # Closed, but flat and far away, as a cone of half angle near pi/2: the bounds are as rough as vertices there.
+    # Closed, but flat and far away, as a cone of half angle near pi/2: the bounds are as accurate as vertices there.
     rough = _ROUND_OFF * max(np.abs(far_low).max(), np.abs(far_high).max()) / scale * (far_high - far_low)
     return np.maximum(low, far_low - rough), np.minimum(high, far_high + rough)
 
 
 def _closed_bounds(
-    planes: list[base.HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
+    planes: list[HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
 ) -> tuple[Any, Any, bool, bool]:
-    """Bounds from the vertices within a far box; whether it cuts the volume off, and whether a vertex was too flat."""
+    """Bounds from the vertices within a far box; whether the box cuts the volume, and whether a vertex was too flat."""
     box_low, box_high = np.maximum(low, -far), np.minimum(high, far)
     normals = np.vstack([[normal for normal, _offset in planes], np.eye(3), -np.eye(3)])
     offsets = np.concatenate([[offset for _normal, offset in planes], box_high, -box_low])

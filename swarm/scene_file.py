@@ -1,4 +1,4 @@
-"""Scene files: TOML to a job. A scene file is data: nothing in it is run."""
+"""Scene files: TOML to a job. A scene file is data: nothing in it is executed."""
 
 import dataclasses
 import tomllib
@@ -12,14 +12,16 @@ from .errors import SceneError
 from .filling import fill
 from .methods import Method
 from .particles import Particles
+from .run.options import RunOptions
 from .scene import Scene
 
 _TABLES = ("gravity", "particles", "surface", "method", "run")
+_SAVED = {"checkpoint": 60.0}
 
 
 @dataclass(frozen=True)
 class ParticlesTable:
-    """[particles]: how many, how fast, how heavy; or the file they come from."""
+    """[particles]: their number, speed and mass, or the file that holds them."""
 
     count: int | None = None
     speed: float | None = None
@@ -31,36 +33,18 @@ class ParticlesTable:
 
 
 @dataclass(frozen=True)
-class RunTable:
-    """[run]: until when, how often to look, where and what to write."""
-
-    until: float
-    every: float | None = None
-    threads: int | None = None
-    trajectory: str | None = None
-    frames: str | int = "all"
-    precision: str = "float64"
-    compression: str = "none"
-    checkpoint: float = 60.0
-    recording: str | None = None
-    record_particles: int = 5000
-    record_color: str = "speed"
-    record_megabytes: float = 100.0
-
-
-@dataclass(frozen=True)
 class Job:
     """What a scene file describes, checked; `text` is the file itself."""
 
     scene: Scene
     method: Method
-    run: RunTable
+    run: RunOptions
     text: str
     source: ParticlesTable
     path: Path
 
     def start_file(self) -> Path | None:
-        """The file that the particles come from, if they do."""
+        """The file that holds the particles, or None."""
         return None if self.source.source is None else self.path.parent / self.source.source
 
     def particles(self) -> Particles:
@@ -105,7 +89,7 @@ def read(path: str | Path) -> Job:
     """
     path = Path(path)
     try:
-        # As editors on Windows save it: with a mark of the byte order.
+        # Editors on Windows begin a file with a byte order mark.
         text = path.read_text(encoding="utf-8-sig")
         document = tomllib.loads(text)
     except RecursionError:
@@ -130,27 +114,32 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
     return Job(
         scene=tables.scene_of(document.get("surface"), document.get("gravity")),
         method=tables.method_of(document["method"]),
-        run=tables.convert(document["run"], RunTable, "run"),
+        run=_run(document["run"]),
         text=text,
         source=source,
         path=path,
     )
 
 
+def _run(table: Any) -> RunOptions:
+    """[run]; a run from a file saves checkpoints even where it does not say so."""
+    return tables.convert({**_SAVED, **table} if isinstance(table, dict) else table, RunOptions, "run")
+
+
 def _check_source(table: ParticlesTable) -> None:
     filled = ("count", "speed", "temperature", "mass", "seed")
     if table.source is None:
         if table.frame is not None:
-            raise SceneError('particles.frame: only goes with from = "FILE.h5"')
+            raise SceneError('particles.frame: needs from = "FILE.h5"')
         if table.count is None:
             raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
         count("particles.count", table.count)
         return
     both = [name for name in filled if getattr(table, name) is not None]
     if both:
-        raise SceneError(f"particles.{both[0]}: does not go with from = {table.source!r}; leave one of them out")
+        raise SceneError(f"particles.{both[0]}: cannot be combined with from = {table.source!r}; remove one of them")
     suffix = Path(table.source).suffix.lower()
     if suffix not in (".csv", ".h5"):
         raise SceneError(f"particles.from: expected a .csv or .h5 file, got {table.source!r}")
     if table.frame is not None and suffix != ".h5":
-        raise SceneError('particles.frame: only goes with from = "FILE.h5"')
+        raise SceneError('particles.frame: needs from = "FILE.h5"')

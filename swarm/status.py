@@ -1,4 +1,4 @@
-"""What a kernel can report."""
+"""Status codes of kernels."""
 
 from enum import IntEnum
 
@@ -26,9 +26,9 @@ _SENTENCES = {
     Status.INTERRUPTED: "the run was interrupted",
     Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
     Status.STALLED: "the particle met its walls 100 million times within one frame, as in a cusp or in a gap that is "
-    "thin beyond measure; start it elsewhere, or observe more often",
+    "too thin to resolve; start it elsewhere, or use more frames",
     Status.TOO_FAST: "a step is longer than the thinnest solid, so that the particle could jump over it",
     Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
-    Status.HARD_CONTACT: "a contact needs the kernel for hard ones",
+    Status.HARD_CONTACT: "a contact needs the slow-path kernel",
 }

@@ -1,4 +1,4 @@
-"""How a run went and what its files hold: rows for people, numbers for other programs."""
+"""Summaries of runs and their files: text for people, numbers for other programs."""
 
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from .run.simulation import Result
 
 
 def numbers(trajectory: Path) -> dict[str, Any]:
-    """A run's summary from its trajectory, which holds a frame: what JSON can hold."""
+    """A run's summary from its trajectory, which holds at least one frame, in the types of JSON."""
     from .output.trajectory import load
 
     with load(trajectory) as written:
@@ -29,7 +29,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
 
 
 def of_trajectory(file: Path) -> dict[str, str]:
-    """What a trajectory holds, and whether it went well."""
+    """What a trajectory holds, and whether the run went well."""
     from .output.trajectory import load
 
     with load(file) as trajectory:
@@ -50,7 +50,7 @@ def of_trajectory(file: Path) -> dict[str, str]:
 
 
 def of_recording(file: Path, repair: bool) -> dict[str, str]:
-    """What a recording holds; mended before, if it is to be."""
+    """What a recording holds; with `repair`, after its repair."""
     from .output.extras import needed_by
 
     with needed_by("a recording", "record"):
@@ -68,7 +68,7 @@ def of_recording(file: Path, repair: bool) -> dict[str, str]:
         "colour": f"{about['quantity']}, {about['low']:g} to {about['high']:g}",
         "entities": "\n".join(f"{path} ({rows} rows)" for path, rows in sorted(held.entities.items())),
         "size": f"{file.stat().st_size / 1e6:.1f} MB",
-        "whole": "yes" if whole else f"no, it was cut off: swarm info --repair {file}",
+        "whole": "yes" if whole else f"no, it is truncated: swarm info --repair {file}",
     }
 
 
@@ -99,5 +99,5 @@ def _figures(seen: dict[str, Any]) -> dict[str, str]:
 
 
 def _call(described: Any) -> str:
-    """A surface or method as one would write it."""
+    """A surface or method as Python code writes it."""
     return str(described).replace("swarm.", "")

@@ -1,4 +1,4 @@
-"""Descriptions as plain tables (what a scene file and a trajectory hold) and back.
+"""Surfaces, scenes and methods as plain tables, which scene files and trajectories hold, and back.
 
 Every error names the key by its full path, such as surface[1].radius.
 """
@@ -23,13 +23,13 @@ def scene_of(surfaces: Any, gravity: Any) -> Scene:
     """A scene from its tables: a list of surface tables, and gravity or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
-    built = [_described(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
+    built = [_from_table(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
     return Scene(surfaces=built, gravity=gravity)
 
 
 def method_of(table: Any) -> Method:
     """A method from its table."""
-    return _described(table, "method", ALL_METHODS)
+    return _from_table(table, "method", ALL_METHODS)
 
 
 def table_of(described: Surface | Method) -> dict[str, Any]:
@@ -52,11 +52,12 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     """A dataclass from a table: no unknown key, no missing one, every value of its type."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
-    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    # What has no place in a file is an unknown key there.
+    fields = [one for one in dataclasses.fields(cls) if one.metadata.get("in_file", True)]  # type: ignore[arg-type]
     names = {field.metadata.get("key", field.name): field for field in fields}
     for key in table:
         if key not in names:
-            hint = "; gravity stands at the top, before the first table" if key == "gravity" else closest(key, names)
+            hint = "; gravity belongs at the top, before the first table" if key == "gravity" else closest(key, names)
             raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
     for key, field in names.items():
         if field.default is dataclasses.MISSING and key not in table:
@@ -69,14 +70,15 @@ def convert(table: Any, cls: type[T], where: str) -> T:
         ) from None
 
 
-def _described(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
+def _from_table(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:
         raise SceneError(f"{where}.kind: expected one of {listed(kinds)}, got nothing")
     if table["kind"] == "own":
         raise SceneError(
-            f"{where}.kind: 'own' is a phi in Python, which no file holds; make the scene as its script does"
+            f"{where}.kind: 'own' is a phi in Python, which no file holds; build the scene in Python, as the run's "
+            "script does"
         )
     cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
     return convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
@@ -89,7 +91,7 @@ def _type_name(kind: Any) -> str:
 
 
 def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[str, str]) -> str:
-    """Msgspec's "Expected `float`, got `str` - at `$.radius`", with the key first and the value that came."""
+    """Msgspec's "Expected `float`, got `str` - at `$.radius`", with the key first and the value."""
     match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*)`)?", message)
     assert match is not None
     reason, path = match.groups()

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 import swarm
 from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
-from swarm.surfaces import base
-from swarm.surfaces.chain import Chain
+from swarm.kernel.vector import Vec, vec
+from swarm.surfaces import contract
+from swarm.surfaces.fold import Chain
 from swarm.surfaces.rotation import Rotated
 
 settings.register_profile(
@@ -110,24 +111,29 @@ def exponent_of(law):
 
 def call(function, *arguments):
     """A kernel's scalar function in plain Python, in the arithmetic of kernels: 1/0 is infinite and no error."""
-    flat = []
-    for part in arguments:
-        flat += map(np.float64, np.atleast_1d(part)) if isinstance(part, (float, int, np.ndarray)) else [part]
     with np.errstate(all="ignore"):
-        return function(*flat)
+        return function(*map(_as_kernels_take_it, arguments))
+
+
+def _as_kernels_take_it(value):
+    if isinstance(value, np.ndarray) and value.shape == (3,):
+        return vec(map(np.float64, value))
+    if isinstance(value, Vec):
+        return type(value)(*map(np.float64, value))
+    return np.float64(value) if isinstance(value, (float, int)) and not isinstance(value, bool) else value
 
 
 def wall_point(surface, point):
     """A point of the surface, by Newton's method along the gradient."""
     for _ in range(30):
-        gradient = np.array(call(base.gradient, surface, point))
-        point = point - call(base.phi, surface, point) / (gradient @ gradient) * gradient
-    return np.array(call(base.settle, surface, point))
+        gradient = np.array(call(contract.gradient, surface, point))
+        point = point - call(contract.phi, surface, point) / (gradient @ gradient) * gradient
+    return np.array(call(contract.settle, surface, point))
 
 
 def gap(surface, point):
     """The signed gap at a point."""
-    return float(call(base.gap_of, surface, call(base.inner, surface, point)))
+    return float(call(contract.gap_of, surface, call(contract.inner, surface, point)))
 
 
 def scene_of(*names, **keywords):

@@ -7,7 +7,7 @@ import pytest
 
 from swarm import SceneError, SwarmError, checks
 
-MASKED = "points must be an array without a mask, got a masked one; remove or fill what is masked"
+MASKED = "points must be an array without a mask, got a masked one; remove or fill the masked entries"
 
 
 @pytest.mark.parametrize("value", [2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0)])

@@ -1,4 +1,4 @@
-"""README: its first screen is examples/quickstart.py; its Python, scene file and commands run; its files exist."""
+"""The READMEs: the first Python is examples/quickstart.py; all Python, scene files and commands run; files exist."""
 
 import itertools
 import re
@@ -11,10 +11,17 @@ from pathlib import Path
 import pytest
 
 from swarm import scene_file
-from swarm.scene_file import RunTable
+from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
+PATHS = [ROOT / "README.md", ROOT / "examples" / "README.md", ROOT / "bench" / "README.md"]
+README = PATHS[0].read_text()
+# In the order in which they are read, and run.
+ALL = "\n".join(path.read_text() for path in PATHS)
+
+
+def test_it_is_a_page():
+    assert len(README.splitlines()) <= 150
 
 
 def test_first_screen_is_the_example():
@@ -24,10 +31,21 @@ def test_first_screen_is_the_example():
     assert block.group(1) == example
 
 
-def test_files_named_in_the_readme_exist():
-    paths = set(re.findall(r"(?:examples|bench|tests|swarm)/[\w./-]+\.\w+", README))
+def test_files_that_are_named_exist():
+    paths = set(re.findall(r"(?:examples|bench|tests|swarm)/[\w./-]+\.\w+", ALL))
     assert paths
     assert [path for path in sorted(paths) if not (ROOT / path).exists()] == []
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_to_files(path):
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", path.read_text()) if "://" not in link]
+    assert links
+    assert [link for link in links if not (path.parent / link).exists()] == []
+
+
+def test_every_shipped_scene_is_named():
+    assert [path.name for path in (ROOT / "examples" / "scenes").glob("*.toml") if path.name not in ALL] == []
 
 
 def test_ci_runs_the_readme_test_command():
@@ -44,7 +62,7 @@ def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("cavity.h5").touch()  # what the command above the first block has written
     names = {}
-    for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL):
+    for block in re.findall(r"```python\n(.*?)```", ALL, re.DOTALL):
         exec(block, names)
     result, settling = names["result"], names["settling"]
     assert result.particles.position.shape == (3, 10_000)
@@ -69,16 +87,18 @@ SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
 
 
 def commands():
-    """Every command of swarm in README, without its options in brackets and, where it has some, with them all."""
-    spans = re.findall(r"`(swarm [a-z]+ [^`\n]*\.[^`\n]*)`", README) + re.findall(r"&& (swarm [^\n]*)\n", README)
+    """Every command of swarm in the READMEs, without its options in brackets and, where it has some, with them all."""
+    spans = re.findall(r"`(swarm [a-z]+ [^`\n]*\.[^`\n]*)`", ALL) + re.findall(
+        r"^(swarm [a-z]+ \S+\.\S+.*)$", ALL, re.MULTILINE
+    )
     for span in spans:
         for words in dict.fromkeys((re.sub(r" *\[.*?\]", "", span), re.sub(r"[\[\]]", "", span))):
             yield [NAMES.get(word, word) for word in words.split()[1:]]
 
 
 def settings():
-    """Every `key = value` of [run] in README."""
-    return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", README) if line.split()[0] in RunTable.__annotations__]
+    """Every `key = value` of [run] in the READMEs."""
+    return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", ALL) if line.split()[0] in RunOptions.__annotations__]
 
 
 @pytest.mark.physics
@@ -103,7 +123,8 @@ def test_the_commands_run_in_their_order(tmp_path):
 def test_the_settings_of_a_run_are_taken(tmp_path, line):
     (tmp_path / "scene.toml").write_text(SCENE.replace("[run]\n", f"[run]\n{line}\n"))
     key, value = tomllib.loads(line).popitem()
-    assert getattr(scene_file.read(tmp_path / "scene.toml").run, key) == value
+    taken = getattr(scene_file.read(tmp_path / "scene.toml").run, key)
+    assert taken == (Path(value) if key in ("trajectory", "recording") else value)
 
 
 def test_the_settings_are_found():
@@ -111,7 +132,7 @@ def test_the_settings_are_found():
 
 
 @pytest.mark.physics
-@pytest.mark.parametrize("module", sorted({*re.findall(r"python -m ((?:bench|examples)[\w. ]*\w)", README)}))
+@pytest.mark.parametrize("module", sorted({*re.findall(r"python -m ((?:bench|examples)[\w. ]*\w)", ALL)}))
 def test_the_modules_that_take_minutes_can_be_called(module):
     done = subprocess.run([sys.executable, "-m", *module.split(), "--help"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -86,7 +86,14 @@ def test_shipped_scenes_are_read(path):
         ),
         ("until = 1.0", "", r"run\.until: expected a number, got nothing"),
         ("until = 1.0", "until = 1.0\nevry = 2", r"run\.evry: unknown key.*did you mean 'every'"),
-        ("every = 0.5", "gravity = [0, 0, -1]", r"run\.gravity: unknown key.*gravity stands at the top"),
+        ("every = 0.5", "every = 2.0", r"run\.every must be at most until = 1, got 2"),
+        ("every = 0.5", "threads = 0", r"run\.threads must be 1 or more, got 0"),
+        ("every = 0.5", 'frames = "some"', r'run\.frames must be "all", "none", or k .*, got \'some\''),
+        ("every = 0.5", "checkpoint = 0.0", r"run\.checkpoint must be 0\.01 or more, got 0"),
+        ("every = 0.5", 'compile = "nevr"', r"run\.compile must be one of .*'nevr'; did you mean 'never'"),
+        ("every = 0.5", "trajectory = 5", r"run\.trajectory must be the path of a file, got 5"),
+        ("every = 0.5", "resume = true", r"run\.resume: unknown key, expected 'until', 'every', .* and 'compile'"),
+        ("every = 0.5", "gravity = [0, 0, -1]", r"run\.gravity: unknown key.*gravity belongs at the top"),
         ("[particles]", "gravity = [0, 0]\n[particles]", r"gravity must be three numbers, got 2"),
         ("[particles]", "[particles", r"cannot read the scene file .*scene\.toml"),
         (
@@ -139,8 +146,8 @@ def test_particles_from_files(tmp_path):
     np.testing.assert_array_equal(first.position, particles.position)
 
     for text, message in (
-        ('start.csv"\nframe = 0 #', r"particles\.frame: only goes with from"),
-        ('start.csv"\ncount = 3 #', r"particles\.count: does not go with from = 'start\.csv'"),
+        ('start.csv"\nframe = 0 #', r"particles\.frame: needs from"),
+        ('start.csv"\ncount = 3 #', r"particles\.count: cannot be combined with from = 'start\.csv'"),
         ("start.txt", r"particles\.from: expected a \.csv or \.h5 file, got 'start\.txt'"),
     ):
         with pytest.raises(swarm.SceneError, match=message):

@@ -54,7 +54,7 @@ def frames_of(run, method, every, halted=False, between=lambda run, cut_short: r
 def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=(2, 1, 3)):
     """A run that is halted again and again, each time saved and gone on with by a new one, ends as one never halted."""
     start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=5)
-    with Run(scene, start, method, 1, None) as whole:
+    with Run(scene, start.copy(), method, 1, None) as whole:
         expected, expected_seen = frames_of(whole, method, every)
     halts, next_threads = [], itertools.cycle(threads)
     job = checkpoint.Job("", "", "", "", n, "")
@@ -63,11 +63,11 @@ def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=
         halts.append(cut_short)
         checkpoint.save(tmp_path / "a.checkpoint", job, run.arrays())
         run.__exit__()
-        other = Run(scene, start, method, next(next_threads), None)
+        other = Run(scene, start.copy(), method, next(next_threads), None)
         other.restore(checkpoint.read(tmp_path / "a.checkpoint")[1], cut_short)
         return other
 
-    run = Run(scene, start, method, next(next_threads), None)
+    run = Run(scene, start.copy(), method, next(next_threads), None)
     found, found_seen = frames_of(run, method, every, True, begin_again)
     assert found.keys() == expected.keys()
     for name, array in expected.items():
@@ -283,7 +283,7 @@ def test_what_is_missing_or_damaged_is_said(tmp_path):
     position = checkpoint.read(saved)[1]["position"].tobytes()
     for spoiled in (whole[: len(whole) // 2], whole.replace(position, position[1:] + b"?"), b"", b"text"):
         saved.write_bytes(spoiled)
-        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start afresh"):
+        with pytest.raises(swarm.SceneError, match=r"run\.h5\.checkpoint is damaged: .*start again"):
             run(path, resume=True)
     saved.write_bytes(whole)
     path.unlink()
@@ -341,7 +341,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monke
     monkeypatch.setattr(checkpoint.np, "savez", full)
     clock = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: clock[-1])
-    with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the one before it"):
+    with pytest.raises(swarm.FileError, match=r"cannot write the checkpoint .*No space left.* the previous checkpoint"):
         run(path, checkpoint=600.0, progress=lambda frame: clock.append(clock[-1] + 600.0))
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.h5", "run.h5.checkpoint"]
     assert json.loads(saved[-1])["frame"] == 1

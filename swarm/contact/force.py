@@ -1,65 +1,62 @@
 """The force of the soft walls at a point, -V'(g) grad g: what methods without a discrete gradient take."""
 
-import math
-
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, select
-from ..surfaces import base as surfaces
-from ..surfaces import chain as walls
+from ..kernel.vector import ZERO, norm
+from ..surfaces import contract
+from ..surfaces.fold import Chain
 from . import regularisation as law_of
 
-# What the force asks of every wall.
-NEEDS = (surfaces.inner, surfaces.gap_of, surfaces.gap_slope, surfaces.inner_gradient)
+# What the force needs of every wall.
+NEEDS = (contract.inner, contract.gap_of, contract.gap_slope, contract.inner_gradient)
 
 
 @inlined
 def strength(law, surface, q):
     """V'(g) g'(q): the force is this times -grad q."""
-    g = surfaces.gap_of(surface, q)
+    g = contract.gap_of(surface, q)
     # The divided difference of V for equal gaps.
     push, _stiffness = law_of.energy_slope(law, g, g)
-    slope, _curvature = surfaces.gap_slope(surface, q, q)
+    slope, _curvature = contract.gap_slope(surface, q, q)
     return select(g > 0.0, push * slope, 0.0)
 
 
 @by_type
-def force(chain, law, x, y, z):
+def force(chain, law, r):
     """The force of all walls [N]."""
     raise NotImplementedError
 
 
-@force.register(walls.Chain)
-def _(chain, law, x, y, z):
+@force.register(Chain)
+def _(chain, law, r):
     surface = chain.first
-    f = strength(law, surface, surfaces.inner(surface, x, y, z))
-    dx, dy, dz = surfaces.inner_gradient(surface, x, y, z, x, y, z)
-    ox, oy, oz = force(chain.rest, law, x, y, z)
+    f = strength(law, surface, contract.inner(surface, r))
+    d = contract.inner_gradient(surface, r, r)
+    others = force(chain.rest, law, r)
     # A select and no product: off the wall grad q may be infinite.
-    pushes = f != 0.0
-    return select(pushes, ox - f * dx, ox), select(pushes, oy - f * dy, oy), select(pushes, oz - f * dz, oz)
+    return select(f != 0.0, others - f * d, others)
 
 
 @force.register(Nothing)
-def _(chain, law, x, y, z):
-    return 0.0, 0.0, 0.0
+def _(chain, law, r):
+    return ZERO
 
 
 @by_type_outlined
-def add_impulses(chain, law, factor, k, x, y, z, impulse, lane):
-    """Add `factor` times the size of the force of each wall to impulse[wall, lane]."""
+def add_impulses(chain, law, factor, k, r, impulse, lane):
+    """Add `factor` times the magnitude of the force of each wall to impulse[wall, lane]."""
     raise NotImplementedError
 
 
-@add_impulses.register(walls.Chain)
-def _(chain, law, factor, k, x, y, z, impulse, lane):
+@add_impulses.register(Chain)
+def _(chain, law, factor, k, r, impulse, lane):
     surface = chain.first
-    f = strength(law, surface, surfaces.inner(surface, x, y, z))
+    f = strength(law, surface, contract.inner(surface, r))
     if f != 0.0:
-        dx, dy, dz = surfaces.inner_gradient(surface, x, y, z, x, y, z)
-        impulse[k, lane] += factor * abs(f) * math.sqrt(dx * dx + dy * dy + dz * dz)
-    add_impulses(chain.rest, law, factor, k + 1, x, y, z, impulse, lane)
+        impulse[k, lane] += factor * abs(f) * norm(contract.inner_gradient(surface, r, r))
+    add_impulses(chain.rest, law, factor, k + 1, r, impulse, lane)
 
 
 @add_impulses.register(Nothing)
-def _(chain, law, factor, k, x, y, z, impulse, lane):
+def _(chain, law, factor, k, r, impulse, lane):
     pass

@@ -10,13 +10,15 @@ Source: García Orden & Ortega 2007, eqs. (7), (8).
 """
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, outlined, scratch, select
-from ..surfaces import base as surfaces
-from ..surfaces import chain as walls
+from ..kernel.vector import Vec
+from ..surfaces import contract
+from ..surfaces import fold as walls
 from . import corner, impulse
 from . import regularisation as law_of
 
@@ -42,128 +44,129 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
 
 
 @inlined
-def reflection(chain, index, law, x, y, z, px, py, pz, c):
-    """kappa and lambda of the step that ends on surface `index`: the fixed point of (8) in State I with a = 1."""
-    kappa = walls.chord_guess(chain, index, x, y, z, px, py, pz)
+def _start_of(surface, r):
+    return impulse.start_gap(0.0, surface, r, contract.inner(surface, r))
+
+
+@inlined
+def _has_limit(surface, law, r):
+    """Whether the loop has a limit: State I with Phi'(0) > 0.
+
+    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
+    """
+    return (_start_of(surface, r).gap == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
+
+
+@inlined
+def _multiplier_of(surface, law, r, c, kappa):
+    """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
+    start = _start_of(surface, r)
+    slope, _curvature = contract.gap_slope(surface, start.q, start.q)
+    return select(start.gap == 0.0, kappa / (c * slope * law_of.constraint_gradient(law, 0.0)), 0.0)
+
+
+# Of all walls: (chain, wall, law, r) and (chain, wall, law, r, c, kappa).
+has_limit = walls.of_wall(_has_limit, False)
+multiplier_of = walls.of_wall(_multiplier_of, 0.0)
+
+
+@inlined
+def reflection(chain, wall, law, step):
+    """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
+    kappa = walls.chord_guess(chain, wall, step.r, step.p)
     for _i in range(_CHORD_STEPS):
-        kappa = kappa - walls.chord_improve(chain, index, x, y, z, px, py, pz, kappa)
-    multiplier = multiplier_of(chain, index, law, x, y, z, c, kappa)
+        kappa = kappa - walls.chord_improve(chain, wall, step.r, step.p, kappa)
+    multiplier = multiplier_of(chain, wall, law, step.r, step.c, kappa)
     good = (multiplier > 0.0) & (multiplier < math.inf)
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
 
 
 @by_type
-def has_limit(chain, index, law, x, y, z):
-    """Whether the loop has a limit for surface `index`: State I with Phi'(0) > 0.
-
-    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
-    """
-    raise NotImplementedError
-
-
-@has_limit.register(walls.Chain)
-def _(chain, index, law, x, y, z):
-    surface = chain.first
-    g0, _round_off, _tolerance = impulse.start_gap(0.0, surface, x, y, z, surfaces.inner(surface, x, y, z))
-    here = (g0 == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
-    other = has_limit(chain.rest, index - 1.0, law, x, y, z)
-    return ((index == 0.0) & here) | ((index != 0.0) & other)
-
-
-@has_limit.register(Nothing)
-def _(chain, index, law, x, y, z):
-    return False
-
-
-@by_type
-def meets_later(chain, index, law, x, y, z, px, py, pz):
-    """Whether the free flight r0 + p leaves any wall but `index` on which the particle is not yet: a State II."""
+def meets_later(chain, wall, law, r, p):
+    """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
     raise NotImplementedError
 
 
 @meets_later.register(walls.Chain)
-def _(chain, index, law, x, y, z, px, py, pz):
+def _(chain, wall, law, r, p):
     surface = chain.first
-    leaves = surfaces.level_of(surface, surfaces.inner(surface, x + px, y + py, z + pz)) > 0.0
-    here = leaves & (index != 0.0) & (not has_limit(chain, 0.0, law, x, y, z))
-    return here | meets_later(chain.rest, index - 1.0, law, x, y, z, px, py, pz)
+    leaves = contract.level_of(surface, contract.inner(surface, r + p)) > 0.0
+    here = leaves & (wall != 0.0) & (not has_limit(chain, 0.0, law, r))
+    return here | meets_later(chain.rest, wall - 1.0, law, r, p)
 
 
 @meets_later.register(Nothing)
-def _(chain, index, law, x, y, z, px, py, pz):
+def _(chain, wall, law, r, p):
     return False
 
 
-@by_type
-def multiplier_of(chain, index, law, x, y, z, c, kappa):
-    """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the surface."""
-    raise NotImplementedError
+class Before(NamedTuple):
+    """What the secant needs of the sweep before, one entry a wall."""
+
+    multipliers: Any
+    misses: Any
 
 
-@multiplier_of.register(walls.Chain)
-def _(chain, index, law, x, y, z, c, kappa):
-    surface = chain.first
-    q0 = surfaces.inner(surface, x, y, z)
-    g0, _round_off, _tolerance = impulse.start_gap(kappa, surface, x, y, z, q0)
-    slope, _curvature = surfaces.gap_slope(surface, q0, q0)
-    multiplier = kappa / (c * slope * law_of.constraint_gradient(law, 0.0))
-    other = multiplier_of(chain.rest, index - 1.0, law, x, y, z, c, kappa)
-    return select(index == 0.0, select(g0 == 0.0, multiplier, 0.0), other)
+class Swept(NamedTuple):
+    """The step of one sweep: its end, V there, and whether it was solved."""
+
+    r: Vec
+    stored: float
+    solved: bool
 
 
-@multiplier_of.register(Nothing)
-def _(chain, index, law, x, y, z, c, kappa):
-    return 0.0
+class Loop(NamedTuple):
+    """The step that the loop ended with."""
+
+    r: Vec
+    sweeps: int
+    stored: float  # V
+    solved: bool
+    converged: bool  # whether V <= tolerance
 
 
 @outlined
-def sweep_all(method, law, chain, x, y, z, px, py, pz, c, multipliers, before, misses, sweep, reactions):
-    """One sweep of (8) for all walls: the step, then the multipliers in place: (x1, y1, z1, V, solved).
-
-    `before` and `misses` (walls,) keep the last sweep for the secant. `multipliers` end as the ones of the next sweep.
-    """
+def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
+    """One sweep of (8) for all walls: the step, then the multipliers of the next sweep in place; `before` is kept."""
     count = multipliers.shape[0]
-    x1, y1, z1, solved = corner.hold(method.form, law, multipliers, chain, x, y, z, px, py, pz, c, reactions)
+    end = corner.hold(method.form, law, multipliers, chain, step, reactions)
     first, last = scratch(count, np.float64), reactions[:, 3]
-    corner.constraints(chain, law, 0, x, y, z, first)
+    corner.constraints(chain, law, 0, step.r, first)
     stored = 0.0
     for k in range(count):
         stored += 0.5 * law.alpha * last[k] * last[k]
         miss = 0.5 * law.alpha * (first[k] + last[k])
         old = multipliers[k]
-        acceleration = method.acceleration if has_limit(chain, float(k), law, x, y, z) else PLAIN
+        acceleration = method.acceleration if has_limit(chain, float(k), law, step.r) else PLAIN
         if sweep == 0:
             multipliers[k] = old + miss
         else:
-            multipliers[k] = next_multiplier(acceleration, old, miss, before[k], misses[k])
-        before[k], misses[k] = old, miss
-    return x1, y1, z1, stored, solved
+            multipliers[k] = next_multiplier(acceleration, old, miss, before.multipliers[k], before.misses[k])
+        before.multipliers[k], before.misses[k] = old, miss
+    return Swept(end.r, stored, end.solved)
 
 
 @outlined
-def start(method, law, chain, x, y, z, px, py, pz, c, multipliers):
+def start(method, law, chain, step, multipliers):
     """The multipliers that the loop starts from."""
     multipliers[:] = 0.0
-    index, count = walls.touched(chain, x, y, z, px, py, pz)
-    if method.acceleration == REFLECTION and count == 1.0:
-        _kappa, multiplier = reflection(chain, index, law, x, y, z, px, py, pz, c)
-        multipliers[int(index)] = multiplier
+    touched = walls.touched(chain, step.r, step.p)
+    if method.acceleration == REFLECTION and touched.number == 1.0:
+        _kappa, multiplier = reflection(chain, touched.wall, law, step)
+        multipliers[int(touched.wall)] = multiplier
 
 
 @outlined
-def loop(method, law, chain, x, y, z, px, py, pz, c, reactions):
-    """Sweeps until V <= tolerance: (x1, y1, z1, sweeps, V, solved, converged)."""
+def loop(method, law, chain, step, reactions):
+    """Sweeps until V <= tolerance."""
     count = walls.length(chain)
-    multipliers, before = scratch(count, np.float64), scratch(count, np.float64)
-    misses = scratch(count, np.float64)
-    start(method, law, chain, x, y, z, px, py, pz, c, multipliers)
-    x1, y1, z1, stored = x, y, z, math.inf
+    multipliers = scratch(count, np.float64)
+    before = Before(scratch(count, np.float64), scratch(count, np.float64))
+    start(method, law, chain, step, multipliers)
+    end = Swept(step.r, math.inf, True)
     for sweep in range(method.max_sweeps):
-        x1, y1, z1, stored, solved = sweep_all(
-            method, law, chain, x, y, z, px, py, pz, c, multipliers, before, misses, sweep, reactions
-        )
-        if not solved:
-            return x1, y1, z1, sweep + 1, stored, False, False
-        if stored <= method.tolerance:
-            return x1, y1, z1, sweep + 1, stored, True, True
-    return x1, y1, z1, method.max_sweeps, stored, True, False
+        end = sweep_all(method, law, chain, step, multipliers, before, sweep, reactions)
+        converged = end.solved and end.stored <= method.tolerance
+        if converged or not end.solved:
+            return Loop(end.r, sweep + 1, end.stored, end.solved, converged)
+    return Loop(end.r, method.max_sweeps, end.stored, True, False)

@@ -1,80 +1,81 @@
 """Constant gravity, or none: the exact free flight."""
 
-from typing import NamedTuple
-
 from .jit import by_type
+from .vector import Vec, absolute, dot
 
 Nothing = type(None)
 
 
-class Gravity(NamedTuple):
+class Gravity(Vec):
     """Acceleration G [m/s^2]. A scene without gravity has None, which compiles to nothing."""
-
-    x: float
-    y: float
-    z: float
 
 
 @by_type
-def displacement(gravity, vx, vy, vz, t):
+def as_vector(gravity):
+    """G as a vector like any other."""
+    return Vec(gravity.x, gravity.y, gravity.z)
+
+
+@by_type
+def displacement(gravity, v, t):
     """v t + G t^2/2"""
     raise NotImplementedError
 
 
 @displacement.register(Gravity)
-def _(gravity, vx, vy, vz, t):
+def _(gravity, v, t):
     half = 0.5 * t
-    return (vx + half * gravity.x) * t, (vy + half * gravity.y) * t, (vz + half * gravity.z) * t
+    return (v + half * gravity) * t
 
 
 @displacement.register(Nothing)
-def _(gravity, vx, vy, vz, t):
-    return vx * t, vy * t, vz * t
+def _(gravity, v, t):
+    return v * t
 
 
 @by_type
-def accelerated(gravity, vx, vy, vz, t):
+def accelerated(gravity, v, t):
     """v + G t"""
     raise NotImplementedError
 
 
 @accelerated.register(Gravity)
-def _(gravity, vx, vy, vz, t):
-    return vx + gravity.x * t, vy + gravity.y * t, vz + gravity.z * t
+def _(gravity, v, t):
+    return v + gravity * t
 
 
 @accelerated.register(Nothing)
-def _(gravity, vx, vy, vz, t):
-    return vx, vy, vz
+def _(gravity, v, t):
+    return v
 
 
 @by_type
-def potential(gravity, x, y, z):
+def potential(gravity, r):
     """Potential energy per mass, -G.r"""
     raise NotImplementedError
 
 
 @potential.register(Gravity)
-def _(gravity, x, y, z):
-    return -(gravity.x * x + gravity.y * y + gravity.z * z)
+def _(gravity, r):
+    return -dot(gravity, r)
 
 
 @potential.register(Nothing)
-def _(gravity, x, y, z):
+def _(gravity, r):
     return 0.0
 
 
 @by_type
-def weight(gravity, sx, sy, sz):
-    """How far the potential energy per mass moves at most when the coordinates move by (sx, sy, sz)."""
+def weight(gravity, s):
+    """How far the potential energy per mass moves at most when the coordinates move by s."""
     raise NotImplementedError
 
 
 @weight.register(Gravity)
-def _(gravity, sx, sy, sz):
-    return abs(gravity.x) * sx + abs(gravity.y) * sy + abs(gravity.z) * sz
+def _(gravity, s):
+    return dot(absolute(gravity), s)
 
 
 @weight.register(Nothing)
-def _(gravity, sx, sy, sz):
+def _(gravity, s):
     return 0.0

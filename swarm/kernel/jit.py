@@ -1,33 +1,29 @@
-"""The one place for compiler flags, the kernel cache, and dispatch on the type of a parameter tuple.
+"""The one place for compiler flags and dispatch on the type of a parameter tuple.
 
 Kernels are plain functions of numbers. `kernel` compiles a loop over them, `by_type` makes a family of
 functions that is chosen by the type of its first argument: at compile time inside kernels, at run time in
 plain Python, from the same definitions.
 """
 
-import contextlib
 import functools
-import hashlib
 import importlib
 import importlib.util
 import inspect
-import logging
-import os
 import threading
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from types import UnionType
 from typing import Any, TypeVar
 
-import numba
 import numpy as np
 from numba import types
-from numba.core import cgutils, event
+from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
 from numba.np import linalg as blas
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
+
+from . import cache
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -66,64 +62,10 @@ def _find_scipy_only() -> None:
 _find_scipy_only()
 
 
-def _source_hash() -> str:
-    """Digest of every source file of the package: it names the cache folder.
-
-    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would
-    answer with the old code.
-    """
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Folder of the compiled kernels, $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then the source hash."""
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm"
-    return Path(base) / _source_hash()
-
-
-_CACHE = cache_folder()
-_CONFIG: Any = numba.config
-
-
-_LOG = logging.getLogger("swarm")
-_kernels: list[Any] = []
-_COMPILING = "compiling a kernel for this kind of scene ({}), once: the next run finds it"
-
-
-@contextlib.contextmanager
-def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """Tell the logger and `tell`, by a sentence, of every kernel that is compiled in this context."""
-
-    class Listener(event.Listener):  # type: ignore[misc]
-        def on_start(self, compiled: Any) -> None:
-            if compiled.data["dispatcher"] in _kernels:
-                sentence = _COMPILING.format(compiled.data["dispatcher"].__name__)
-                _LOG.info(sentence)
-                tell(sentence)
-
-        def on_end(self, compiled: Any) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Listener()):
-        yield
-
-
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    previous = _CONFIG.CACHE_DIR
-    _CONFIG.CACHE_DIR = str(_CACHE)
-    try:
-        compiled: F = numba.njit(cache=True, **_FLAGS)(function)
-        _kernels.append(compiled)
-        return compiled
-    finally:
-        _CONFIG.CACHE_DIR = previous
+    compiled: F = cache.kept(function, _FLAGS)
+    return compiled
 
 
 def outlined(function: F) -> F:
@@ -183,6 +125,7 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
                 f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
             )
         known(kind, definition)
+        cache.registered(kind, made)
         for other, derived in implied:
             if kind is not object and other.dispatch(kind) is other.dispatch(object):
                 other.register(kind, derived)
@@ -333,8 +276,8 @@ def _emit_index(context, builder, signature, args):
     return context.cast(builder, *args, *signature.args, signature.return_type)
 
 
-@inlined
-def kept(value: Any) -> Any:
+@by_type
+def kept(value):
     """A value from an array that a select may write back unchanged to its place.
 
     Of such a select LLVM makes a masked store, which costs AMD processors some ten times an ordinary one (measured: 18

@@ -1,16 +1,17 @@
 """The particles that are being advanced, one a lane: arrays that fit in the cache, the ways in and out."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from ..kernel.jit import Array, by_type_outlined, index, inlined, next_of, outlined, spaced
-from ..methods import base as methods
+from ..kernel.vector import column, put
+from ..methods import contract as methods
 from ..particles import Multipliers
-from ..surfaces import chain as walls
 from ..surfaces import flights
+from ..surfaces import fold as walls
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
 LANES = 256
@@ -18,7 +19,7 @@ LANES = 256
 _STRIDE = 264
 # Bytes of a line of the cache, and of a number of eight flags.
 _LINE, EIGHT = 64, 8
-X, Y, Z, VX, VY, VZ, LEFT, K0, K1, K2, HITS, ROWS = range(12)
+R, V, LEFT, OWN, HITS, ROWS = 0, 3, 6, 7, 10, 11
 
 with_distances = spaced(_STRIDE)
 
@@ -28,7 +29,7 @@ class Lanes(NamedTuple):
 
     rows: Array  # (ROWS, stride) position, velocity, time left, the method's constants, impacts
     impulse: Array  # (walls, stride) normal impulse per mass
-    surface: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
+    wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     unsolved: Array  # bool, whether its solve goes on
     sweeping: Array  # bool, whether the loop of its multiplier goes on
@@ -66,13 +67,24 @@ class Draws(NamedTuple):
     mine: Array  # the draws of this thread, in order
 
 
+class Share(NamedTuple):
+    """What one thread advances of a frame, and by how much."""
+
+    state: Any  # `particles.State`
+    done: Array  # (N,) bool, who has arrived
+    halted: Halted
+    draws: Draws
+    halt: Array  # (1,) int64, passes after which to return
+    span: float  # in the method's unit
+
+
 def empty(walls: int) -> Lanes:
     """Lanes for one block."""
     eights = np.zeros(_STRIDE // EIGHT, np.int64)
     return Lanes(
         rows=_table(ROWS),
         impulse=_table(walls),
-        surface=_table(1)[0],
+        wall=_table(1)[0],
         kappa=_table(1)[0],
         unsolved=np.zeros(_STRIDE, np.bool_),
         sweeping=np.zeros(_STRIDE, np.bool_),
@@ -96,14 +108,22 @@ def _table(rows: int) -> NDArray[np.float64]:
     return memory[first : first + size].view(np.float64).reshape(rows, _STRIDE)
 
 
-def nobody(walls: int) -> Halted:
+def none_halted(walls: int) -> Halted:
     """No particle was halted."""
     return Halted(np.empty(0, np.int64), np.empty((ROWS + walls, 0)))
 
 
 @inlined
-def following_particle(draws, done, i, stop, drawn):
+def lane_of(method, rows, i):
+    """What is in a lane."""
+    kept = methods.own(method, rows[OWN, i], rows[OWN + 1, i], rows[OWN + 2, i])
+    return methods.Lane(column(rows, R, i), column(rows, V, i), rows[LEFT, i], rows[HITS, i], kept)
+
+
+@inlined
+def following_particle(share, i, stop, drawn):
     """(particle, stop, draws so far): the first from i on that is not done, of another draw if need be; or stop."""
+    draws, done = share.draws, share.done
     while True:
         while i < stop and done[i]:
             i += 1
@@ -119,22 +139,20 @@ def following_particle(draws, done, i, stop, drawn):
 
 
 @inlined
-def load(method, chain, lanes, lane, state, halted, i, span):
+def load(method, chain, lanes, lane, share, i):
     """Particle i into a lane, as it starts the frame, or as a halt left it."""
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
     particle[lane] = i
+    state, halted = share.state, share.halted
     if halted.particle.size > 0 and _pick_up(lanes, lane, halted, i):
         return
     i = index(i)
-    position, velocity = state.position, state.velocity
-    for axis in range(3):
-        rows[X + axis, lane] = position[axis, i]
-        rows[VX + axis, lane] = velocity[axis, i]
-    constants = methods.lane_constants(
-        method, state.mass[i], state.energy[i], velocity[0, i], velocity[1, i], velocity[2, i]
-    )
-    rows[K0, lane], rows[K1, lane], rows[K2, lane] = constants
-    rows[LEFT, lane], rows[HITS, lane] = span, 0.0
+    v = column(state.velocity, 0, i)
+    put(rows, R, lane, column(state.position, 0, i))
+    put(rows, V, lane, v)
+    own = methods.constants(method, state.mass[i], state.energy[i], v)
+    rows[OWN, lane], rows[OWN + 1, lane], rows[OWN + 2, lane] = own
+    rows[LEFT, lane], rows[HITS, lane] = share.span, 0.0
     for s in range(walls.length(chain)):
         impulse[s, lane] = 0.0
 
@@ -172,18 +190,16 @@ def leave(lanes, live):
 @inlined
 def retire(method, chain, lanes, lane, state):
     """A lane back into its particle."""
-    rows, impulse = lanes.rows, lanes.impulse
-    position, velocity, impacts, total = state.position, state.velocity, state.impacts, state.impulse
+    rows, impulse, impacts, total = lanes.rows, lanes.impulse, state.impacts, state.impulse
     i = index(lanes.particle[lane])
-    for axis in range(3):
-        position[axis, i] = rows[X + axis, lane]
-        velocity[axis, i] = rows[VX + axis, lane]
+    put(state.position, 0, i, column(rows, R, lane))
+    put(state.velocity, 0, i, column(rows, V, lane))
     impacts[i] += np.int64(rows[HITS, lane])
     for s in range(walls.length(chain)):
         total[s, i] += impulse[s, lane] * state.mass[i]
     if methods.dissipates(method):
         # Each particle knows its energy: what it has lost is accounted for with it.
-        now = 0.5 * rows[K0, lane]
+        now = 0.5 * rows[OWN, lane]
         state.dissipated[i] += state.mass[i] * (state.energy[i] - now)
         state.energy[i] = now
 

@@ -7,30 +7,26 @@ depend on which lane or block a particle is in.
 
 from typing import NamedTuple
 
-from ..kernel.gravity import Gravity, Nothing
+from ..kernel.gravity import Gravity, Nothing, as_vector
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, select
-from ..methods import base as methods
+from ..kernel.vector import column, put
+from ..methods import contract as methods
 from ..status import Status
-from ..surfaces import chain as walls
 from ..surfaces import flights
+from ..surfaces import fold as walls
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from .arrays import (
     EIGHT,
     HITS,
-    K0,
-    K1,
-    K2,
     LANES,
     LEFT,
-    VX,
-    VY,
-    VZ,
-    X,
-    Y,
-    Z,
+    OWN,
+    R,
+    V,
     count_sweeps,
     following_particle,
     keep_failure,
+    lane_of,
     leave,
     load,
     move,
@@ -41,7 +37,7 @@ from .solve import solution, solve
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
-# Passes after which a call of `advance_block` that nobody halts would return.
+# Passes of a call of `advance_block` that is never halted.
 NEVER = 2**63 - 1
 
 
@@ -52,26 +48,25 @@ class Hard(NamedTuple):
 
 
 @kernel
-def advance_block(method, chain, gravity, hard, state, done, halted, span, draws, halt, lanes):
-    """Advance what `draws` gives by `span` and return (status, particle, drawn): DONE, or the first that failed.
+def advance_block(method, chain, gravity, hard, share, lanes):
+    """Advance what a thread draws of a frame: (status, particle, drawn), DONE or the first particle that failed.
 
-    `drawn` is how many draws that were; `span` is in the method's unit; `lanes` are any. After `halt[0]` passes, which
-    another thread may change at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and
-    `lanes.left_behind` has what these held, which the next call takes as `halted`. Particles that are `done` are left
-    alone, and those that arrive become it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to
-    go on from there with what can do it.
+    `drawn` is how many draws that were; `lanes` are any. After `share.halt[0]` passes, which another thread may change
+    at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and `lanes.left_behind` has what these held,
+    which the next call takes as `share.halted`. Particles that are done are left alone, and those that arrive become
+    it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     """
-    lanes = with_distances(lanes)
+    lanes, state = with_distances(lanes), share.state
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
-        following, stop, drawn = following_particle(draws, done, following, stop, drawn)
+        following, stop, drawn = following_particle(share, following, stop, drawn)
         if following == stop:
             break
-        load(method, chain, lanes, index(live), state, halted, following, span)
+        load(method, chain, lanes, index(live), share, following)
         following += 1
         live += 1
     while live > 0:
-        if passes >= halt[0]:
+        if passes >= share.halt[0]:
             leave(lanes, live)
             return Status.INTERRUPTED.value, live, drawn
         passes += 1
@@ -88,10 +83,10 @@ def advance_block(method, chain, gravity, hard, state, done, halted, span, draws
         for k in range(_marked(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
             retire(method, chain, lanes, lane, state)
-            done[index(lanes.particle[lane])] = True
-            following, stop, drawn = following_particle(draws, done, following, stop, drawn)
+            share.done[index(lanes.particle[lane])] = True
+            following, stop, drawn = following_particle(share, following, stop, drawn)
             if following < stop:
-                load(method, chain, lanes, lane, state, halted, following, span)
+                load(method, chain, lanes, lane, share, following)
                 following += 1
             else:
                 live -= 1
@@ -123,19 +118,13 @@ def _marked(lanes, live):
 def _pass(method, chain, gravity, multipliers, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     _fly(gravity, method, chain, lanes, live)
-    unknown, rows = methods.unknown(method), lanes.rows
+    unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, multipliers, lanes, live)
     some_arrived, some_hard = False, False
     for i in range(live):
-        arrived, hard = _end(
-            method, chain, lanes, i,
-            methods.contact(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], lanes.surface[i],
-                *solution(unknown, method, lanes, i),
-            ),
-        )  # fmt: skip
+        lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
+        contact = methods.contact(method, chain, gravity, lane, lanes.wall[i], found)
+        arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
 
@@ -156,23 +145,21 @@ def _fly(gravity, method, chain, lanes, live):
 def _(gravity, method, chain, lanes, live):
     rows = lanes.rows
     for i in range(live):
-        time, wall = 0.0, 0.0
-        if methods.seeks(method):
-            time, wall = flights.first_hit(
-                chain, gravity, rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i]
-            )
-        _flight(method, chain, gravity, lanes, i, time, wall)
+        hit = flights.NEVER
+        if methods.lands(method):
+            hit = flights.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i))
+        _flight(method, chain, gravity, lanes, i, hit)
 
 
 @_fly.register(Gravity)
 def _(gravity, method, chain, lanes, live):
-    if methods.seeks(method):
+    if methods.lands(method):
         _fall(chain, gravity, lanes, live)
     for i in range(live):
-        time, wall = 0.0, 0.0
-        if methods.seeks(method):
-            time, wall = flights.end_fall(chain, lanes.course, 0, i)
-        _flight(method, chain, gravity, lanes, i, time, wall)
+        hit = flights.NEVER
+        if methods.lands(method):
+            hit = flights.end_fall(chain, lanes.course, 0, i)
+        _flight(method, chain, gravity, lanes, i, hit)
 
 
 @inlined
@@ -180,11 +167,7 @@ def _fall(chain, gravity, lanes, live):
     """The course of every lane to its first hit, by safe steps."""
     rows, course, marked = lanes.rows, lanes.course, lanes.marked
     for i in range(live):
-        flights.begin_fall(
-            chain, course, 0, i,
-            rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-            gravity.x, gravity.y, gravity.z,
-        )  # fmt: skip
+        flights.begin_fall(chain, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
     for _step in range(SAFE_STEPS):
         for i in range(live):
             flights.step_fall(chain, course, 0, i)
@@ -202,81 +185,79 @@ def _fall(chain, gravity, lanes, live):
 @inlined
 def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
-    time, wall = flights.end_fall(chain, lanes.course, 0, i)
-    return (wall < 0.0) & (time < lanes.rows[LEFT, i])
+    hit = flights.end_fall(chain, lanes.course, 0, i)
+    return (hit.wall < 0.0) & (hit.time < lanes.rows[LEFT, i])
 
 
 @inlined
-def _flight(method, chain, gravity, lanes, i, time, wall):
-    """A lane to its next contact, `time` from here at `wall` if the method seeks it, or to the end of the frame."""
-    rows = lanes.rows
-    x, y, z, vx, vy, vz, left, lanes.surface[i] = methods.flight(
-        method, chain, gravity,
-        rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-        rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], time, wall, rows[HITS, i],
-    )  # fmt: skip
-    _put(lanes, i, x, y, z, vx, vy, vz, left)
+def _flight(method, chain, gravity, lanes, i, hit):
+    """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
+    lane = lane_of(method, lanes.rows, i)
+    if methods.lands(method):
+        end = methods.land(method, chain, gravity, lane, hit)
+    else:
+        end = methods.flight(method, chain, gravity, lane)
+    _put(lanes, i, end)
+    lanes.wall[i] = end.wall
 
 
 @inlined
 def _end(method, chain, lanes, i, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
-    x, y, z, vx, vy, vz, left, wall, given, hits, energy = contact
-    _put(lanes, i, x, y, z, vx, vy, vz, left)
-    _count(method, lanes, i, left, hits, energy)
-    lanes.surface[i] = wall
-    _add_impulse(chain.rest, chain, lanes.impulse, i, wall, given)
-    return not (left > 0.0), wall <= methods.HARD
+    _put(lanes, i, contact)
+    _count(method, lanes, i, contact)
+    lanes.wall[i] = contact.wall
+    _add_impulse(chain.rest, chain, lanes.impulse, i, contact.wall, contact.impulse)
+    return not (contact.left > 0.0), contact.wall <= methods.HARD
 
 
 @inlined
-def _put(lanes, i, x, y, z, vx, vy, vz, left):
-    """Where a lane is now, and how much of its frame is left."""
-    rows = lanes.rows
-    rows[X, i], rows[Y, i], rows[Z, i] = x, y, z
-    rows[VX, i], rows[VY, i], rows[VZ, i] = vx, vy, vz
-    rows[LEFT, i] = left
+def _put(lanes, i, end):
+    """Where a lane is at the end of a flight or a contact, and how much of its frame is left."""
+    put(lanes.rows, R, i, end.r)
+    put(lanes.rows, V, i, end.v)
+    lanes.rows[LEFT, i] = end.left
 
 
 @inlined
-def _count(method, lanes, i, left, hits, energy):
+def _count(method, lanes, i, contact):
     """What a contact counts, whether the lane has arrived, and the energy where contacts may lose some."""
     rows = lanes.rows
-    rows[HITS, i] += hits
+    rows[HITS, i] += contact.hits
     if methods.dissipates(method):
-        rows[K0, i] = energy
-    lanes.marked[i] = not (left > 0.0)
+        rows[OWN, i] = contact.twice_energy
+    lanes.marked[i] = not (contact.left > 0.0)
 
 
 @by_type
-def _add_impulse(rest, chain, impulse, lane, surface, given):
-    """impulse[surface, lane] += given, without a branch; a loop over rows here would not vectorise."""
+def _add_impulse(rest, chain, impulse, lane, wall, given):
+    """impulse[wall, lane] += given, without a branch; a loop over rows here would not vectorise."""
 
 
 @_add_impulse.register(Nothing)
-def _(rest, chain, impulse, lane, surface, given):
+def _(rest, chain, impulse, lane, wall, given):
     # One wall: what is given is 0, or it is given by that.
     impulse[0, lane] += given
 
 
 @_add_impulse.register(walls.Chain)
-def _(rest, chain, impulse, lane, surface, given):
-    _add_to(chain, impulse, 0, lane, surface, given)
+def _(rest, chain, impulse, lane, wall, given):
+    _add_to(chain, impulse, 0, lane, wall, given)
 
 
 @by_type
-def _add_to(chain, impulse, row, lane, surface, given):
+def _add_to(chain, impulse, row, lane, wall, given):
     """The same for the walls from `row` on."""
 
 
 @_add_to.register(walls.Chain)
-def _(chain, impulse, row, lane, surface, given):
-    impulse[row, lane] += select(surface == 0.0, given, 0.0)
-    _add_to(chain.rest, impulse, row + 1, lane, surface - 1.0, given)
+def _(chain, impulse, row, lane, wall, given):
+    impulse[row, lane] += select(wall == 0.0, given, 0.0)
+    _add_to(chain.rest, impulse, row + 1, lane, wall - 1.0, given)
 
 
 @_add_to.register(Nothing)
-def _(chain, impulse, row, lane, surface, given):
+def _(chain, impulse, row, lane, wall, given):
     pass
 
 
@@ -293,19 +274,14 @@ def _(hard, method, chain, gravity, lanes, live):
 
 @_hard_passes.register(Hard)
 def _(hard, method, chain, gravity, lanes, live):
-    rows, surface = lanes.rows, lanes.surface
     worst, where = 0, 0
     for i in range(live):
-        if surface[i] <= methods.HARD:
-            x, y, z, vx, vy, vz, left, hits, energy, status = methods.hard_pass(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], rows[K1, i], rows[K2, i], methods.HARD - surface[i],
-                lanes.impulse, lanes.record, i,
-            )  # fmt: skip
-            _put(lanes, i, x, y, z, vx, vy, vz, left)
-            _count(method, lanes, i, left, hits, energy)
-            if rows[HITS, i] > hard.most_hits:
+        if lanes.wall[i] <= methods.HARD:
+            lane = lane_of(method, lanes.rows, i)
+            contact, status = methods.hard_pass(method, chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
+            _put(lanes, i, contact)
+            _count(method, lanes, i, contact)
+            if lanes.rows[HITS, i] > hard.most_hits:
                 status = Status.STALLED.value
             if status > worst:
                 worst, where = status, i

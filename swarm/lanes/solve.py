@@ -5,12 +5,15 @@ Each sweep is one loop over all lanes without branches; lanes that are solved st
 
 import numpy as np
 
+from ..contact.impulse import LoopRecord
+from ..contact.reflection import Turned
 from ..contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, kept, select
-from ..methods import base as methods
+from ..kernel.vector import column, put
+from ..methods import contract as methods
 from ..particles import Multipliers
-from .arrays import K0, K1, LEFT, VX, VY, VZ, X, Y, Z
+from .arrays import LEFT, lane_of
 
 
 @by_type
@@ -20,26 +23,20 @@ def solve(unknown, method, chain, gravity, multipliers, lanes, live):
 
 @solve.register(object)
 def _(unknown, method, chain, gravity, multipliers, lanes, live):
-    rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
     if methods.most_sweeps(method, chain) > 0:
         for i in range(live):
-            kappa[i], unsolved[i] = methods.guess(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], surface[i],
-            )  # fmt: skip
+            lanes.kappa[i], lanes.unsolved[i] = methods.guess(
+                method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i]
+            )
     _begin_multipliers(multipliers, method, chain, gravity, lanes, live)
     _newton(method, chain, gravity, multipliers, lanes, live)
     _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if methods.turns(method):
-        turned = lanes.turned
         for i in range(live):
-            turned[0, i], turned[1, i], turned[2, i], turned[3, i] = methods.turn(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], rows[K1, i], surface[i], kappa[i],
-            )  # fmt: skip
+            turned = methods.turn(method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], lanes.kappa[i])
+            put(lanes.turned, 0, i, turned.v)
+            lanes.turned[3, i] = turned.impulse
 
 
 @solve.register(Nothing)
@@ -49,22 +46,21 @@ def _(unknown, method, chain, gravity, multipliers, lanes, live):
 
 @by_type
 def solution(unknown, method, lanes, i):
-    """What `solve` left of a lane: the unknown, whether it is unsolved, velocity and impulse where the method turns."""
+    """What `solve` left of a lane."""
     raise NotImplementedError
 
 
 @solution.register(object)
 def _(unknown, method, lanes, i):
-    tx, ty, tz, given = 0.0, 0.0, 0.0, 0.0
+    turned = methods.NOT_TURNED
     if methods.turns(method):
-        turned = lanes.turned
-        tx, ty, tz, given = turned[0, i], turned[1, i], turned[2, i], turned[3, i]
-    return lanes.kappa[i], lanes.unsolved[i], tx, ty, tz, given
+        turned = Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
+    return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
 
 @solution.register(Nothing)
 def _(unknown, method, lanes, i):
-    return 0.0, False, 0.0, 0.0, 0.0, 0.0
+    return methods.Solution(0.0, False, methods.NOT_TURNED)
 
 
 @by_type
@@ -74,13 +70,11 @@ def _begin_multipliers(multipliers, method, chain, gravity, lanes, live):
 
 @_begin_multipliers.register(Multipliers)
 def _(multipliers, method, chain, gravity, lanes, live):
-    rows, surface, kappa, record = lanes.rows, lanes.surface, lanes.kappa, lanes.record
+    kappa, record = lanes.kappa, lanes.record
     for i in range(live):
         record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
-            method, chain, gravity,
-            rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-            rows[LEFT, i], rows[K0, i], surface[i], kappa[i],
-        )  # fmt: skip
+            method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], kappa[i]
+        )
         lanes.sweeping[i] = lanes.unsolved[i]
         record[BEFORE, i], record[MISS, i] = np.nan, np.nan
         record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
@@ -104,20 +98,15 @@ def _(multipliers, method, chain, gravity, lanes, live):
 @inlined
 def _update_multipliers(method, lanes, live):
     """The end of a sweep of the loop (8): how many lanes need another."""
-    rows, record, kappa, unsolved, sweeping = lanes.rows, lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
+    record, kappa, unsolved, sweeping = lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
     remaining = 0
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
         new, miss, more = methods.next_multiplier(
-            method,
-            rows[LEFT, i],
-            record[ACCELERATION, i],
-            old,
-            record[MEAN, i],
-            record[STORED, i],
-            record[BEFORE, i],
-            record[MISS, i],
-        )
+            method, lanes.rows[LEFT, i], record[ACCELERATION, i], old,
+            LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
+            methods.Sweep(record[BEFORE, i], record[MISS, i]),
+        )  # fmt: skip
         going = sweeping[i]
         record[BEFORE, i] = select(going, old, kept(record[BEFORE, i]))
         record[MISS, i] = select(going, miss, kept(record[MISS, i]))
@@ -136,29 +125,28 @@ def _update_multipliers(method, lanes, live):
 @inlined
 def _newton(method, chain, gravity, multipliers, lanes, live):
     """Sweeps of the inner solve, until the last lane is solved."""
-    rows, surface, kappa, unsolved = lanes.rows, lanes.surface, lanes.kappa, lanes.unsolved
+    kappa, unsolved = lanes.kappa, lanes.unsolved
     for _sweep in range(methods.most_sweeps(method, chain)):
         remaining = 0
         for i in range(live):
             going = unsolved[i]
-            kappa[i], unsolved[i], mean, stored, gain = methods.improve(
-                method, chain, gravity,
-                rows[X, i], rows[Y, i], rows[Z, i], rows[VX, i], rows[VY, i], rows[VZ, i],
-                rows[LEFT, i], rows[K0, i], surface[i], kept(kappa[i]), going, lanes.record[MULTIPLIER, i],
+            kappa[i], unsolved[i], found = methods.improve(
+                method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i],
+                methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), lanes.record[MULTIPLIER, i],
             )  # fmt: skip
-            _record(multipliers, lanes.record, i, going, mean, stored, gain)
+            _record(multipliers, lanes.record, i, going, found)
             remaining += unsolved[i]
         if remaining == 0:
             break
 
 
 @by_type
-def _record(multipliers, record, lane, going, mean, stored, gain):
-    """What the loop (8) wants to know of a sweep of the inner solve."""
+def _record(multipliers, record, lane, going, found):
+    """What the loop (8) asks of a sweep of the inner solve."""
 
 
 @_record.register(Multipliers)
-def _(multipliers, record, lane, going, mean, stored, gain):
-    record[MEAN, lane] = select(going, mean, kept(record[MEAN, lane]))
-    record[STORED, lane] = select(going, stored, kept(record[STORED, lane]))
-    record[GAIN, lane] = select(going, gain, kept(record[GAIN, lane]))
+def _(multipliers, record, lane, going, found):
+    record[MEAN, lane] = select(going, found.mean, kept(record[MEAN, lane]))
+    record[STORED, lane] = select(going, found.stored, kept(record[STORED, lane]))
+    record[GAIN, lane] = select(going, found.gain, kept(record[GAIN, lane]))

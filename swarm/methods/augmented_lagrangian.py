@@ -1,8 +1,7 @@
 """AugmentedLagrangian: the paper's method, with Uzawa's loop in every contact step."""
 
-import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,17 +11,19 @@ from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, reaction_needs
+from ..contact.records import Step
 from ..contact.reflection import CHORD_NEEDS
 from ..contact.sliding import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, scratch, select
+from ..kernel.jit import inlined, kept, scratch, select
+from ..kernel.vector import norm
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
-from ..surfaces import base as surfaces
-from ..surfaces import chain as walls
-from . import adaptive_step, base, fixed_step
+from ..surfaces import contract as surfaces
+from ..surfaces import fold as walls
+from . import base, contract, fixed_step, steps
 
 RAISE, COUNT, IMPACT = 0, 1, 2
 _POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
@@ -113,12 +114,13 @@ class AugmentedLagrangian(base.Method):
         contact = *reaction_needs(self.gradient), surfaces.gap_scale, *CHORD_NEEDS, *SLIDING_NEEDS
         return *fixed_step.of_steps(scene), *contact
 
-    def numbers(self, scene: Scene) -> "AugmentedLagrangianNumbers":
-        return AugmentedLagrangianNumbers(
+    def numbers(self, scene: Scene) -> steps.Numbers:
+        kind = steps.CutSteps if self.adaptive else steps.FixedSteps
+        return kind(
             self.dt,
             self.law(),
             form_of(self.gradient),
-            adaptive_step.Adaptive(base.SHORTEST * scene.finite_size()) if self.adaptive else None,
+            base.SHORTEST * scene.finite_size(),
             self.tolerance,
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
@@ -151,154 +153,123 @@ class AugmentedLagrangian(base.Method):
         )
 
 
-class AugmentedLagrangianNumbers(NamedTuple):
-    """What kernels know of the method."""
-
-    dt: float
-    law: Any
-    form: Any  # of the discrete gradient
-    adaptive: Any  # Adaptive or None
-    tolerance: float
-    max_sweeps: int
-    acceleration: float
-    policy: int
-    longest: Any  # step that jumps over no solid [m], None where there is none
-
-
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@base.lane_constants.register(AugmentedLagrangianNumbers)
-def _(method, mass, energy, vx, vy, vz):
-    # 1/(2m), the energy per mass at the start, and nothing
+@contract.constants.register(steps.Numbers)
+def _(method, mass, energy, v):
     return 0.5 / mass, energy, 0.0
 
 
-@base.flight.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    return adaptive_step.flight(method.adaptive, method, chain, gravity, x, y, z, vx, vy, vz, left)
+@contract.own.register(steps.Numbers)
+def _(method, first, second, third):
+    return steps.Own(first, second, third)
 
 
-@base.most_sweeps.register(AugmentedLagrangianNumbers)
+@contract.most_sweeps.register(steps.Numbers)
 def _(method, chain):
     return contact_impulse.NEWTON_STEPS
 
 
-@base.guess.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    kappa = contact_impulse.guess(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
-    touching = surface >= 0.0
+@inlined
+def _free_step(gravity, lane, h):
+    """The step without walls: r0, p and c = h^2/(2m)."""
+    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_2m * h * h)
+
+
+@contract.guess.register(steps.Numbers)
+def _(method, chain, gravity, lane, wall):
+    cut = steps.step_of(method, lane.left)
+    kappa = contact_impulse.guess(chain, wall, cut.law, _free_step(gravity, lane, cut.h))
+    touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
 
 
-@base.improve.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    step, more, mean, stored, gain = contact_impulse.improve(
-        chain, surface, law, multiplier, x, y, z, px, py, pz, k0 * h * h, kappa
-    )
-    return select(unsolved, kappa - step, kappa), unsolved & more, mean, stored, gain
+@contract.improve.register(steps.Numbers)
+def _(method, chain, gravity, lane, wall, solution, multiplier):
+    cut, kappa = steps.step_of(method, lane.left), solution.kappa
+    newton = contact_impulse.improve(chain, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
+    return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
 
-@base.multiplier_sweeps.register(AugmentedLagrangianNumbers)
+@contract.multiplier_sweeps.register(steps.Numbers)
 def _(method):
     return method.max_sweeps
 
 
-@base.first_multiplier.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
-    h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    better, multiplier = uzawa.reflection(chain, surface, law, x, y, z, px, py, pz, k0 * h * h)
+@contract.first_multiplier.register(steps.Numbers)
+def _(method, chain, gravity, lane, wall, kappa):
+    cut = steps.step_of(method, lane.left)
+    better, multiplier = uzawa.reflection(chain, wall, cut.law, _free_step(gravity, lane, cut.h))
     use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-    limited = uzawa.has_limit(chain, surface, law, x, y, z)
+    limited = uzawa.has_limit(chain, wall, cut.law, lane.r)
     return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, method.acceleration, uzawa.PLAIN)
 
 
-@base.next_multiplier.register(AugmentedLagrangianNumbers)
-def _(method, left, acceleration, multiplier, mean, stored, multiplier_before, miss_before):
-    _h, _used, law = adaptive_step.step_of(method.adaptive, method, left)
-    miss = law.alpha * mean
-    following = uzawa.next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before)
-    return following, miss, not (stored <= method.tolerance)
+@contract.next_multiplier.register(steps.Numbers)
+def _(method, left, acceleration, multiplier, record, before):
+    miss = steps.step_of(method, left).law.alpha * record.mean
+    following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
+    return following, miss, not (record.stored <= method.tolerance)
 
 
-@base.contact.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
+@contract.contact.register(steps.Numbers)
+def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
-    h, used, _law = adaptive_step.step_of(method.adaptive, method, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    x1, y1, z1 = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
-    gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
+    cut, kappa = steps.step_of(method, lane.left), solution.kappa
+    h, p = cut.h, displacement(gravity, lane.v, cut.h)
+    r1 = walls.push(chain, wall, lane.r, p, kappa)
+    g = walls.inner_gradient(chain, wall, lane.r, r1)
     f = 2.0 / h * kappa
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
-    given = abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz)
+    v1 = accelerated(gravity, lane.v, h) - f * g
+    given = abs(f) * norm(g)
 
-    free = adaptive_step.is_alone(method.adaptive, chain, gravity, surface, x, y, z, x1, y1, z1, h, kappa)
-    solved = free & (not unsolved) & walls.pushes(chain, surface, kappa)
-    touching = surface >= 0.0
-    step = (left > 0.0) & touching & solved
-    factor, _balanced = energies.restored(
-        method.law, chain, gravity, 2.0 * k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 1.0 / h * given
-    )
-    new = step & adaptive_step.is_new(method.adaptive, chain, x, y, z)
+    alone = steps.is_alone(method, chain, wall, lane.r, r1, kappa)
+    solved = alone & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
+    touching = wall >= 0.0
+    step = (lane.left > 0.0) & touching & solved
+    budget = energies.Budget(2.0 * lane.own.over_2m, lane.own.energy, 1.0 / h * given)
+    factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, r1, v1, h))
+    new = step & steps.is_new(method, chain, lane.r)
     # A step without contact: only fixed steps end here that way, just before one.
-    loose = (left > 0.0) & (surface > base.HARD) & (not touching)
-    ex, ey, ez = accelerated(gravity, vx, vy, vz, h)
-    return (
-        select(step, x1, select(loose, x + px, kept(x))),
-        select(step, y1, select(loose, y + py, kept(y))),
-        select(step, z1, select(loose, z + pz, kept(z))),
-        select(step, wx * factor, select(loose, ex, kept(vx))),
-        select(step, wy * factor, select(loose, ey, kept(vy))),
-        select(step, wz * factor, select(loose, ez, kept(vz))),
-        left - select(step | loose, used, 0.0),
-        select(touching & (not solved), base.HARD - surface, surface),
+    loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
+    return contract.Contact(
+        select(step, r1, select(loose, lane.r + p, kept(lane.r))),
+        select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
+        lane.left - select(step | loose, cut.used, 0.0),
+        select(touching & (not solved), contract.HARD - wall, wall),
         select(step, given, 0.0),
         select(new, 1.0, 0.0),
-        k0,
+        0.0,
     )
 
 
 # --- Several walls, nested solves, and loops that do not converge ----------------------------------------
 
 
-@base.hard_pass.register(AugmentedLagrangianNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    h, used, law = adaptive_step.step_of(method.adaptive, method, left)
-    if adaptive_step.is_blocked(method.adaptive, method.law, chain, surface, x, y, z, h * vx, h * vy, h * vz):
-        record[uzawa.SWEEPS, lane] = 0.0
-        return adaptive_step.as_impacts(
-            method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane
-        )
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    if fixed_step.too_fast(method.longest, px, py, pz):
-        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
+@contract.hard_pass.register(steps.Numbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    cut, record = steps.step_of(method, lane.left), lanes.record
+    h = cut.h
+    if steps.is_blocked(method, chain, wall, lane.r, h * lane.v):
+        record[uzawa.SWEEPS, i] = 0.0
+        return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
+    free = _free_step(gravity, lane, h)
+    if fixed_step.too_fast(method.longest, free.p):
+        return fixed_step.refused(lane, Status.TOO_FAST.value)
     reactions = scratch((walls.length(chain), 4), np.float64)
-    x1, y1, z1, sweeps, stored, solved, converged = uzawa.loop(
-        method, law, chain, x, y, z, px, py, pz, k0 * h * h, reactions
-    )
-    record[uzawa.SWEEPS, lane], record[uzawa.STORED, lane] = sweeps, stored
-    record[uzawa.UNCONVERGED, lane] = 0.0 if converged else 1.0
-    if not converged and method.policy == IMPACT:
-        return adaptive_step.as_impacts(
-            method.adaptive, chain, x, y, z, vx, vy, vz, left, h, used, k0, k1, surface, impulse, lane
-        )
-    if not converged and (method.policy == RAISE or not solved):
-        status = Status.UNCONVERGED.value if solved else Status.UNSOLVED.value
-        return x, y, z, vx, vy, vz, left, 0.0, k0, status
-    new = 1.0 if adaptive_step.is_new(method.adaptive, chain, x, y, z) else 0.0
-    rx, ry, rz = corner.total(reactions)
-    f = 2.0 / h
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    wx, wy, wz = wx - f * rx, wy - f * ry, wz - f * rz
-    corner.add_impulses(reactions, h, impulse, lane)
-    given = f * math.sqrt(rx * rx + ry * ry + rz * rz)
-    e, _balanced = energies.restored(
-        method.law, chain, gravity, 2.0 * k0, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 1.0 / h * given
-    )
-    return x1, y1, z1, wx * e, wy * e, wz * e, left - used, new, k0, Status.DONE.value
+    end = uzawa.loop(method, cut.law, chain, free, reactions)
+    record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
+    record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
+    if not end.converged and method.policy == IMPACT:
+        return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
+    if not end.converged and (method.policy == RAISE or not end.solved):
+        return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
+    new = 1.0 if steps.is_new(method, chain, lane.r) else 0.0
+    reaction = corner.total(reactions)
+    v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
+    corner.add_impulses(reactions, h, lanes.impulse, i)
+    budget = energies.Budget(2.0 * lane.own.over_2m, lane.own.energy, 1.0 / h * (2.0 / h * norm(reaction)))
+    factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
+    left = lane.left - cut.used
+    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, 0.0), Status.DONE.value

@@ -1,25 +1,14 @@
-"""What a method is: a description for people, a tuple of numbers for kernels, and the pass of one particle.
-
-A pass is a free flight followed by at most one contact. Its parts are scalar, branch-free functions, and lanes.py
-loops over each part separately: short loops keep more lanes in the processor's window than one long loop (measured on
-Zen 3: 7.8 instead of 10.3 ns an impact in an ellipsoid, 3.2 instead of 5.8 for the bare loop in C). What is rare and
-needs loops and branches is left to `hard_pass`.
-"""
+"""What a method is for a user: a description, checked. The functions of its numbers are in contract.py."""
 
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import SceneError
-from ..kernel.jit import by_type, by_type_outlined
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import base as surfaces
+from ..surfaces import contract as surfaces
 from ..surfaces import required
-
-# A wall this low in place of a surface index asks for `hard_pass`: HARD - wall is the surface.
-HARD = -2.0
-
 
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
@@ -33,7 +22,7 @@ class Method:
         """Raise a `SceneError` if this method cannot run this scene with these particles."""
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        """The functions of surfaces/base.py that its kernels ask of every wall."""
+        """The functions of surfaces/contract.py that its kernels ask of every wall."""
         return ()
 
     def numbers(self, scene: Scene) -> Any:
@@ -49,7 +38,7 @@ class Method:
         return duration
 
     def is_rigid(self) -> bool:
-        """Whether a particle outside its walls by more than round-off is an error, and no wall that gives way."""
+        """Whether a particle outside its walls by more than round-off is an error rather than wall compliance."""
         return False
 
     def has_multipliers(self) -> bool:
@@ -57,7 +46,7 @@ class Method:
         return False
 
     def seldom_hard(self, scene: Scene) -> bool:
-        """Whether most runs meet no contact for `hard_pass`: then its kernel is compiled when the first one comes."""
+        """Whether most runs meet no contact for `hard_pass`: then the slow-path kernel is compiled at the first one."""
         return False
 
     def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
@@ -101,113 +90,3 @@ def check_crossing(name: str, step: float | None, scene: Scene, particles: Parti
         raise SceneError(
             f"{name} must be at most the crossing time size/|v| of the fastest particle, {crossing:.3g} s, got {step:g}"
         )
-
-
-@by_type
-def lane_constants(method, mass, energy, vx, vy, vz):
-    """Three numbers of one particle that hold for the whole frame; the method says which."""
-    raise NotImplementedError
-
-
-@by_type
-def seeks(method):
-    """Whether `flight` takes the first hit of a flight, found before: a constant for the compiler."""
-    return False
-
-
-@by_type
-def flight(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    """Fly to the next contact, or to the end: (x, y, z, vx, vy, vz, left, surface).
-
-    The arguments time and surface are `flights.first_hit`, for a method that seeks it; hits is how many impacts the
-    frame has had. `left` is what is left of the frame, in the method's unit; the surface that is returned is the wall
-    of the contact that follows, or -1 for none; `HARD - wall` leaves the contact to `hard_pass`.
-    """
-    raise NotImplementedError
-
-
-@by_type
-def unknown(method):
-    """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
-    return method
-
-
-@by_type
-def most_sweeps(method, chain):
-    """The most sweeps of `improve` a contact may take: a constant for the compiler, 0 where it has a closed form."""
-    return 0
-
-
-@by_type
-def guess(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
-    return 0.0, False
-
-
-@by_type
-def improve(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    """One sweep of the solve: (kappa, unsolved, (Phi0 + Phi1)/2, V, dkappa/dlambda).
-
-    A lane that is solved stays as it is, bit by bit. The last three are for the loop of a multiplier.
-    """
-    return kappa, False, 0.0, 0.0, 0.0
-
-
-@by_type
-def multiplier_sweeps(method):
-    """The most sweeps of that loop."""
-    return 0
-
-
-@by_type
-def first_multiplier(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa):
-    """The multiplier that the loop (8) starts from, kappa for it, and the acceleration of the loop."""
-    return 0.0, kappa, 0.0
-
-
-@by_type
-def next_multiplier(method, left, acceleration, multiplier, mean, stored, multiplier_before, miss_before):
-    """The multiplier after a sweep, what the sweep missed by, and whether to go on."""
-    return 0.0, 0.0, False
-
-
-@by_type
-def turns(method):
-    """Whether `turn` runs before `contact`, as one loop of both would be too long: a constant for the compiler."""
-    return False
-
-
-@by_type
-def turn(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, surface, kappa):
-    """The velocity after the contact with `surface` and its impulse per mass, for `contact`."""
-    return 0.0, 0.0, 0.0, 0.0
-
-
-@by_type
-def dissipates(method):
-    """Whether contacts may lose energy, so that k0, twice the energy per mass, changes: a constant for the compiler."""
-    return False
-
-
-@by_type
-def contact(
-    method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned
-):
-    """The contact with `surface`: (x, y, z, vx, vy, vz, left, surface, impulse, hits, k0).
-
-    (tx, ty, tz, turned) is what `turn` found.
-
-    `impulse` is the normal impulse per mass that the surface gave; `hits` counts new impacts. A `surface` that is HARD
-    already passes through and nothing else changes; to become hard, return `HARD - surface`. `unsolved` says that the
-    unknown was not found, or that the multiplier did not converge.
-    """
-    raise NotImplementedError
-
-
-@by_type_outlined
-def hard_pass(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    """What flight or contact left: (x, y, z, vx, vy, vz, left, hits, k0, status).
-
-    Adds to `impulse[surface, lane]`, and writes the sweeps of a multiplier loop into `record[:, lane]`.
-    """
-    raise NotImplementedError

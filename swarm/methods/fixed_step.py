@@ -1,7 +1,7 @@
 """What methods with a fixed step share: whole steps, the jump over free ones, solids that a step could miss."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,11 @@ from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import by_type, inlined, kept, select
+from ..kernel.vector import Vec, square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
-from . import base
+from . import base, contract
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
 _WHOLE = 1e-6
@@ -117,38 +118,70 @@ def of_steps(scene: Scene) -> tuple[Any, ...]:
     return asked
 
 
+# --- Kernels ---------------------------------------------------------------------------------------------
+
+
 @by_type
-def too_fast(longest, px, py, pz):
+def too_fast(longest, p):
     """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
     return False
 
 
 @too_fast.register(float)
-def _(longest, px, py, pz):
-    return px * px + py * py + pz * pz > longest * longest
+def _(longest, p):
+    return square(p) > longest * longest
 
 
 @inlined
-def free_steps(chain, gravity, dt, x, y, z, vx, vy, vz, left):
-    """Jump over the steps that surely stay free: (x, y, z, vx, vy, vz, steps left)."""
+def free_steps(chain, gravity, dt, lane):
+    """The `Flight` over the steps that surely stay free."""
     # One too many by round-off starts a contact 1e-16 deep: harmless.
-    steps = np.floor(flights.free_time(gravity, chain, x, y, z, vx, vy, vz) * (1.0 / dt))
-    steps = select(steps < left, steps, left)
+    steps = np.floor(flights.free_time(gravity, chain, lane.r, lane.v) * (1.0 / dt))
+    steps = select(steps < lane.left, steps, lane.left)
     t = steps * dt
-    dx, dy, dz = displacement(gravity, vx, vy, vz, t)
-    vx, vy, vz = accelerated(gravity, vx, vy, vz, t)
-    return x + dx, y + dy, z + dz, vx, vy, vz, left - steps
+    r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
+    return contract.Flight(r, v, lane.left - steps, -1.0)
 
 
 @inlined
-def taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz):
-    """Where a lane is after its step, if it takes one: (x, y, z, vx, vy, vz, steps left)."""
-    return (
-        select(step, x1, kept(x)),
-        select(step, y1, kept(y)),
-        select(step, z1, kept(z)),
-        select(step, wx, kept(vx)),
-        select(step, wy, kept(vy)),
-        select(step, wz, kept(vz)),
-        left - select(step, 1.0, 0.0),
+def before_step(method, start, touched, alone, p):
+    """A flight over free steps, with the wall of the step that follows: HARD where one lane cannot take it alone."""
+    wall = select(alone, touched.wall, contract.HARD - touched.wall)
+    wall = select(too_fast(method.longest, p), contract.HARD, wall)
+    return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
+
+
+class Taken(NamedTuple):
+    """Where a step ends, how it changes the wall's number, its impulse per mass, and whether it starts an impact."""
+
+    r: Vec
+    v: Vec
+    wall: float
+    impulse: float
+    new: bool
+
+
+@inlined
+def contact(lane, step, taken):
+    """The `Contact` of a lane that takes its step, or does not."""
+    return contract.Contact(
+        select(step, taken.r, kept(lane.r)),
+        select(step, taken.v, kept(lane.v)),
+        lane.left - select(step, 1.0, 0.0),
+        taken.wall,
+        select(step, taken.impulse, 0.0),
+        select(step & taken.new, 1.0, 0.0),
+        0.0,
     )
+
+
+@inlined
+def refused(lane, status):
+    """A hard step that is not taken, for this reason."""
+    return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0), status
+
+
+@inlined
+def done(lane, r, v, new, status):
+    """A hard step that is."""
+    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, select(new, 1.0, 0.0), 0.0), status

@@ -5,18 +5,18 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
-from ..contact.reflection import CHORD_NEEDS, chord_end, chord_step, chord_turn, exact
+from ..contact.reflection import CHORD_NEEDS, Energy, exact, loses_energy
 from ..contact.sliding import NEEDS as SLIDING_NEEDS
-from ..contact.sliding import impact
+from ..contact.sliding import Contacts
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import by_type, kept, select
+from ..kernel.jit import kept, select
+from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
-from ..status import Status
-from ..surfaces import chain as walls
 from ..surfaces import flights
-from . import base
+from . import base, contract
+from .chord import Chord, after_short_flight
 
 # Walls within this part of the scene's size hold a sliding particle together.
 _TOUCH = 1e-10
@@ -84,226 +84,94 @@ class Impact(base.Method):
         # In one smooth cavity only what grazes is: one launch in 1e9, if none is aimed.
         return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid() and scene.gravity is None
 
-    def numbers(self, scene: Scene) -> "ImpactNumbers":
+    def numbers(self, scene: Scene) -> "Reflection | Chord":
         size = scene.finite_size()
         length = base.SHORTEST * size if self.shortest_flight is None else 0.0
         pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
-        step = self.contact_step or None
-        return ImpactNumbers(step, scene.restitution(), self.shortest_flight or 0.0, length, _TOUCH * size, pull * size)
+        given = self.shortest_flight or 0.0, length, _TOUCH * size, pull * size
+        if self.contact_step > 0.0:
+            return Chord(*given, self.contact_step)
+        return Reflection(*given, scene.restitution())
 
 
-class ImpactNumbers(NamedTuple):
-    """What kernels know of the method; one of shortest_flight and shortest_length is 0."""
+class Reflection(NamedTuple):
+    """What kernels know of the method with the exact reflection; one of the shortest flight's two numbers is 0."""
 
-    contact_step: Any  # None or h
-    restitution: Any  # None or one e a wall
-    shortest_flight: float
-    shortest_length: float
-    touch: float
+    shortest_flight: float  # [s]
+    shortest_length: float  # of a flight [m]
+    touch: float  # distance within which walls hold a sliding particle [m]
     fall2: float  # |G| size, the square of a speed
+    restitution: Any  # None or one e a wall
+
+
+class ImpactOwn(NamedTuple):
+    """What a lane keeps: its energy, and its shortest flight [s]."""
+
+    energy: Energy
+    shortest: float
 
 
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@base.lane_constants.register(ImpactNumbers)
-def _(method, mass, energy, vx, vy, vz):
+@contract.constants.register(Reflection)
+@contract.constants.register(Chord)
+def _(method, mass, energy, v):
     # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the shortest flight of this particle
     twice_energy = 2.0 * energy
     moving = twice_energy > 0.0
     half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
-    speed2 = vx * vx + vy * vy + vz * vz + method.fall2
+    speed2 = square(v) + method.fall2
     moving = speed2 > 0.0
     shortest = method.shortest_flight + method.shortest_length / math.sqrt(select(moving, speed2, 1.0))
     return twice_energy, half_inverse, select(moving, shortest, 0.0)
 
 
-@base.seeks.register(ImpactNumbers)
+@contract.own.register(Reflection)
+@contract.own.register(Chord)
+def _(method, first, second, third):
+    return ImpactOwn(Energy(first, second), third)
+
+
+@contract.dissipates.register(Reflection)
 def _(method):
-    return True
+    return loses_energy(method.restitution)
 
 
-@base.flight.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    hit = (time <= left) & (surface >= 0.0)
-    t = select(time < left, time, left)
-    dx, dy, dz = displacement(gravity, vx, vy, vz, t)
-    vx, vy, vz = accelerated(gravity, vx, vy, vz, t)
+@contract.land.register(Reflection)
+@contract.land.register(Chord)
+def _(method, chain, gravity, lane, hit):
+    t = select(hit.time < lane.left, hit.time, lane.left)
     # A flight shorter than the shortest ends in a contact that may graze; not the first one, cut by the frame's begin.
-    short = (time < k2) & (hits > 0.0)
-    surface = select(hit, select(short, base.HARD - surface, surface), -1.0)
-    return x + dx, y + dy, z + dz, vx, vy, vz, left - t, surface
-
-
-@base.unknown.register(ImpactNumbers)
-def _(method):
-    return method.contact_step
-
-
-@base.most_sweeps.register(ImpactNumbers)
-def _(method, chain):
-    return _sweeps(method.contact_step, chain)
-
-
-@by_type
-def _sweeps(contact_step, chain):
-    return 0
-
-
-@_sweeps.register(float)
-def _(contact_step, chain):
-    return walls.chord_sweeps(chain)
-
-
-@base.guess.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    return _guess(method.contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left)
-
-
-@by_type
-def _guess(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left):
-    return 0.0, False
-
-
-@_guess.register(float)
-def _(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left):
-    h = select(contact_step < left, contact_step, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    return walls.chord_guess(chain, surface, x, y, z, px, py, pz), (surface >= 0.0) & (h > 0.0)
-
-
-@base.improve.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    kappa, more = _improve(method.contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa, unsolved)
-    return kappa, more, 0.0, 0.0, 0.0
-
-
-@by_type
-def _improve(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa, unsolved):
-    return kappa, False
-
-
-@_improve.register(float)
-def _(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa, unsolved):
-    h = select(contact_step < left, contact_step, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    better, more = chord_step(chain, surface, x, y, z, px, py, pz, kappa)
-    return select(unsolved, better, kappa), unsolved & more
-
-
-@base.turns.register(ImpactNumbers)
-def _(method):
-    return _turns(method.contact_step)
-
-
-@by_type
-def _turns(contact_step):
-    return False
-
-
-@_turns.register(float)
-def _(contact_step):
-    return True
-
-
-@base.turn.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, surface, kappa):
-    return _turn(method.contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa)
-
-
-@by_type
-def _turn(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa):
-    return 0.0, 0.0, 0.0, 0.0
-
-
-@_turn.register(float)
-def _(contact_step, chain, gravity, surface, x, y, z, vx, vy, vz, left, kappa):
-    h = select(contact_step < left, contact_step, left)
-    return chord_turn(chain, gravity, surface, x, y, z, vx, vy, vz, h, kappa)
-
-
-@base.dissipates.register(ImpactNumbers)
-def _(method):
-    return _dissipates(method.restitution)
-
-
-@by_type
-def _dissipates(restitution):
-    return False
-
-
-@_dissipates.register(walls.Chain)
-def _(restitution):
-    return True
-
-
-@base.contact.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
-    return _lane(
-        method.contact_step, method.restitution, chain, gravity, surface, x, y, z, vx, vy, vz, left, k0, k1, unsolved,
-        tx, ty, tz, turned,
-    )  # fmt: skip
-
-
-@by_type
-def _lane(
-    contact_step, restitution, chain, gravity, surface, x, y, z, vx, vy, vz, left, k0, k1, unsolved, tx, ty, tz, turned
-):
-    """The contact of one lane."""
-    raise NotImplementedError
-
-
-@_lane.register(type(None))
-def _(
-    contact_step, restitution, chain, gravity, surface, x, y, z, vx, vy, vz, left, k0, k1, unsolved, tx, ty, tz, turned
-):
-    wx, wy, wz, impulse, energy = exact(restitution, chain, gravity, surface, x, y, z, vx, vy, vz, k0, k1)
-    hit = surface >= 0.0
-    return (
-        x,
-        y,
-        z,
-        select(hit, wx, kept(vx)),
-        select(hit, wy, kept(vy)),
-        select(hit, wz, kept(vz)),
-        left,
-        surface,
-        select(hit, impulse, 0.0),
-        select(hit, 1.0, 0.0),
-        select(hit, energy, k0),
+    short = (hit.time < lane.own.shortest) & (lane.hits > 0.0)
+    wall = select(short, contract.HARD - hit.wall, hit.wall)
+    return contract.Flight(
+        lane.r + displacement(gravity, lane.v, t),
+        accelerated(gravity, lane.v, t),
+        lane.left - t,
+        select((hit.time <= lane.left) & (hit.wall >= 0.0), wall, -1.0),
     )
 
 
-@_lane.register(float)
-def _(
-    contact_step, restitution, chain, gravity, surface, x, y, z, vx, vy, vz, left, k0, k1, unsolved, tx, ty, tz, turned
-):
-    h = select(contact_step < left, contact_step, left)
-    ox, oy, oz, wx, wy, wz, stays = chord_end(chain, gravity, surface, x, y, z, vx, vy, vz, tx, ty, tz, h, k0, k1)
-    hit = surface >= 0.0
-    chord = hit & stays & (turned > 0.0) & (not unsolved)
-    return (
-        select(chord, ox, kept(x)),
-        select(chord, oy, kept(y)),
-        select(chord, oz, kept(z)),
-        select(chord, wx, kept(vx)),
-        select(chord, wy, kept(vy)),
-        select(chord, wz, kept(vz)),
-        left - select(chord, h, 0.0),
-        select(hit & (not chord), base.HARD - surface, surface),
-        select(chord, turned, 0.0),
-        select(chord, 1.0, 0.0),
-        k0,
+@contract.contact.register(Reflection)
+def _(method, chain, gravity, lane, wall, solution):
+    bounce = exact(method.restitution, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
+    hit = wall >= 0.0
+    return contract.Contact(
+        lane.r,
+        select(hit, bounce.v, kept(lane.v)),
+        lane.left,
+        wall,
+        select(hit, bounce.impulse, 0.0),
+        select(hit, 1.0, 0.0),
+        select(hit, bounce.twice_energy, lane.own.energy.twice),
     )
 
 
 # --- Short flights ---------------------------------------------------------------------------------------
 
 
-@base.hard_pass.register(ImpactNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    x, y, z, vx, vy, vz, used, energy = impact(
-        method.contact_step, method.restitution, chain, gravity, surface, x, y, z, vx, vy, vz, left, k0, k1, k2,
-        method.touch, impulse, lane,
-    )  # fmt: skip
-    return x, y, z, vx, vy, vz, left - used, 1.0, energy, Status.DONE.value
+@contract.hard_pass.register(Reflection)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    contacts = Contacts(None, method.restitution, lane.own.shortest, method.touch)
+    return after_short_flight(contacts, chain, gravity, lane, wall, lanes, i)

@@ -3,17 +3,18 @@
 A rule says where that point would be without walls (`reach`), and what follows from where it is (`end`).
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..contact import corner, implicit
+from ..contact.records import Step
 from ..kernel.gravity import displacement
 from ..kernel.jit import by_type, by_type_outlined, scratch, select
+from ..kernel.vector import Vec, norm
 from ..status import Status
-from ..surfaces import chain as walls
-from . import base, fixed_step
+from ..surfaces import fold as walls
+from . import contract, fixed_step
 
 
 class RuleNumbers(NamedTuple):
@@ -25,107 +26,114 @@ class RuleNumbers(NamedTuple):
     rule: Any
 
 
+class RuleOwn(NamedTuple):
+    """What a lane keeps."""
+
+    c: float  # h^2/(4m) of equation (I) in contact/implicit.py
+    unused: float
+    also_unused: float
+
+
+class RuleStep(NamedTuple):
+    """r1, v1 and what the walls took of the velocity."""
+
+    r: Vec
+    v: Vec
+    kick: Vec
+
+
 @by_type
-def reach(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c):
-    """From r0 to where the point would be without the force there; c = h^2/(4m)."""
+def reach(rule, h, law, chain, gravity, lane):
+    """From r0 to where the point would be without the force there."""
     raise NotImplementedError
 
 
 @by_type
-def end(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c, sx, sy, sz, rx, ry, rz):
-    """r1, v1 and what the walls took of the velocity, from the point s and kappa grad q(s)."""
+def end(rule, h, law, chain, gravity, lane, point, push):
+    """The `RuleStep`, from the point s and `push`, kappa grad q(s)."""
     raise NotImplementedError
 
 
 @by_type_outlined
-def add_impulses(rule, h, law, chain, x, y, z, c, reactions, impulse, lane):
-    """Add the impulse per mass of each wall in one step to impulse[wall, lane]."""
+def add_impulses(rule, method, chain, lane, reactions, impulse, i):
+    """Add the impulse per mass of each wall in one step to impulse[wall, i]."""
     raise NotImplementedError
 
 
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@base.lane_constants.register(RuleNumbers)
-def _(method, mass, energy, vx, vy, vz):
-    # c = h^2/(4m) of equation (I) in contact/implicit.py, and nothing
+@contract.constants.register(RuleNumbers)
+def _(method, mass, energy, v):
     return 0.25 * method.dt * method.dt / mass, 0.0, 0.0
 
 
-@base.flight.register(RuleNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
-    px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
-    surface, count = walls.touched(chain, x, y, z, px, py, pz)
+@contract.own.register(RuleNumbers)
+def _(method, first, second, third):
+    return RuleOwn(first, second, third)
+
+
+@contract.flight.register(RuleNumbers)
+def _(method, chain, gravity, lane):
+    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
+    free = contract.Lane(start.r, start.v, start.left, lane.hits, lane.own)
+    touched = walls.touched(chain, start.r, reach(method.rule, method.dt, method.law, chain, gravity, free))
     # Several walls at once: the careful way.
-    surface = select(count > 1.0, base.HARD - surface, surface)
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    surface = select(fixed_step.too_fast(method.longest, px, py, pz), base.HARD, surface)
-    return x, y, z, vx, vy, vz, left, select(left > 0.0, surface, -1.0)
+    p = displacement(gravity, start.v, method.dt)
+    return fixed_step.before_step(method, start, touched, touched.number <= 1.0, p)
 
 
-@base.most_sweeps.register(RuleNumbers)
+@contract.most_sweeps.register(RuleNumbers)
 def _(method, chain):
     return implicit.SWEEPS
 
 
-@base.guess.register(RuleNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
-    kappa = implicit.guess(chain, surface, method.law, x + px, y + py, z + pz, k0)
-    touching = surface >= 0.0
-    return select(touching, kappa, 0.0), touching
+@contract.guess.register(RuleNumbers)
+def _(method, chain, gravity, lane, wall):
+    r = lane.r + reach(method.rule, method.dt, method.law, chain, gravity, lane)
+    touching = wall >= 0.0
+    return select(touching, implicit.guess(chain, wall, method.law, r, lane.own.c), 0.0), touching
 
 
-@base.improve.register(RuleNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
-    step, more = implicit.improve(chain, surface, method.law, x + px, y + py, z + pz, k0, kappa)
-    return select(unsolved, kappa - step, kappa), unsolved & more, 0.0, 0.0, 0.0
+@contract.improve.register(RuleNumbers)
+def _(method, chain, gravity, lane, wall, solution, multiplier):
+    r, kappa = lane.r + reach(method.rule, method.dt, method.law, chain, gravity, lane), solution.kappa
+    step, more = implicit.improve(chain, wall, method.law, r, lane.own.c, kappa)
+    return select(solution.unsolved, kappa - step, kappa), solution.unsolved & more, contract.NO_RECORD
 
 
-@base.contact.register(RuleNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
-    px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
-    sx, sy, sz = implicit.reached(chain, surface, x + px, y + py, z + pz, kappa)
-    # kappa grad q(s)
-    rx, ry, rz = x + px - sx, y + py - sy, z + pz - sz
-    x1, y1, z1, wx, wy, wz, kx, ky, kz = end(
-        method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0, sx, sy, sz, rx, ry, rz
-    )
-    touching = surface >= 0.0
+@contract.contact.register(RuleNumbers)
+def _(method, chain, gravity, lane, wall, solution):
+    r = lane.r + reach(method.rule, method.dt, method.law, chain, gravity, lane)
+    point = implicit.reached(chain, wall, r, solution.kappa)
+    step = end(method.rule, method.dt, method.law, chain, gravity, lane, point, r - point)
+    touching = wall >= 0.0
     # Another wall at s, or an equation that is not solved yet: the careful way.
-    solved = (not unsolved) & (not walls.outside(chain, surface, sx, sy, sz))
-    step = (left > 0.0) & select(touching, solved, surface > base.HARD)
+    solved = (not solution.unsolved) & (not walls.outside(chain, wall, point))
     # The midpoint rule may end outside before it feels a force.
-    inside = not walls.outside(chain, -1.0, x, y, z)
-    new = step & inside & (touching | walls.outside(chain, -1.0, x1, y1, z1))
-    return (
-        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz),
-        select(touching & (not solved), base.HARD - surface, surface),
-        select(step & touching, math.sqrt(kx * kx + ky * ky + kz * kz), 0.0),
-        select(new, 1.0, 0.0),
-        k0,
+    inside = not walls.outside(chain, -1.0, lane.r)
+    taken = fixed_step.Taken(
+        step.r,
+        step.v,
+        select(touching & (not solved), contract.HARD - wall, wall),
+        select(touching, norm(step.kick), 0.0),
+        inside & (touching | walls.outside(chain, -1.0, step.r)),
     )
+    return fixed_step.contact(lane, (lane.left > 0.0) & select(touching, solved, wall > contract.HARD), taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@base.hard_pass.register(RuleNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    h = method.dt
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    if fixed_step.too_fast(method.longest, px, py, pz):
-        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
-    px, py, pz = reach(method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0)
+@contract.hard_pass.register(RuleNumbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    h, law = method.dt, method.law
+    if fixed_step.too_fast(method.longest, displacement(gravity, lane.v, h)):
+        return fixed_step.refused(lane, Status.TOO_FAST.value)
+    free = Step(lane.r, reach(method.rule, h, law, chain, gravity, lane), lane.own.c)
     reactions = scratch((walls.length(chain), 4), np.float64)
-    sx, sy, sz, solved = corner.hold(implicit.AtEnd(), method.law, None, chain, x, y, z, px, py, pz, k0, reactions)
-    add_impulses(method.rule, h, method.law, chain, x, y, z, k0, reactions, impulse, lane)
-    rx, ry, rz = corner.total(reactions)
-    x1, y1, z1, wx, wy, wz, _kx, _ky, _kz = end(
-        method.rule, method.dt, method.law, chain, gravity, x, y, z, vx, vy, vz, k0, sx, sy, sz, rx, ry, rz
-    )
-    new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
+    point, solved = corner.hold(implicit.AtEnd(), law, None, chain, free, reactions)
+    add_impulses(method.rule, method, chain, lane, reactions, lanes.impulse, i)
+    step = end(method.rule, h, law, chain, gravity, lane, point, corner.total(reactions))
     status = Status.DONE.value if solved else Status.UNSOLVED.value
-    return x1, y1, z1, wx, wy, wz, left - 1.0, new, k0, status
+    return fixed_step.done(lane, step.r, step.v, not walls.outside(chain, -1.0, lane.r), status)

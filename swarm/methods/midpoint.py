@@ -46,21 +46,18 @@ class MidpointRule(NamedTuple):
 
 
 @implicit_rule.reach.register(MidpointRule)
-def _(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c):
+def _(rule, h, law, chain, gravity, lane):
     # rm = r0 + h/2 v0 + h^2/4 a(rm)
-    ux, uy, uz = accelerated(gravity, vx, vy, vz, 0.5 * h)
-    return 0.5 * h * ux, 0.5 * h * uy, 0.5 * h * uz
+    return 0.5 * h * accelerated(gravity, lane.v, 0.5 * h)
 
 
 @implicit_rule.end.register(MidpointRule)
-def _(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c, sx, sy, sz, rx, ry, rz):
+def _(rule, h, law, chain, gravity, lane, point, push):
     # r1 = 2 rm - r0, v1 = v0 + h G - (4/h) kappa grad q(rm)
-    f = 4.0 / h
-    kx, ky, kz = f * rx, f * ry, f * rz
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    return 2.0 * sx - x, 2.0 * sy - y, 2.0 * sz - z, wx - kx, wy - ky, wz - kz, kx, ky, kz
+    kick = 4.0 / h * push
+    return implicit_rule.RuleStep(2.0 * point - lane.r, accelerated(gravity, lane.v, h) - kick, kick)
 
 
 @implicit_rule.add_impulses.register(MidpointRule)
-def _(rule, h, law, chain, x, y, z, c, reactions, impulse, lane):
-    corner.add_impulses(reactions, 0.5 * h, impulse, lane)
+def _(rule, method, chain, lane, reactions, impulse, i):
+    corner.add_impulses(reactions, 0.5 * method.dt, impulse, i)

@@ -1,6 +1,5 @@
 """Penalty: fixed steps with soft walls, conserving kinetic + potential + stored energy."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,12 +9,14 @@ from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, nested, reaction_needs
+from ..contact.records import Step
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import scratch, select
+from ..kernel.jit import inlined, scratch, select
+from ..kernel.vector import norm
 from ..scene import Scene
 from ..status import Status
-from ..surfaces import chain as walls
-from . import base, fixed_step
+from ..surfaces import fold as walls
+from . import contract, fixed_step
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Penalty(fixed_step.SoftWalls):
 
     Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt: a contact step counts only
     if its energy balances, and one that cannot be solved (a step longer than the cavity into several walls at once)
-    ends the run with an error. Walls give way by up to |v| sqrt(m/alpha) for a = 1. Order: 2 in dt. Cost: free
-    steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps look at the gap at their
-    ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the edge of a solid that is
-    shorter than |v| dt.
-    Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/base.py.
+    ends the run with an error. Walls are compliant: for a = 1 a particle is up to |v| sqrt(m/alpha) deep in one.
+    Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
+    look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
+    edge of a solid that is shorter than |v| dt.
+    Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
     Traceback (most recent call last):
@@ -69,99 +70,102 @@ class PenaltyNumbers(NamedTuple):
     longest: Any  # step that jumps over no solid [m], None where there is none
 
 
+class PenaltyOwn(NamedTuple):
+    """What a lane keeps."""
+
+    c: float  # h^2/(2m) of equation (K) in contact/impulse.py
+    energy: float  # per mass, at the start
+    unused: float
+
+
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@base.lane_constants.register(PenaltyNumbers)
-def _(method, mass, energy, vx, vy, vz):
-    # c = h^2/(2m) of equation (K) in contact/impulse.py, the energy per mass at the start, and nothing
+@contract.constants.register(PenaltyNumbers)
+def _(method, mass, energy, v):
     return 0.5 * method.dt * method.dt / mass, energy, 0.0
 
 
-@base.flight.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    surface, count = walls.touched(chain, x, y, z, px, py, pz)
+@contract.own.register(PenaltyNumbers)
+def _(method, first, second, third):
+    return PenaltyOwn(first, second, third)
+
+
+@inlined
+def _step(method, gravity, lane):
+    """The step without walls: r0, p and c."""
+    return Step(lane.r, displacement(gravity, lane.v, method.dt), lane.own.c)
+
+
+@contract.flight.register(PenaltyNumbers)
+def _(method, chain, gravity, lane):
+    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
+    p = displacement(gravity, start.v, method.dt)
+    touched = walls.touched(chain, start.r, p)
     # Several walls at once, or nested solves: the careful way.
-    surface = select((count > 1.0) | nested(method.form), base.HARD - surface, surface)
-    surface = select(fixed_step.too_fast(method.longest, px, py, pz), base.HARD, surface)
-    return x, y, z, vx, vy, vz, left, select(left > 0.0, surface, -1.0)
+    alone = (touched.number <= 1.0) & (not nested(method.form))
+    return fixed_step.before_step(method, start, touched, alone, p)
 
 
-@base.most_sweeps.register(PenaltyNumbers)
+@contract.most_sweeps.register(PenaltyNumbers)
 def _(method, chain):
     return contact_impulse.NEWTON_STEPS
 
 
-@base.guess.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface):
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    kappa = contact_impulse.guess(chain, surface, method.law, x, y, z, px, py, pz, k0)
-    touching = surface >= 0.0
+@contract.guess.register(PenaltyNumbers)
+def _(method, chain, gravity, lane, wall):
+    kappa = contact_impulse.guess(chain, wall, method.law, _step(method, gravity, lane))
+    touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
 
 
-@base.improve.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, surface, kappa, unsolved, multiplier):
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    step, more, _mean, _stored, _gain = contact_impulse.improve(
-        chain, surface, method.law, None, x, y, z, px, py, pz, k0, kappa
-    )
-    return select(unsolved, kappa - step, kappa), unsolved & more, 0.0, 0.0, 0.0
+@contract.improve.register(PenaltyNumbers)
+def _(method, chain, gravity, lane, wall, solution, multiplier):
+    kappa, unsolved = solution.kappa, solution.unsolved
+    newton = contact_impulse.improve(chain, wall, method.law, None, _step(method, gravity, lane), kappa)
+    return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
 
 
-@base.contact.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
+@contract.contact.register(PenaltyNumbers)
+def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
-    h = method.dt
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    touching = surface >= 0.0
-    bx, by, bz = walls.push(chain, surface, x, y, z, px, py, pz, kappa)
-    x1, y1, z1 = select(touching, bx, x + px), select(touching, by, y + py), select(touching, bz, z + pz)
+    h, kappa = method.dt, solution.kappa
+    step = _step(method, gravity, lane)
+    touching = wall >= 0.0
+    r1 = select(touching, walls.push(chain, wall, step.r, step.p, kappa), step.r + step.p)
     # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-    gx, gy, gz = walls.inner_gradient(chain, surface, x, y, z, x1, y1, z1)
+    g = walls.inner_gradient(chain, wall, step.r, r1)
     f = select(touching, 2.0 / h * kappa, 0.0)
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    wx, wy, wz = wx - f * gx, wy - f * gy, wz - f * gz
+    v1 = accelerated(gravity, lane.v, h) - f * g
 
     # A push into another wall, or an equation that is not solved yet: the careful way.
-    # k0 = h^2/(2m)
-    over_mass = 2.0 / (h * h) * k0
-    factor, balanced = energies.restored(
-        method.law, chain, gravity, over_mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0
+    budget = energies.Budget(2.0 / (h * h) * lane.own.c, lane.own.energy, 0.0)
+    factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
+    solved = balanced & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
+    solved = solved & (not walls.outside(chain, wall, r1))
+    taken = fixed_step.Taken(
+        r1,
+        v1 * select(touching, factor, 1.0),
+        select(touching & (not solved), contract.HARD - wall, wall),
+        abs(f) * norm(g),
+        touching & (not walls.outside(chain, -1.0, lane.r)),
     )
-    solved = balanced & (not unsolved) & walls.pushes(chain, surface, kappa)
-    solved = solved & (not walls.outside(chain, surface, x1, y1, z1))
-    step = (left > 0.0) & select(touching, solved, surface > base.HARD)
-    e = select(touching, factor, 1.0)
-    new = step & touching & (not walls.outside(chain, -1.0, x, y, z))
-    return (
-        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx * e, wy * e, wz * e),
-        select(touching & (not solved), base.HARD - surface, surface),
-        select(step, abs(f) * math.sqrt(gx * gx + gy * gy + gz * gz), 0.0),
-        select(new, 1.0, 0.0),
-        k0,
-    )
+    return fixed_step.contact(lane, (lane.left > 0.0) & select(touching, solved, wall > contract.HARD), taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@base.hard_pass.register(PenaltyNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    h = method.dt
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    if fixed_step.too_fast(method.longest, px, py, pz):
-        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
+@contract.hard_pass.register(PenaltyNumbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    h, step = method.dt, _step(method, gravity, lane)
+    if fixed_step.too_fast(method.longest, step.p):
+        return fixed_step.refused(lane, Status.TOO_FAST.value)
     reactions = scratch((walls.length(chain), 4), np.float64)
-    x1, y1, z1, solved = corner.hold(method.form, method.law, None, chain, x, y, z, px, py, pz, k0, reactions)
-    corner.add_impulses(reactions, h, impulse, lane)
-    rx, ry, rz = corner.total(reactions)
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    wx, wy, wz = wx - 2.0 / h * rx, wy - 2.0 / h * ry, wz - 2.0 / h * rz
-    new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
-    over_mass = 2.0 / (h * h) * k0
-    e, balanced = energies.restored(method.law, chain, gravity, over_mass, k1, h, x, y, z, x1, y1, z1, wx, wy, wz, 0.0)
+    r1, solved = corner.hold(method.form, method.law, None, chain, step, reactions)
+    corner.add_impulses(reactions, h, lanes.impulse, i)
+    v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
+    budget = energies.Budget(2.0 / (h * h) * lane.own.c, lane.own.energy, 0.0)
+    factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
     status = Status.DONE.value if solved and balanced else Status.UNSOLVED.value
-    return x1, y1, z1, wx * e, wy * e, wz * e, left - 1.0, new, k0, status
+    return fixed_step.done(lane, r1, v1 * factor, not walls.outside(chain, -1.0, lane.r), status)

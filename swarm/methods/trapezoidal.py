@@ -47,25 +47,20 @@ class TrapezoidalRule(NamedTuple):
 
 
 @implicit_rule.reach.register(TrapezoidalRule)
-def _(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c):
+def _(rule, h, law, chain, gravity, lane):
     # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
-    dx, dy, dz = displacement(gravity, vx, vy, vz, h)
-    fx, fy, fz = force(chain, law, x, y, z)
-    return dx + c * fx, dy + c * fy, dz + c * fz
+    return displacement(gravity, lane.v, h) + lane.own.c * force(chain, law, lane.r)
 
 
 @implicit_rule.end.register(TrapezoidalRule)
-def _(rule, h, law, chain, gravity, x, y, z, vx, vy, vz, c, sx, sy, sz, rx, ry, rz):
+def _(rule, h, law, chain, gravity, lane, point, push):
     # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
-    f = 2.0 / h
-    fx, fy, fz = force(chain, law, x, y, z)
-    kx, ky, kz = f * (rx - c * fx), f * (ry - c * fy), f * (rz - c * fz)
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    return sx, sy, sz, wx - kx, wy - ky, wz - kz, kx, ky, kz
+    kick = 2.0 / h * (push - lane.own.c * force(chain, law, lane.r))
+    return implicit_rule.RuleStep(point, accelerated(gravity, lane.v, h) - kick, kick)
 
 
 @implicit_rule.add_impulses.register(TrapezoidalRule)
-def _(rule, h, law, chain, x, y, z, c, reactions, impulse, lane):
-    corner.add_impulses(reactions, h, impulse, lane)
+def _(rule, method, chain, lane, reactions, impulse, i):
+    corner.add_impulses(reactions, method.dt, impulse, i)
     # h/(2m) |F0|
-    add_impulses(chain, law, 2.0 * c / h, 0, x, y, z, impulse, lane)
+    add_impulses(chain, method.law, 2.0 * lane.own.c / method.dt, 0, lane.r, impulse, i)

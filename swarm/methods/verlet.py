@@ -1,17 +1,17 @@
 """Verlet: explicit steps with soft walls. It does not conserve the energy: a baseline for the charts."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..contact.force import NEEDS as FORCE_NEEDS
 from ..contact.force import add_impulses, force
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import inlined, select
+from ..kernel.jit import inlined
+from ..kernel.vector import Vec, norm
 from ..scene import Scene
 from ..status import Status
-from ..surfaces import chain as walls
-from . import base, fixed_step
+from ..surfaces import fold as walls
+from . import contract, fixed_step
 
 
 @dataclass(frozen=True)
@@ -55,71 +55,71 @@ class VerletNumbers(NamedTuple):
     longest: Any  # step that jumps over no solid [m], None where there is none
 
 
+class VerletOwn(NamedTuple):
+    """What a lane keeps."""
+
+    over_mass: float  # h/(2m)
+    unused: float
+    also_unused: float
+
+
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@base.lane_constants.register(VerletNumbers)
-def _(method, mass, energy, vx, vy, vz):
-    # h/(2m), and nothing
+@contract.constants.register(VerletNumbers)
+def _(method, mass, energy, v):
     return 0.5 * method.dt / mass, 0.0, 0.0
 
 
-@base.flight.register(VerletNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, time, surface, hits):
-    x, y, z, vx, vy, vz, left = fixed_step.free_steps(chain, gravity, method.dt, x, y, z, vx, vy, vz, left)
-    px, py, pz = displacement(gravity, vx, vy, vz, method.dt)
-    surface, count = walls.touched(chain, x, y, z, px, py, pz)
+@contract.own.register(VerletNumbers)
+def _(method, first, second, third):
+    return VerletOwn(first, second, third)
+
+
+@contract.flight.register(VerletNumbers)
+def _(method, chain, gravity, lane):
+    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
+    p = displacement(gravity, start.v, method.dt)
+    touched = walls.touched(chain, start.r, p)
     # Impulses of several walls at once: one by one.
-    surface = select(count > 1.0, base.HARD - surface, surface)
-    surface = select(fixed_step.too_fast(method.longest, px, py, pz), base.HARD, surface)
-    return x, y, z, vx, vy, vz, left, select(left > 0.0, surface, -1.0)
+    return fixed_step.before_step(method, start, touched, touched.number <= 1.0, p)
 
 
-@base.unknown.register(VerletNumbers)
-def _(method):
-    return None
+class VerletStep(NamedTuple):
+    """r1, v1 and what the walls add to the velocity, h (F0 + F1)/(2m)."""
+
+    r: Vec
+    v: Vec
+    kick: Vec
 
 
 @inlined
-def _step(method, chain, gravity, x, y, z, vx, vy, vz, k0):
-    """r1, v1 and what the walls add to the velocity, h (F0 + F1)/(2m)."""
-    h = method.dt
-    fx, fy, fz = force(chain, method.law, x, y, z)
-    dx, dy, dz = displacement(gravity, vx, vy, vz, h)
+def _step(method, chain, gravity, lane):
+    """The step of a lane."""
+    h, over_mass = method.dt, lane.own.over_mass
+    f0 = force(chain, method.law, lane.r)
     # h^2/(2m) F0
-    c = h * k0
-    x1, y1, z1 = x + (dx + c * fx), y + (dy + c * fy), z + (dz + c * fz)
-    gx, gy, gz = force(chain, method.law, x1, y1, z1)
-    kx, ky, kz = k0 * (fx + gx), k0 * (fy + gy), k0 * (fz + gz)
-    wx, wy, wz = accelerated(gravity, vx, vy, vz, h)
-    return x1, y1, z1, wx + kx, wy + ky, wz + kz, kx, ky, kz
+    r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
+    kick = over_mass * (f0 + force(chain, method.law, r1))
+    return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick)
 
 
-@base.contact.register(VerletNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, kappa, unsolved, tx, ty, tz, turned):
-    x1, y1, z1, wx, wy, wz, kx, ky, kz = _step(method, chain, gravity, x, y, z, vx, vy, vz, k0)
-    step = (left > 0.0) & (surface > base.HARD)
-    new = step & (surface >= 0.0) & (not walls.outside(chain, -1.0, x, y, z))
-    return (
-        *fixed_step.taken(step, x, y, z, vx, vy, vz, left, x1, y1, z1, wx, wy, wz),
-        surface,
-        select(step, math.sqrt(kx * kx + ky * ky + kz * kz), 0.0),
-        select(new, 1.0, 0.0),
-        k0,
-    )
+@contract.contact.register(VerletNumbers)
+def _(method, chain, gravity, lane, wall, solution):
+    step = _step(method, chain, gravity, lane)
+    new = (wall >= 0.0) & (not walls.outside(chain, -1.0, lane.r))
+    taken = fixed_step.Taken(step.r, step.v, wall, norm(step.kick), new)
+    return fixed_step.contact(lane, (lane.left > 0.0) & (wall > contract.HARD), taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@base.hard_pass.register(VerletNumbers)
-def _(method, chain, gravity, x, y, z, vx, vy, vz, left, k0, k1, k2, surface, impulse, record, lane):
-    h = method.dt
-    px, py, pz = displacement(gravity, vx, vy, vz, h)
-    if fixed_step.too_fast(method.longest, px, py, pz):
-        return x, y, z, vx, vy, vz, left, 0.0, k0, Status.TOO_FAST.value
-    x1, y1, z1, wx, wy, wz, _kx, _ky, _kz = _step(method, chain, gravity, x, y, z, vx, vy, vz, k0)
-    add_impulses(chain, method.law, k0, 0, x, y, z, impulse, lane)
-    add_impulses(chain, method.law, k0, 0, x1, y1, z1, impulse, lane)
-    new = 0.0 if walls.outside(chain, -1.0, x, y, z) else 1.0
-    return x1, y1, z1, wx, wy, wz, left - 1.0, new, k0, Status.DONE.value
+@contract.hard_pass.register(VerletNumbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    if fixed_step.too_fast(method.longest, displacement(gravity, lane.v, method.dt)):
+        return fixed_step.refused(lane, Status.TOO_FAST.value)
+    step = _step(method, chain, gravity, lane)
+    add_impulses(chain, method.law, lane.own.over_mass, 0, lane.r, lanes.impulse, i)
+    add_impulses(chain, method.law, lane.own.over_mass, 0, step.r, lanes.impulse, i)
+    return fixed_step.done(lane, step.r, step.v, not walls.outside(chain, -1.0, lane.r), Status.DONE.value)

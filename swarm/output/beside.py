@@ -1,4 +1,4 @@
-"""Frames written beside the computation: a thread of their own behind a short queue."""
+"""Frames written in the background: by a thread that reads a short queue."""
 
 import contextlib
 import queue
@@ -13,12 +13,12 @@ import numpy as np
 from ..particles import State
 from .writer import WriteFrames, Written
 
-# Frames are written many at once, up to the end of a chunk of the file (`_CHUNK` in writer.py): of 10 000 particles
-# one alone takes 2.5 ms, ten take 0.9 ms each. None waits for others longer than this [s].
+# Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
+# single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits for others longer than this [s].
 _CHUNK_FRAMES = 10
 _PATIENCE = 0.05
-# Frames on their way: one half is written while the other is computed. More would only hide a slow disk in memory; of
-# very many particles there is one, which is enough to write while the next is computed.
+# Most frames in the queue: half of them are written while the others are computed. More would only hide a slow disk in
+# memory. With very many particles there is one, which is written while the next is computed.
 _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
 
@@ -26,7 +26,7 @@ WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
 class Writer(Protocol):
-    """A context that gives a function which writes frames."""
+    """A context that gives the function that writes frames."""
 
     def __enter__(self) -> WriteFrames: ...
 
@@ -35,11 +35,11 @@ class Writer(Protocol):
     ) -> bool | None: ...
 
     def sync(self) -> None:
-        """Let all that was written reach the disk."""
+        """Flush to the disk what was written."""
 
 
 class Several:
-    """A context of several writers, each with what it keeps of the particles: one after the other."""
+    """Several writers as one, each with the particles that it keeps; they write one after the other."""
 
     def __init__(self, writers: list[tuple[Writer, slice]]) -> None:
         self._writers = writers
@@ -61,7 +61,7 @@ class Several:
         self._stack.__exit__(kind, error, trace)
 
     def sync(self) -> None:
-        """Let all that was written reach the disk."""
+        """Flush to the disk what was written."""
         for writer, _kept in self._writers:
             writer.sync()
 
@@ -71,18 +71,18 @@ def _some(state: State, kept: slice) -> State:
 
 
 class Beside:
-    """A context whose function returns when the frame is copied; the one it takes writes all that wait, at once.
+    """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
 
-    When the context ends, every frame is written. What writing raised is raised by the next frame, or at the end. Of n
-    particles those are copied that are `kept`.
+    When the context ends, every frame is written. An error of the writer is raised by the next frame, or at the end. Of
+    the n particles only those `kept` are copied.
     """
 
     def __init__(self, writer: Writer, n: int, kept: slice = slice(None)) -> None:
         self._writer, self._kept = writer, kept
         n = max(1, len(range(n)[kept]))
-        # An event asks for everything before it, and is set when that is written; None is the end.
+        # An event is set when all frames before it are written; None is the end.
         self._frames: queue.SimpleQueue[Written | threading.Event | None] = queue.SimpleQueue()
-        # What bounds the other queue: a frame needs one of these.
+        # Bounds the other queue: a frame needs one of these copies.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
         copies = max(1, min(_COPIES, _BYTES // (48 * n)))
         for _ in range(copies):
@@ -90,9 +90,9 @@ class Beside:
         half = max(1, copies // 2)
         self._at_once = half if half < _CHUNK_FRAMES else half - half % _CHUNK_FRAMES
         self._problem: BaseException | None = None
-        # What a frame takes to write [s], lately.
+        # Time to write a frame of the latest batch [s].
         self.seconds = 0.0
-        # Frames that are written.
+        # Number of frames written.
         self.written = 0
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
 
@@ -135,13 +135,13 @@ class Beside:
         end: object = True
         while end is not None:
             frames, end = self._gather()
-            # After a frame that is not there, none follows.
+            # After a frame that could not be written, no other one is.
             if frames and self._problem is None:
                 began = time.perf_counter()
                 try:
                     self._write(frames)
                     self.written = frames[-1][0] + 1
-                except BaseException as problem:  # whatever it is, the thread that computes raises it
+                except BaseException as problem:  # of any kind: the computing thread raises it
                     self._problem = problem
                 self.seconds = (time.perf_counter() - began) / len(frames)
             for frame in frames:
@@ -150,7 +150,7 @@ class Beside:
                 end.set()
 
     def _gather(self) -> tuple[list[Written], object]:
-        """The next frames to write, and what ended them: None is the end of the run."""
+        """The next batch of frames, and what ended it: None is the end of the run."""
         frames: list[Written] = []
         frame = self._frames.get()
         latest = time.monotonic() + _PATIENCE

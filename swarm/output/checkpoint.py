@@ -1,7 +1,7 @@
-"""Checkpoints: all that a run needs to go on with the same bits, in one NumPy archive, replaced as a whole.
+"""Checkpoints: all that a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
 
-A line of JSON under "job" says what was run and how far; the other entries are the arrays of `Run.arrays`. Each has a
-checksum.
+A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Each
+has a checksum.
 """
 
 import contextlib
@@ -30,18 +30,18 @@ Arrays = dict[str, NDArray[Any]]
 # The name of an archive's first entry ends here.
 _FIRST = b"job.npy"
 _HEAD = 30 + len(_FIRST)
-_HINT = "run it with the inputs it was started with, or start afresh with --overwrite"
+_HINT = "use the inputs that it was started with, or start again with --overwrite"
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is being run, and how far it is.
+    """A run and its progress.
 
     Attributes:
-        version, scene, method, storage: as texts; particles: how many; start: a digest of the particles at the start.
+        version, scene, method, storage: as text; particles: their number; start: a digest of them at the start.
         frame, time: the last frame that was written [s].
-        following: the frame that is under way [s], or None.
-        wall_time: seconds that were spent so far.
+        following: time of the frame that is being computed [s], or None.
+        wall_time: used so far [s].
     """
 
     version: str
@@ -56,12 +56,12 @@ class Job:
     wall_time: float = 0.0
 
     def require_same(self, other: "Job", path: Path) -> None:
-        """Raise a SceneError that names both values if `other` is not the run that this checkpoint is of."""
+        """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
         for name in ("particles", "method", "scene", "storage", "start", "version"):
             mine, its = getattr(self, name), getattr(other, name)
             if mine != its:
                 raise SceneError(
-                    f"{path} is of another run: its {_NAMES[name]} {_told(mine)}, got {_told(its)}; {_HINT}"
+                    f"{path} is of another run: its {_NAMES[name]} {_one_line(mine)}, got {_one_line(its)}; {_HINT}"
                 )
 
 
@@ -75,13 +75,13 @@ _NAMES = {
 }
 
 
-def _told(value: Any) -> str:
+def _one_line(value: Any) -> str:
     """A value in one line."""
     return ", ".join(line for line in str(value).splitlines() if line)
 
 
 def digest_of(particles: Particles) -> str:
-    """Tells one start from another."""
+    """A digest that identifies particles."""
     digest = hashlib.sha256()
     for array in (particles.position, particles.velocity, particles.mass):
         digest.update(np.ascontiguousarray(array).data)
@@ -89,7 +89,7 @@ def digest_of(particles: Particles) -> str:
 
 
 def save(path: Path, job: Job, arrays: Arrays) -> None:
-    """Replace the checkpoint: until the new one is whole on the disk, the old one stays.
+    """Replace the checkpoint; the old one stays until the new one is completely on the disk.
 
     Raises:
         FileError: it cannot be written.
@@ -105,11 +105,11 @@ def save(path: Path, job: Job, arrays: Arrays) -> None:
             _sync_folder(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FileError(f"cannot write the checkpoint {path}: {error}; the one before it is as it was") from error
+        raise FileError(f"cannot write the checkpoint {path}: {error}; the previous checkpoint is unchanged") from error
 
 
 def _sync_folder(path: Path) -> None:
-    """Let the names in a folder reach the disk; other systems open no folders."""
+    """Flush the names in a folder to the disk; other systems cannot open folders."""
     folder = os.open(path, os.O_RDONLY)
     try:
         os.fsync(folder)
@@ -118,7 +118,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def is_one(path: Path) -> bool:
-    """Whether a file begins as checkpoints do, even if it is not whole."""
+    """Whether a file begins like a checkpoint, even if it is incomplete."""
     if not path.is_file():
         return False
     with open(path, "rb") as file:
@@ -133,9 +133,9 @@ def read(path: Path) -> tuple[Job, Arrays]:
     """
     with _reading(path):
         with zipfile.ZipFile(path) as archive:
-            # All that it holds has a checksum, which is known when it is read to its end.
+            # Every entry has a checksum, which is checked when it is read to its end.
             entries = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in archive.infolist()}
-        # Up to here it may not be looked at: its arrays may be of any size.
+        # Parsed only after that: the header of a damaged array may state any size.
         arrays = {
             name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
         }
@@ -146,9 +146,9 @@ def read(path: Path) -> tuple[Job, Arrays]:
 
 
 def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
-    """Raise a SceneError if these are not the arrays of that run, whose own are given.
+    """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
 
-    What a halt left in the lanes may be of any number of particles, each once.
+    The lanes of a run halted within a frame may hold any number of particles, each once.
     """
     with _reading(path):
         if arrays.keys() != run.keys():
@@ -162,7 +162,7 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
                 )
         particles = arrays["halted.particle"]
         if len(particles) and not (particles[0] >= 0 and particles[-1] < len(run["mass"]) and _ascends(particles)):
-            raise ValueError("it names particles that there are not")
+            raise ValueError("it names particles that do not exist")
 
 
 def _ascends(values: NDArray[Any]) -> bool:
@@ -175,6 +175,6 @@ def _reading(path: Path) -> Iterator[None]:
         yield
     except (*DAMAGE, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise DamagedError(
-            f"{path} is damaged: {reason(error)}; the frames in its trajectory are whole: go on from the last of them "
-            "as a new run (from = in [particles]), or start afresh, with overwrite and without resume"
+            f"{path} is damaged: {reason(error)}; the frames in its trajectory are intact: start a new run from the "
+            "last of them (from = in [particles]), or start again, with overwrite and without resume"
         ) from error

@@ -1,4 +1,4 @@
-"""Colours of particles, by speed or by energy error, on a dark ground: light is much."""
+"""Colours of particles by speed or by energy error, on a dark background: bright means large."""
 
 import math
 from collections.abc import Callable
@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from ..contact.regularisation import stored_energy
 from ..errors import SceneError
+from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Floats, Particles
 from ..scene import Scene
-from ..surfaces import base
+from ..surfaces import contract
+from ..surfaces.surface import side_sign
 
 BY = ("speed", "energy-error")
 
-# Viridis (https://bids.github.io/colormap) without its darkest third, which a dark ground swallows: every kind of eye
-# sees it go from dark to light.
+# Viridis (https://bids.github.io/colormap) without its darkest third, which is invisible on a dark background. It
+# goes from dark to light with every kind of colour vision.
 _TABLE = np.array(
     [
         (53, 95, 141), (44, 114, 142), (36, 134, 142), (31, 153, 138), (41, 175, 127),
@@ -26,15 +28,15 @@ _TABLE = np.array(
     dtype=np.float64,
 )  # fmt: skip
 _STEPS = 256
-# Speeds up to this many times that of the mean energy of the start.
+# The scale ends at this many times the speed of the mean energy at the start.
 _FASTER = 1.5
-# Decades of the relative energy error: from round-off to what a picture shows.
+# log10 of the relative energy errors at the ends of the scale.
 _DECADES = (-16.0, -6.0)
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours mean: the quantity with its unit, and its values at both ends."""
+    """The meaning of colours: the quantity with its unit, and its values at both ends."""
 
     quantity: str
     low: float
@@ -64,7 +66,7 @@ Values = Callable[[Floats, Floats], Floats]
 
 
 def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[Scale, Values]:
-    """The scale, and the function of positions and velocities (3, N) that gives what it is of.
+    """The scale, and its quantity as a function of positions and velocities (3, N).
 
     Raises:
         SceneError: energy errors are asked for where impacts dissipate energy.
@@ -77,8 +79,8 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: _speed(velocity)
     if scene.restitution() is not None:
         raise SceneError(
-            "record_color must be 'speed' where a surface has a restitution below 1, got 'energy-error': what impacts "
-            "dissipate is no error"
+            "record_color must be 'speed' where a surface has a restitution below 1, got 'energy-error': energy that "
+            "impacts dissipate is not an error"
         )
     before, inverse = energy(start.position, start.velocity), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 
@@ -95,17 +97,17 @@ def _speed(velocity: Floats) -> Floats:
 
 
 def _energies(scene: Scene, method: Method, start: Particles) -> tuple[Values, Floats]:
-    """Energies per mass as a function of positions and velocities, and what their errors are relative to."""
+    """Energies per mass as a function of positions and velocities, and the scale of their errors."""
     law, gravity, mass = method.law(), np.array(scene.gravity or (0.0, 0.0, 0.0)), start.mass
 
     def stored(position: Floats) -> Floats:
         total = np.zeros(len(mass))
         if law is not None:
             for surface in scene.surfaces:
-                side = base.side_sign(getattr(surface, "side", "inside"))
+                side = side_sign(getattr(surface, "side", "inside"))
                 for wall in surface.walls():
-                    gap = side * base.phi(wall, *position)
-                    # Few are in a wall, and the law is for one number.
+                    gap = side * contract.phi(wall, vec(position))
+                    # Few particles are in a wall, and the law takes one number.
                     for i in np.flatnonzero(gap > 0.0):
                         total[i] += stored_energy(law, float(gap[i])) / mass[i]
         return total

@@ -1,4 +1,4 @@
-"""What contact sheets and plots draw, by matplotlib: particles among their walls, and time series."""
+"""Drawing with matplotlib for contact sheets and plots: particles among their walls, and time series."""
 
 from pathlib import Path
 from typing import Any
@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from ..particles import Floats
 from . import colours, series
 
-# Okabe and Ito's, for a light ground.
+# Okabe and Ito's, for a light background.
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MAP = ListedColormap(colours.table(), name="swarm")
-GROUND, LIGHT = "#18181b", "#c8c8d0"
+BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _DPI = 100
+# Matplotlib leaves room around 3-D axes: this much larger they fill their cell.
+_ZOOM = 1.3
 
 
 def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
@@ -32,11 +34,14 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
 def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]]) -> None:
     """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale."""
     points = np.asarray(positions)
+    axes.computed_zorder = False  # the particles would hide the solids among them
     for solid, curves in wires:
-        lines = Line3DCollection(curves, colors=_SOLID_WIRE if solid else _WIRE, linewidths=0.5, alpha=0.7)
-        axes.add_collection3d(lines, autolim=False)
+        style = (
+            {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
+        )
+        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, **style), autolim=False)
     size = float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
-    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False)
+    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False, zorder=2)
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
@@ -50,13 +55,13 @@ def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bo
     axes.set_xlabel("x [m]", labelpad=-4, fontsize=8)
     axes.set_ylabel("y [m]", labelpad=-4, fontsize=8)
     axes.set_zlabel("z [m]", labelpad=-4, fontsize=8)
-    axes.set_aspect("equal")
+    axes.set_box_aspect(high - low, zoom=_ZOOM)
     axes.grid(False)
-    axes.set_facecolor(GROUND)
+    axes.set_facecolor(BACKGROUND)
 
 
 def colour_bar(picture: Any, axes: Any, quantity: str, low: float, high: float) -> None:
-    """What the colours of the particles mean, below these axes."""
+    """A colour bar for the particles, below these axes."""
     meaning = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(low, high), MAP)
     bar = picture.colorbar(meaning, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02)
     bar.set_label(f"colour: {quantity}", color=LIGHT, fontsize=9)
@@ -77,7 +82,7 @@ def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarit
         axes.set_yscale("log")
         lowest = min(values.min() for _times, values in drawn.values())
         highest = max(values.max() for _times, values in drawn.values())
-        # A decade around what is there, or a flat line would have no ticks.
+        # A decade around the values: a flat line would have no ticks.
         axes.set_ylim(10.0 ** (np.floor(lowest) - 0.3), 10.0 ** (np.floor(highest) + 1.3))
         if lowest == series.NOTHING:
             axes.axhline(10.0**series.NOTHING, color="grey", linewidth=0.6, linestyle=":")
@@ -93,7 +98,7 @@ def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarit
 
 
 def _steady(axes: Any, drawn: dict[str, tuple[Floats, Floats]]) -> None:
-    """Where a curve is constant but for round-off, its round-off is not drawn as mountains."""
+    """Keep curves that are constant up to round-off flat, instead of scaling round-off to the height of the axes."""
     values = np.concatenate([values for _times, values in drawn.values()])
     middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
     if half <= 1e-6 * abs(middle):
@@ -102,7 +107,7 @@ def _steady(axes: Any, drawn: dict[str, tuple[Floats, Floats]]) -> None:
 
 
 def save(picture: Any, path: Path) -> None:
-    """Write a picture and forget it."""
+    """Write a picture and close it."""
     try:
         picture.savefig(path, dpi=_DPI)
     finally:

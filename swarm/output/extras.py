@@ -1,4 +1,4 @@
-"""Packages that not everybody needs: what says which one is missing."""
+"""Optional packages, and the error that says which one is missing."""
 
 import contextlib
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What a trajectory must look like before anything of it is read: its datasets, their types, and shapes that agree."""
+"""The layout that a trajectory is checked for before it is read: datasets, their types, and consistent shapes."""
 
 import math
 from pathlib import Path
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 PARTS = ("position", "velocity")
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
-# No filter of HDF5 packs more densely: deflate, 1032 to 1.
+# The highest compression of any HDF5 filter: deflate, 1032 to 1.
 _DENSEST = 1032
-# Of a heap of texts, and of each object in it: bytes of the header; and how it begins.
+# Bytes of the header of a heap of texts, and of each object in it; the signature of a heap.
 _HEADER, _HEAP = 16, int.from_bytes(b"GCOL", "little")
 _INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 
-# What every run observes, and tables and pictures show; of each surface there is an impulse.
+# Observables of every run, besides the impulse of each surface.
 _NUMBERS = (
     "kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy", "energy_error",
     "max_penetration", "impacts", "escaped", "unconverged",
@@ -24,14 +24,14 @@ _NUMBERS = (
 
 
 def missing(file: Any) -> str | None:
-    """What a trajectory has and this file has not, or None."""
+    """The first part of a trajectory that this file lacks, or None."""
     return next((name for name in _REQUIRED if name not in file), None)
 
 
 def frames(file: Any, path: Path) -> int:
-    """The number of whole frames of a file; a ValueError says what is not as it was written.
+    """The number of complete frames of a file; a ValueError says what is inconsistent.
 
-    A file that is being written may hold more of a part than whole frames, never less.
+    While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
     for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start")):
         if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
@@ -51,7 +51,7 @@ def frames(file: Any, path: Path) -> int:
         return n
     kept = _dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
-        raise ValueError(f"of {count} particles it cannot keep {len(kept)}")
+        raise ValueError(f"particles/all/mass must have 1 to {count} entries, got {len(kept)}")
     _require_fits(kept, len(kept), path)
     if (ids := _dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
@@ -61,7 +61,7 @@ def frames(file: Any, path: Path) -> int:
 
 
 def require_index(file: Any) -> None:
-    """Go through the indexes of all chunks, which raises what h5py raises if one is damaged."""
+    """Read the indexes of all chunks; h5py raises an error if one is damaged."""
 
     def count(_name: str, found: Any) -> None:
         if isinstance(found, h5py.Dataset) and found.chunks is not None:
@@ -71,11 +71,11 @@ def require_index(file: Any) -> None:
 
 
 def text(dataset: Any, path: Path) -> str:
-    """A text of the file; a ValueError says that it is none.
+    """A text of the file; a ValueError if it is damaged.
 
-    HDF5 keeps it in a heap without a checksum, and goes through a damaged one for ever: so it is gone through here
-    before. HDF5 File Format Specification, III.E and VIII: a text is its length, the address of its heap and a number;
-    the heap is objects one after the other, and number 0 is the rest of it.
+    HDF5 keeps texts in a heap without a checksum, and never returns from reading a damaged one, so the heap is checked
+    first. HDF5 File Format Specification, III.E and VIII: a text is its length, the address of its heap and an object
+    number; a heap is a sequence of objects, and object 0 is its free space.
     """
     place = dataset.id.get_offset()
     with open(path, "rb") as file:
@@ -86,20 +86,20 @@ def text(dataset: Any, path: Path) -> str:
 
         begin = at = -1 if place is None else integer(place + 4, 8)
         if not 0 <= begin < path.stat().st_size or integer(begin, 4) != _HEAP:
-            raise ValueError("it is in no heap")
+            raise ValueError("its heap is not where it should be")
         end = begin + integer(begin + 8, 8)
         at += _HEADER
         while at + _HEADER <= end:
             number, size = integer(at, 2), integer(at + 8, 8)
             step = _HEADER + -(-size // 8) * 8 if number else size
             if step < _HEADER or at + step > end:
-                raise ValueError("its heap is no chain of objects")
+                raise ValueError("its heap is damaged")
             at += step
     return str(dataset.asstr()[()])
 
 
 def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
-    """Raise a ValueError if one that every run has is not there, or not of its shape."""
+    """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
     for name, shape in shapes.items():
@@ -109,7 +109,7 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
 
 
 def _dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
-    """A dataset of one of these kinds and of this shape; None is any length, and there may be more frames."""
+    """A dataset of one of these kinds and of this shape; None is any length, and the first axis may be longer."""
     found = file[name]
     if not isinstance(found, h5py.Dataset) or found.shape is None:
         raise ValueError(f"{name} must be a dataset")
@@ -121,13 +121,13 @@ def _dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | 
             for axis, (got, wanted) in enumerate(zip(found.shape, shape, strict=True))
         )
         if not same:
-            told = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
-            raise ValueError(f"{name} must have the shape ({told}), got {found.shape}")
+            expected = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
+            raise ValueError(f"{name} must have the shape ({expected}), got {found.shape}")
     return found
 
 
 def _require_fits(dataset: Any, rows: int, path: Path) -> None:
-    """Raise a ValueError if so many rows cannot be in a file of that size: nothing is to be made for them."""
+    """Raise a ValueError if the file is too small for so many rows, before memory is allocated for them."""
     size, packed = path.stat().st_size, dataset.id.get_create_plist().get_nfilters() > 0
     wanted = rows * math.prod(dataset.shape[1:]) * dataset.dtype.itemsize
     if wanted > size * (_DENSEST if packed else 1):

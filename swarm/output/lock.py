@@ -1,4 +1,4 @@
-"""One run at a time writes a trajectory: a lock file beside it, whose lock goes with the process that holds it."""
+"""Only one run writes a trajectory: the lock of a file beside it, which the system releases when a process ends."""
 
 import contextlib
 from collections.abc import Iterator
@@ -12,8 +12,8 @@ from . import paths
 def only_writer(trajectory: Path) -> Iterator[None]:
     """Hold the lock of a trajectory.
 
-    The lock is that of a file beside it: one of the trajectory itself would shut readers out. What a killed run leaves
-    of it locks nobody out.
+    A file beside it is locked, since a lock on the trajectory itself would block readers. A lock file that a killed run
+    leaves blocks no later run.
 
     Raises:
         FileError: another run holds it, or its file cannot be made.
@@ -25,7 +25,7 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except filelock.Timeout as error:
-        if not path.exists():  # what no file can be made of looks to filelock like one that comes and goes
+        if not path.exists():  # filelock reports a file that cannot be created as locked
             raise FileError(f"cannot write the trajectory {trajectory}: no file can be made in that folder") from error
         raise FileError(
             f"the trajectory {trajectory} is being written by another run; wait until that has ended, or choose "
@@ -36,8 +36,8 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # While it is held: whoever opened the file before sees that it has no name any more, and opens the next one.
-        # Where a file in use keeps its name, as on Windows, filelock removes it.
+        # Removed while locked: a process that has it open notices that its name is gone, and opens a new one. Windows
+        # cannot remove an open file: there filelock removes it later.
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
         lock.release()

@@ -1,4 +1,4 @@
-"""Where a run writes: what its files are called, and which paths cannot become files."""
+"""Names of the files of a run, and checks that a path can become a file."""
 
 import os
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from ..errors import SceneError
 
-# Files that are gone when a run has ended have names that nobody else gives a file.
+# Part of the names of temporary files, which no other program uses.
 _OURS = "swarm-"
 
 
@@ -14,7 +14,7 @@ def given(name: str, value: Any) -> Path:
     """The argument `name` as the path of a file.
 
     Raises:
-        SceneError: it is no path, or an empty one.
+        SceneError: it is not a path, or it is empty.
     """
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else value
     if not isinstance(text, str) or not text or "\0" in text:
@@ -23,13 +23,13 @@ def given(name: str, value: Any) -> Path:
 
 
 def target_of(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file to write: behind a symbolic link, the file it leads to."""
+    """The argument `name` as the path of a file to write: a symbolic link is resolved."""
     path = given(name, value)
     return path.resolve() if path.is_symlink() else path
 
 
 def checkpoint_of(trajectory: Path) -> Path:
-    """The checkpoint that goes with a trajectory."""
+    """The checkpoint of a trajectory."""
     return trajectory.with_name(trajectory.name + ".checkpoint")
 
 
@@ -39,12 +39,12 @@ def lock_of(trajectory: Path) -> Path:
 
 
 def part_of(path: Path) -> Path:
-    """What a file is called until it is whole."""
+    """The name of a file until it is complete."""
     return path.with_name(f".{path.name}.{_OURS}part{path.suffix}")
 
 
 def identity(path: Path) -> tuple[int, int] | None:
-    """Tells one file from another that takes its name; None where there is none."""
+    """Device and inode, which differ for another file of the same name; None if there is no file."""
     try:
         status = path.stat()
     except OSError:
@@ -65,12 +65,12 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
 
 
 def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:
-    """Raise a SceneError if an output is an input, or two outputs are one file; by what each of them is."""
+    """Raise a SceneError if an output is an input, or two outputs are the same file; the keys say what each is."""
     seen = [(what, path) for what, path in inputs.items() if path is not None]
     for what, path in ((what, path) for what, path in outputs.items() if path is not None):
         for other, there in seen:
             if _same(path, there):
-                raise SceneError(f"{what}: {path} is the {other} too; choose another name for one of them")
+                raise SceneError(f"{what}: {path} is also the {other}; choose another name for one of them")
         seen.append((what, path))
 
 

@@ -1,4 +1,4 @@
-"""Recordings read back: what is in a `.rrd` file, and whether it is whole."""
+"""Recordings (.rrd) read back, and whether they are complete."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scala
 
 
 class Playback:
-    """A recording of swarm, read at once.
+    """A recording of swarm, read completely.
 
     Attributes:
         numbers, times: of the frames, times in [s].
@@ -35,7 +35,7 @@ class Playback:
         wires: of each surface, whether it is a solid and its curves.
 
     Raises:
-        SceneError: there is no such file, it is damaged or cut off, or is no recording of swarm.
+        SceneError: there is no such file, it is damaged or truncated, or not a recording of swarm.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,12 +48,12 @@ class Playback:
                 foreign = not file.read(len(_BEGIN)).startswith(_BEGIN)
             if foreign:
                 raise SceneError(f"{path} is not a recording of swarm") from error
-            told = reason(error).replace(f"Failed to read RRD file at {path}: ", "")
-            raise DamagedError(f"{path} is damaged: {told}; swarm info --repair may mend it") from error
+            problem = reason(error).replace(f"Failed to read RRD file at {path}: ", "")
+            raise DamagedError(f"{path} is damaged: {problem}; swarm info --repair may repair it") from error
 
     def _read(self) -> None:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that it has no footer, which is_whole says
+            warnings.simplefilter("ignore")  # about a missing footer, which is_whole reports
             chunks = RrdReader(self.path).stream().to_chunks()
         self.entities: dict[str, int] = {}
         self.series: dict[str, tuple[Floats, Floats]] = {}
@@ -108,7 +108,7 @@ class Playback:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether the file ends as Rerun ends it, so that every viewer opens it."""
+    """Whether the file is complete: with the footer that every viewer needs."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -119,28 +119,28 @@ def is_whole(path: Path) -> bool:
 
 
 def repaired(path: Path, target: Path) -> Playback:
-    """What is left of a recording that was cut off, as a whole one in another file.
+    """Copy what can be read of a truncated recording to a complete one in another file.
 
     Raises:
-        SceneError: nothing is left, or it is no recording of swarm.
+        SceneError: no frame can be read, or it is not a recording of swarm.
         FileError: the other file cannot be written.
     """
     command = [sys.executable, "-m", "rerun", "rrd", "merge", "--continue-on-error", str(path), "-o", str(target)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode or not target.is_file():
-        told = done.stderr.strip().splitlines() or ["rerun said nothing"]
-        raise FileError(f"cannot repair {path}: {told[-1]}")
+        output = done.stderr.strip().splitlines() or ["rerun gave no reason"]
+        raise FileError(f"cannot repair {path}: {output[-1]}")
     try:
         return Playback(target)
     except SceneError as error:
-        raise SceneError(f"{path} is not a recording of swarm, or no frame of it is left") from error
+        raise SceneError(f"{path} is not a recording of swarm, or no frame of it can be read") from error
 
 
 def repair(path: Path) -> Playback:
-    """Mend a recording in place.
+    """Repair a recording in place.
 
     Raises:
-        SceneError, FileError: as `repaired`; the file is as it was.
+        SceneError, FileError: as `repaired`; the file is unchanged.
     """
     require_file(path, "a recording (.rrd)")
     target = paths.part_of(path)
@@ -153,7 +153,7 @@ def repair(path: Path) -> Playback:
 
 
 def described(path: Path) -> tuple[Playback, bool]:
-    """A recording, and whether it is whole: of one that is not, what could be repaired."""
+    """A recording, and whether it is complete; if it is not, what could be repaired of it."""
     require_file(path, "a recording (.rrd)")
     if is_whole(path):
         return Playback(path), True

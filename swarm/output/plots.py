@@ -1,4 +1,4 @@
-"""A trajectory on one picture: whether it went well, and where the particles are."""
+"""A trajectory in one picture: time series that show whether the run went well, speeds, and the particles."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from . import colours, drawing, series
 from .shapes import shapes_of
 from .trajectory import Trajectory
 
-# At most so many particles are drawn.
+# Most particles drawn.
 _SHOWN = 5000
 _BINS = 60
 _WIDE, _HIGH = 17.0, 7.6
@@ -29,7 +29,7 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
     left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
 
-    left.set_facecolor(drawing.GROUND)
+    left.set_facecolor(drawing.BACKGROUND)
     drawn = slice(None, None, -(-len(end) // _SHOWN))
     scale, values = colours.colouring("speed", scene, method, trajectory.frame(0))
     axes = left.add_subplot(projection="3d")
@@ -37,8 +37,8 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     wires = [(shape.solid, shape.wires) for shape in shapes]
     drawing.particles(axes, end.position[:, drawn].T, drawing.red_green_blue(packed), wires)
     drawing.colour_bar(left, axes, scale.quantity, scale.low, scale.high)
-    told = f"{len(packed)} of {len(end)} particles, t = {times[-1]:.6g} s"
-    axes.set_title(told, fontsize=10, color=drawing.LIGHT)
+    title = f"{len(packed)} of {len(end)} particles, t = {times[-1]:.6g} s"
+    axes.set_title(title, fontsize=10, color=drawing.LIGHT)
 
     lines = series.lines_of(scene, method, shapes)
     before: series.Seen = None

@@ -1,10 +1,10 @@
-"""Recordings: what Rerun (https://rerun.io) shows, written while a run goes on or from its trajectory.
+"""Recordings for Rerun (https://rerun.io), written during a run or from its trajectory.
 
 /scene/particles              Points3D, a frame's; coloured
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...)     Scalars
-/time                         Scalars: the exact time [s], for `sim_time` counts nanoseconds
-/about                        what the colours mean, as text and as values; static
+/time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
+/about                        meaning of the colours, as text and as values; static
 """
 
 import atexit
@@ -31,31 +31,31 @@ from .shapes import shapes_of
 from .trajectory import Trajectory
 from .writer import WriteFrames, Written
 
-# Bytes of a particle (position and colour), and of what Rerun writes at most for a number of a time series: a chunk.
+# Bytes of a particle (position and colour), and at most of a number of a time series, which may be a chunk of its own.
 _PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
 _MEGABYTE = 1e6
 _AT_ONCE = 10  # frames of a trajectory
 # Rows of the time series that are sent together, unless that takes longer than this [s].
 _ROWS, _PATIENCE = 50, 0.5
-# A flush takes milliseconds; where the file cannot be written, it may never end [s].
+# Longest flush [s]: it takes milliseconds, but may never return if the file cannot be written.
 _LONGEST = 10.0
 
-_GROUND = (24, 24, 27)
+_BACKGROUND = (24, 24, 27)
 _CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
-# Okabe and Ito's, without those that a dark ground swallows.
+# Okabe and Ito's, without those that are invisible on a dark background.
 LINES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How much a recording shows.
+    """What a recording shows.
 
     Args:
-        particles: at most so many, evenly chosen.
+        particles: the most that are recorded, evenly chosen.
         color: "speed" or "energy-error".
-        megabytes: at most this large: of many frames every k-th is recorded, and the last.
-        live: True to show it in a viewer on this machine as it is made, or the URL of a viewer.
+        megabytes: the largest size; if there are too many frames, every k-th and the last are recorded.
+        live: True to show it in a viewer on this machine during the run, or the URL of a viewer.
     """
 
     particles: int = 5000
@@ -70,9 +70,9 @@ class Settings:
 
 
 class RecordingWriter:
-    """A context that begins the recording and gives the function that appends frames.
+    """A context that creates the recording and gives the function that appends frames.
 
-    `frames` is how many there will be.
+    `frames` is the number of frames of the run.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class RecordingWriter:
             paths.check_target(path, overwrite, "recording")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._count, self._last = len(start), frames - 1
-        # Every k-th: a slice takes a tenth of the time that a list of them takes.
+        # Every k-th particle: a slice takes a tenth of the time of a list of indices.
         self._drawn = slice(None, None, math.ceil(len(start) / settings.particles))
         some = Particles(start.position[:, self._drawn], start.velocity[:, self._drawn], start.mass[self._drawn])
         self._scale, self._values = colours.colouring(settings.color, scene, method, some)
@@ -122,7 +122,7 @@ class RecordingWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._failed:
-            return  # to flush once more would wait for ever
+            return  # another flush would never return
         try:
             self._send_rows()
             self._stream.flush(timeout_sec=_LONGEST)
@@ -132,7 +132,7 @@ class RecordingWriter:
                 raise FileError(f"cannot close the recording {self._path}: {problem}") from problem
 
     def _begin(self) -> None:
-        """What does not change."""
+        """Log what does not change."""
         log = self._stream.log
         log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
@@ -151,10 +151,10 @@ class RecordingWriter:
         for colour, line in zip(_cycled(self._series), self._series, strict=True):
             log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
         scale, shown = self._scale, len(self._some)
-        told = f"{shown} of {self._count} particles" if shown < self._count else f"{shown} particles"
+        particles = f"{shown} of {self._count} particles" if shown < self._count else f"{shown} particles"
         every = f", every {self._stride}th frame" if self._stride > 1 else ""
         text = (
-            f"**{told}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
+            f"**{particles}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
             f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
             f"plots {series.NOTHING:g} is the logarithm of 0."
         )
@@ -182,23 +182,23 @@ class RecordingWriter:
         try:
             self._send("/scene/particles", numbers, times, columns.partition([n] * len(chosen)))
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
-            # A dozen series cost as much as the points of a few frames: sent together, but in time for a screen.
+            # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
                 self._send_rows()
-            # Without it nobody would hear of a full disk, and what is sent to a thread that died of it waits for ever.
+            # Without it a full disk would go unnoticed, and sending to the thread that it has ended would never return.
             self._stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             self._failed = True
-            # What ends the stream, and Rerun at the end of the process, waits for ever for its dead thread.
+            # Closing the stream, or Rerun at the exit of the process, would wait for its dead thread for ever.
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
 
     def sync(self) -> None:
-        """Nothing: no checkpoint refers to a recording."""
+        """Do nothing: no checkpoint refers to a recording."""
 
     def _send_rows(self) -> None:
-        """The time series of the frames since the last time."""
+        """Send the time series of the frames since the last call."""
         if self._rows:
             numbers, times = (np.array([row[part] for row in self._rows]) for part in (0, 1))
             for line, values in zip(self._series, np.array([row[2] for row in self._rows]).T, strict=True):
@@ -224,7 +224,7 @@ def _cycled(lines: list[series.Line]) -> list[tuple[int, int, int]]:
 def _blueprint(lines: list[series.Line]) -> rrb.Blueprint:
     """The 3-D view beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
-        origin="/scene", name="particles", background=_GROUND, line_grid=rrb.LineGrid3D(visible=False)
+        origin="/scene", name="particles", background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
     )
     plots = []
     for view, together in series.views_of(lines).items():
@@ -265,6 +265,6 @@ def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bo
                     ]
                 )
     except SceneError:
-        # Of a damaged trajectory half a recording would look like a whole one.
+        # A part of the recording of a damaged trajectory would look like a complete one.
         path.unlink(missing_ok=True)
         raise

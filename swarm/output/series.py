@@ -9,19 +9,19 @@ from ..methods import Method
 from ..scene import Scene
 from .shapes import Shape
 
-# The logarithm of a zero.
+# Stands for the logarithm of zero.
 NOTHING = -18.0
 
-# A frame's time [s], and what was observed then.
+# A frame's time [s] and its observables.
 Seen = tuple[float, dict[str, Any]] | None
 
 
 @dataclass(frozen=True)
 class Line:
-    """A time series: the plot it is in, its entity, its name in the legend, and its value at a frame.
+    """A time series: its plot, its entity, its name in the legend, and its value at a frame.
 
-    The value is a function of the frame's time, of what was observed then and of both at the frame before; of a
-    `logarithm` it is log10.
+    The value is a function of the frame's time and observables, and of those of the frame before. If `logarithm`, it is
+    a log10.
     """
 
     view: str
@@ -32,7 +32,7 @@ class Line:
 
 
 def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
-    """The time series of a scene: no line of what it does not have."""
+    """The time series of a scene, without those that are always zero in it."""
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {"contact": method.law() is not None, "dissipated": scene.restitution() is not None}
     lines = [
@@ -43,7 +43,7 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
         Line("largest penetration [m]", "/penetration", "of a particle", _logarithm_of("max_penetration"), True),
         Line("impacts per second [1/s]", "/impacts", "all particles", _rate("impacts", 1.0)),
     ]
-    # The walls of an open volume end where the drawing does: they have no area.
+    # The walls of an open volume are drawn in part, so they have no area.
     group, unit = ("force", "N") if scene.is_open() else ("pressure", "Pa")
     for i, shape in enumerate(shapes):
         area = 1.0 if scene.is_open() else shape.area()
@@ -75,7 +75,7 @@ def _logarithm_of(name: str) -> Callable[..., float]:
 
 
 def _rate(name: str, per: float, i: int | None = None) -> Callable[..., float]:
-    """The growth of what is counted, over the time from the frame before; at the first frame there is none."""
+    """The rate of a cumulative observable since the frame before; NaN at the first frame."""
 
     def value(moment: float, seen: dict[str, Any], before: Seen) -> float:
         if before is None:

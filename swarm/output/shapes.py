@@ -1,4 +1,4 @@
-"""What the walls of a scene look like, for any phi: triangles, their area, and curves of the walls as a wire frame."""
+"""The walls of a scene as shapes to draw, for any phi: triangles, their area, and the curves of a wire frame."""
 
 import math
 from dataclasses import dataclass
@@ -12,16 +12,15 @@ from skimage.measure import marching_cubes
 from ..particles import Floats
 from ..scene import Scene
 
-# Points along each side of the grid whose cells the triangles lie in. A sphere's area comes out 0.07 % too small,
-# a box's 0.6 %.
+# Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
-# Planes across each axis whose curves make the wire frame, and the points along a side of each plane.
+# Planes across each axis whose intersections with the walls are the wire frame, and points along a side of each plane.
 _PLANES, _FINE = 5, 160
-# The outermost planes are this part of its width inside a surface: there they show rims and edges.
+# The outermost planes are this fraction of the width inside a surface, where they show rims and edges.
 _END = 0.01
-# The grid goes this many of its cells beyond the walls, so that they close.
+# Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
-# Where the volume is open, the drawing ends this many times farther out than the surfaces and particles.
+# An open volume is drawn to this many times the distance of the surfaces and particles.
 _BEYOND = 1.2
 
 Corners = tuple[Floats, Floats]
@@ -60,7 +59,7 @@ def shapes_of(scene: Scene, positions: Floats) -> list[Shape]:
         name = f"{i}_{type(surface).__name__.lower()}"
         own = _of_surface(scene, i, *coarse)
         around = _around(own[0], box) if len(own[0]) else _near(surface, box)
-        # Once more, as fine as the surface is small.
+        # Again, on a grid around this surface only.
         vertices, triangles, normals = _of_surface(scene, i, *_triangles(scene, around))
         wires = _wires(scene, i, vertices, box) if len(vertices) else []
         shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
@@ -92,7 +91,7 @@ def _near(surface: Any, box: Corners) -> Corners:
 
 
 def _gap(scene: Scene, points: Floats) -> Floats:
-    """The largest gap of all surfaces at points (3, N): 0 on every wall. Where phi is no number, particles are not."""
+    """The largest gap of all surfaces at points (3, N): 0 on every wall. No particle is where phi is not a number."""
     with np.errstate(all="ignore"):
         gap = scene.gaps(points).max(axis=0)
     return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))

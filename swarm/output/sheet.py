@@ -1,4 +1,4 @@
-"""Contact sheets: some frames of a recording and its time series on one picture."""
+"""Contact sheets: some frames of a recording and its time series in one picture."""
 
 import tempfile
 from pathlib import Path
@@ -29,7 +29,7 @@ def draw(playback: Playback, target: Path, times: list[float] | None, with_viewe
         playback: the recording.
         target: the PNG to write.
         times: [s], within the recording.
-        with_viewer: True: by the Rerun viewer, or raise; False: by matplotlib; None: by the viewer if it can.
+        with_viewer: True: by the Rerun viewer; False: by matplotlib; None: by the viewer if it can draw here.
 
     Raises:
         SceneError: a time is outside the recording.
@@ -80,7 +80,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
     picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
-    top.set_facecolor(drawing.GROUND)
+    top.set_facecolor(drawing.BACKGROUND)
     cells = []
     for place, k in enumerate(frames):
         cells.append(top.add_subplot(above, min(_COLUMNS, len(frames)), place + 1, projection=None if found else "3d"))
@@ -96,8 +96,8 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     about = playback.about
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
-    told = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {count}"
-    top.suptitle(f"{told}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
+    title = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {count}"
+    top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
     for place, (group, (view, logarithm)) in enumerate((g, v) for g, v in _GROUPS.items() if g in groups):
         drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), view, groups[group], logarithm)
     return picture

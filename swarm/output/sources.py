@@ -1,4 +1,4 @@
-"""Files that are read: what is said of a path with no such file, and of what HDF5 and others say of a damaged one."""
+"""Errors of files that are read: missing, of another kind, or damaged."""
 
 import re
 import stat
@@ -6,18 +6,18 @@ from pathlib import Path
 
 from ..errors import SceneError
 
-# What h5py, NumPy, tomllib, msgspec and swarm itself raise when they read what nobody wrote. KeyError and IndexError
-# are LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
+# What h5py, NumPy, tomllib, msgspec and swarm itself raise for a damaged file. KeyError and IndexError are
+# LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
 # RuntimeError.
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError)
 
 
 class DamagedError(SceneError):
-    """A file that is not as it was written."""
+    """A damaged file."""
 
 
 def require_file(path: Path, expected: str) -> None:
-    """Raise a SceneError if there is no file, nothing in it, or something else."""
+    """Raise a SceneError unless the path is a regular file that is not empty."""
     try:
         found = path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -27,16 +27,16 @@ def require_file(path: Path, expected: str) -> None:
     if stat.S_ISDIR(found.st_mode):
         raise SceneError(f"{path} is a folder; expected {expected}")
     if not stat.S_ISREG(found.st_mode):
-        raise SceneError(f"{path} is no regular file; expected {expected}")
+        raise SceneError(f"{path} is not a regular file; expected {expected}")
     if found.st_size == 0:
         raise SceneError(f"{path} is empty; expected {expected}")
 
 
 def reason(error: BaseException | None) -> str:
-    """What an error says, in one line, without the function of HDF5 that it is from."""
-    told = str(error.args[0]) if isinstance(error, LookupError) and error.args else str(error)
-    told = next(iter(told.strip().splitlines()), "") or type(error).__name__
+    """The message of an error in one line, without the name of the HDF5 function."""
+    message = str(error.args[0]) if isinstance(error, LookupError) and error.args else str(error)
+    message = next(iter(message.strip().splitlines()), "") or type(error).__name__
     for pattern in (r".*error message = '([^']*)'.*", r"(?:Unable to|Can't|Link|Object)[^(]*\((.*)\)"):
-        found = re.fullmatch(pattern, told)
-        told = found.group(1) if found else told
-    return told
+        found = re.fullmatch(pattern, message)
+        message = found.group(1) if found else message
+    return message

@@ -1,4 +1,4 @@
-"""What of the particles a trajectory keeps, and how."""
+"""Which particles a trajectory keeps, and in which form."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ _COMPRESSIONS = ("none", "gzip", "lzf")
 
 @dataclass(frozen=True)
 class Storage:
-    """What a trajectory keeps of every frame; observables are always whole.
+    """What a trajectory keeps of every frame; observables are always kept in full.
 
     Args:
-        frames: "all" particles, "none", or k: every k-th one, from the first on.
-        precision: "float64", or "float32", which takes half the room.
+        frames: "all" particles, "none", or k: every k-th one, beginning with the first.
+        precision: "float64", or "float32", which takes half the space.
         compression: "none", "gzip" (level 1, bytes shuffled), or "lzf", which is twice as fast.
 
     Raises:
-        SceneError: an argument is none of these.
+        SceneError: an argument has another value.
 
     >>> len(range(10)[Storage(frames=4).kept()])
     3
@@ -41,7 +41,7 @@ class Storage:
         checks.one_of("compression", self.compression, _COMPRESSIONS)
 
     def kept(self) -> slice:
-        """Which particles it keeps."""
+        """The particles that it keeps."""
         if isinstance(self.frames, str):
             return slice(None) if self.frames == "all" else slice(0)
         return slice(None, None, self.frames)

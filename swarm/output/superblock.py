@@ -1,10 +1,10 @@
-"""The mark of HDF5 on a file that is open for writing, taken off again.
+"""Clearing the mark that HDF5 sets on a file that is open for writing.
 
-In the mode for one writer and many readers (SWMR) HDF5 writes in an order in which every prefix of its writes is a
-whole file: what a kill leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
-loses the half of it.) But it marks the file, so that readers which do not ask for
-that mode refuse it, even after the writer is dead. The mark is a byte of the superblock, whose layout is fixed: HDF5
-File Format Specification, II.A, superblock version 3.
+In the mode for one writer and many readers (SWMR) HDF5 orders its writes so that every prefix of them is a valid file:
+a file that a killed run leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
+loses half of it.) But HDF5 marks the file, and readers that do not ask for SWMR refuse a marked one, even after the
+writer has ended. The mark is a byte of the superblock, whose layout is fixed: HDF5 File Format Specification, II.A,
+superblock version 3.
 """
 
 import io
@@ -18,7 +18,7 @@ _MASK = 0xFFFFFFFF
 
 
 def unmark(file: BinaryIO) -> bytes:
-    """Clear the mark of an open file, which is not buffered; return its superblock."""
+    """Clear the mark of an open, unbuffered file; return its superblock."""
     block = _read(file)
     if len(block) == SIZE and block[_FLAGS] != 0:
         block[_FLAGS] = 0
@@ -26,11 +26,10 @@ def unmark(file: BinaryIO) -> bytes:
     return bytes(block)
 
 
-def mend(file: BinaryIO) -> None:
-    """Make what a kill left ready to be written on: no mark, and the end where the file ends.
+def make_appendable(file: BinaryIO) -> None:
+    """Prepare a file that a killed run left for writing: clear the mark, and set the end of file to the real one.
 
-    The superblock is the last that a flush writes. Its end may lie before blocks that are in use already, and HDF5
-    would give their place to others.
+    A flush writes the superblock last, so its end of file may lie before blocks in use, which HDF5 would overwrite.
     """
     block = _read(file)
     if len(block) == SIZE and block[_VERSION] == 3:
@@ -40,15 +39,15 @@ def mend(file: BinaryIO) -> None:
 
 
 class Unmarked(io.FileIO):
-    """A file as if it had no mark, to be read by h5py.
+    """A file for h5py to read as if it had no mark.
 
-    A marked one opens in the mode for readers only, and there HDF5 waits until the writer has mended what is damaged:
-    if there is no writer, for ever.
+    A marked file can only be opened in SWMR mode, where HDF5 waits for the writer to complete what is damaged: for
+    ever, if there is no writer.
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._place = 0
+        self._offset = 0
         block = bytearray(super().read(SIZE) or b"")
         if len(block) == SIZE and block[_VERSION] == 3 and _sum(block) == block[_CHECKSUM]:
             block[_FLAGS] = 0
@@ -56,18 +55,18 @@ class Unmarked(io.FileIO):
         self._block = bytes(block)
 
     def __del__(self) -> None:
-        # h5py closes no file that it did not open.
+        # h5py does not close a file that it did not open.
         self.close()
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Go to a place."""
-        self._place = super().seek(offset, whence)
-        return self._place
+        """Move to an offset."""
+        self._offset = super().seek(offset, whence)
+        return self._offset
 
     def readinto(self, buffer: Any) -> int:
-        """Read from there; the superblock is the one without a mark."""
-        at, view = self._place, memoryview(buffer)
-        # Where processes are forked, they share the place of a file.
+        """Read from the offset; the superblock is without its mark."""
+        at, view = self._offset, memoryview(buffer)
+        # Forked processes share the offset of a file.
         data = os.pread(self.fileno(), len(view), at) if hasattr(os, "pread") else super().read(len(view)) or b""
         part = self._block[at : at + len(data)]
         view[: len(data)] = part + data[len(part) :]
@@ -79,7 +78,7 @@ def _sum(block: bytearray) -> bytes:
 
 
 def put_back(file: BinaryIO, block: bytes) -> None:
-    """Let the superblock be what it was."""
+    """Restore the superblock."""
     file.seek(0)
     file.write(block)
 
@@ -102,17 +101,17 @@ def checksum(data: bytes) -> int:
     last = len(words) - 3
     for i in range(0, last, 3):
         a, b, c = a + words[i] & _MASK, b + words[i + 1] & _MASK, c + words[i + 2] & _MASK
-        a, c = (a - c & _MASK) ^ _turned(c, 4), c + b & _MASK
-        b, a = (b - a & _MASK) ^ _turned(a, 6), a + c & _MASK
-        c, b = (c - b & _MASK) ^ _turned(b, 8), b + a & _MASK
-        a, c = (a - c & _MASK) ^ _turned(c, 16), c + b & _MASK
-        b, a = (b - a & _MASK) ^ _turned(a, 19), a + c & _MASK
-        c, b = (c - b & _MASK) ^ _turned(b, 4), b + a & _MASK
+        a, c = (a - c & _MASK) ^ _rotated(c, 4), c + b & _MASK
+        b, a = (b - a & _MASK) ^ _rotated(a, 6), a + c & _MASK
+        c, b = (c - b & _MASK) ^ _rotated(b, 8), b + a & _MASK
+        a, c = (a - c & _MASK) ^ _rotated(c, 16), c + b & _MASK
+        b, a = (b - a & _MASK) ^ _rotated(a, 19), a + c & _MASK
+        c, b = (c - b & _MASK) ^ _rotated(b, 4), b + a & _MASK
     a, b, c = a + words[last] & _MASK, b + words[last + 1] & _MASK, c + words[last + 2] & _MASK
     for bits in (14, 11, 25, 16, 4, 14, 24):
-        a, b, c = b, (c ^ b) - _turned(b, bits) & _MASK, a
+        a, b, c = b, (c ^ b) - _rotated(b, bits) & _MASK, a
     return b
 
 
-def _turned(word: int, bits: int) -> int:
+def _rotated(word: int, bits: int) -> int:
     return (word << bits | word >> 32 - bits) & _MASK

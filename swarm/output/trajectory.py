@@ -1,4 +1,4 @@
-"""Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read as they are asked for.
+"""Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read on demand.
 
 particles/all/{position,velocity}/{step,time,value}, value (frames, N, 3); particles/all/{mass,id} (N,);
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
@@ -25,13 +25,13 @@ from . import layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
-# Of all who open a file in one process by the same driver HDF5 wants the same flags of locking. That for logs, which
-# reads as the usual one does and logs nothing unless it is asked to, is hardly another's.
+# HDF5 wants the same locking flags from all who open a file in one process with the same driver. The driver for logs
+# reads like the usual one, logs nothing by default, and is unlikely to be used by other code.
 _DRIVER = "swarm"
 
 
 class Trajectory:
-    """A trajectory on disk, read as it is asked for.
+    """A trajectory on disk, read on demand.
 
     Attributes:
         times: (frames,) [s].
@@ -39,8 +39,8 @@ class Trajectory:
         scene, method: as they were run.
         scene_text: the scene file's text, or None.
 
-    A file that is being written can be read, and so can what a kill left of one: the frames that are whole when it is
-    opened. What cannot be right is a SceneError that says what of the file is damaged.
+    A file that is being written, or that a killed run left, can be read: the frames that are complete when it is
+    opened. Inconsistent content raises a SceneError that names the damaged part.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -69,7 +69,7 @@ class Trajectory:
 
     @contextlib.contextmanager
     def _reading(self, what: str) -> Iterator[Any]:
-        """The open file, for reading `what`: whatever goes wrong with that is a SceneError, for the file is damaged."""
+        """The open file, for reading `what`; an error in that means that the file is damaged, and is a SceneError."""
         if not self._file:
             raise SceneError(f"{self.path} is closed; open it again with swarm.load")
         try:
@@ -80,7 +80,7 @@ class Trajectory:
             raise DamagedError(f"{self.path} is damaged: {what}: {reason(error)}") from error
 
     def __len__(self) -> int:
-        """Number of frames that are whole: their times are written last."""
+        """Number of complete frames."""
         with self._reading("its frames"):
             return self._frames
 
@@ -95,7 +95,7 @@ class Trajectory:
 
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
-        """Everything that was observed, one entry a frame."""
+        """All observables, one entry a frame."""
         seen = {"time": self.times}
         with self._reading("its observables") as file:
             group = file.get("observables", {})
@@ -105,7 +105,7 @@ class Trajectory:
         return seen
 
     def observed(self) -> dict[str, NDArray[Any]]:
-        """The observables, all of them that every run has."""
+        """The observables, checked to include those of every run."""
         seen, scene = self.observables, self.scene
         with self._reading("its observables"):
             layout.require_observables(seen, len(scene.surfaces))
@@ -117,7 +117,7 @@ class Trajectory:
             raise SceneError(f"{self.path} holds no frame: its run ended before the first one was written")
 
     def require_index(self) -> None:
-        """Raise a SceneError if HDF5 could not find all chunks: a writer would wait for a damaged index for ever."""
+        """Raise a SceneError if an index of chunks is damaged: a writer would never return from it."""
         with self._reading("its index") as file:
             layout.require_index(file)
 
@@ -167,12 +167,12 @@ class Trajectory:
 
     @property
     def descriptions(self) -> dict[str, str]:
-        """What makes a run another one, as texts: scene, method and storage."""
+        """The texts that identify a run: scene, method and storage."""
         return {name: self._text(name) for name in ("scene", "method", "storage")}
 
     @property
     def start(self) -> str:
-        """A digest of the particles at the start: "" in a file of a version that stored none."""
+        """A digest of the particles at the start; "" if the file has none."""
         with self._reading("its start") as file:
             stored = "parameters/start" in file
         return self._text("start") if stored else ""
@@ -184,7 +184,7 @@ class Trajectory:
             table = _toml(self._text("scene"))
             surfaces = table["surface"]
             own = any(surface["kind"] == "own" for surface in surfaces)
-        # A surface of one's own is no damage: that the file does not hold it is said as it is.
+        # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
             return tables.scene_of(surfaces, table.get("gravity"))
 
@@ -207,7 +207,7 @@ class Trajectory:
 
 
 def _opened(path: Path) -> h5py.File:
-    # Without a chunk cache only those rows of a chunk are read that are asked for: of one particle's path a thousandth.
+    # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
     # Without locking, a file that is still being written can be read.
     options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
     try:
@@ -216,7 +216,7 @@ def _opened(path: Path) -> h5py.File:
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
-            # Marked by its writer in this very moment, or in the one in which it was killed.
+            # Its writer is at this moment between marking it and clearing the mark, or was killed there.
             return h5py.File(superblock.Unmarked(path), "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
@@ -234,7 +234,7 @@ h5py.register_driver(_DRIVER, _own_driver)
 
 
 def _finite(values: Any) -> NDArray[Any]:
-    """What was read, if it can have been written: no run writes an infinity or a NaN."""
+    """The values, if they are finite: no run writes an infinity or a NaN."""
     wrong = ~np.isfinite(values)
     if wrong.any():
         raise ValueError(f"expected finite numbers, got {values[wrong][0]:g} at frame {int(np.argwhere(wrong)[0, 0])}")

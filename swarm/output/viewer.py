@@ -1,4 +1,4 @@
-"""The Rerun viewer: shown while a run goes on, or without a screen, for pictures."""
+"""The Rerun viewer: shown during a run, or without a screen, for pictures."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ from ..errors import RunError, SceneError
 _PORT = 9876
 _PATIENCE = 30.0  # [s]
 _PAUSE = 0.1
-# What the viewer takes to draw a frame once it is there, with a software driver, and how often it is asked [s].
+# Time that the viewer takes to draw a frame with a software driver [s].
 _DRAWING = 1.0
 _HERE = "127.0.0.1"
 
@@ -50,14 +50,14 @@ def _listens(port: int) -> bool:
 
 
 class _Viewer:
-    """A viewer's process; only this machine reaches it: by default it would be all the network."""
+    """The process of a viewer, which listens to this machine only; by default it would listen to the network."""
 
     def __init__(self, *arguments: str) -> None:
-        # A file, not a pipe: nobody reads it while the viewer writes, and its child would keep a pipe open.
-        self._told = tempfile.TemporaryFile()  # noqa: SIM115 (closed by end)
+        # A file, not a pipe: a pipe would fill up unread, and the child of the viewer would keep it open.
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115 (closed by end)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rerun", "--bind", _HERE, *arguments],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._messages, start_new_session=True,
         )  # fmt: skip
 
     def wait_for(self, port: int) -> None:
@@ -70,16 +70,16 @@ class _Viewer:
             time.sleep(_PAUSE)
 
     def require_alive(self) -> None:
-        """Raise a RunError with its last words if it has ended."""
+        """Raise a RunError with its last message if it has ended."""
         if self.process.poll() is None:
             return
-        self._told.seek(0)
-        told = self._told.read().decode(errors="replace").splitlines()
-        reasons = [line for line in told if "adapter" in line or "panicked" in line or "rror" in line]
-        raise RunError(f"the Rerun viewer ended: {(reasons or told or ['it said nothing'])[-1].strip()}")
+        self._messages.seek(0)
+        lines = self._messages.read().decode(errors="replace").splitlines()
+        reasons = [line for line in lines if "adapter" in line or "panicked" in line or "rror" in line]
+        raise RunError(f"the Rerun viewer ended: {(reasons or lines or ['no message'])[-1].strip()}")
 
     def end(self) -> None:
-        """End it: the process that was started, and the viewer that this one started."""
+        """Kill the process, and the viewer that it has started."""
         import psutil  # which rerun-sdk brings
 
         with contextlib.suppress(psutil.NoSuchProcess):
@@ -88,11 +88,11 @@ class _Viewer:
                     child.kill()
         self.process.kill()
         self.process.wait()
-        self._told.close()
+        self._messages.close()
 
 
 def no_driver() -> str | None:
-    """Why the viewer cannot draw here, or None: it needs a Vulkan driver, of software is enough."""
+    """Why the viewer cannot draw here, or None: it needs a Vulkan driver, which may be a software driver."""
     if sys.platform != "linux":
         return None
     named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
@@ -128,8 +128,8 @@ def headless(recording: Path) -> Iterator[Any]:
         yield client
     except RunError:
         raise
-    except Exception as error:  # of gRPC, and without a type to tell it by
-        # If it has died, its last words say more.
+    except Exception as error:  # gRPC's errors have no type of their own
+        # If it has ended, its last message says more.
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.process.wait(_DRAWING)
         process.require_alive()

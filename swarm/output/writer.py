@@ -1,7 +1,7 @@
-"""The trajectory under way: frames appended to the file of trajectory.py so that no kill can spoil it.
+"""Writing trajectories: frames are appended so that a kill at any moment leaves a readable file.
 
-The order of what is written makes that so: HDF5's mode for one writer and many readers, and the times last. As many
-frames are whole as there are times.
+The order of the writes ensures that: HDF5's mode for one writer and many readers (SWMR), and the times last. There are
+as many complete frames as times.
 """
 
 import os
@@ -27,10 +27,10 @@ from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
 _CHUNK = (10, 1000)
-# The chunk cache of positions holds the chunks that one frame touches, up to this many bytes; that of an observable its
-# last chunks. One of HDF5's own size, 1 MB, would fill for 100 000 frames, which looks as if memory grew without end.
+# The chunk cache of positions holds the chunks of one frame, up to this many bytes; that of an observable its last
+# chunks. HDF5's default, 1 MB, would fill during 100 000 frames, which looks like a memory leak.
 _LARGEST_CACHE, _SMALL_CACHE = 1 << 28, 1 << 16
-# The oldest format with that mode.
+# The oldest format with SWMR.
 _FORMAT = ("v110", "v110")
 _PACKED: dict[str, dict[str, Any]] = {
     "none": {},
@@ -45,11 +45,11 @@ WriteFrames = Callable[[list[Written]], None]
 
 
 class TrajectoryWriter:
-    """A context that creates the file, or goes on with it, and gives the function that writes frames.
+    """A context that creates the file, or reopens it, and gives the function that writes frames.
 
-    Frame k is row k, so a run that goes on from a checkpoint leaves no gap and no duplicate. Several frames at once
-    cost little more than one: what takes time is the fifteen datasets and the flush. A file has its name when its first
-    frame is whole: until then what is there is left alone, with its checkpoint.
+    Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once cost little more than one:
+    the fifteen datasets and the flush take the time. The file gets its name when its first frame is complete; until
+    then an existing file of that name, and its checkpoint, stay.
     """
 
     def __init__(
@@ -85,8 +85,8 @@ class TrajectoryWriter:
     def _open_file(self, mode: str) -> None:
         self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by __exit__
         if mode == "r+":
-            superblock.mend(self._handle)
-        # HDF5's locks would shut readers out.
+            superblock.make_appendable(self._handle)
+        # HDF5's locks would block readers.
         self._file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
         self._descriptor = _descriptor_of(self._file)
 
@@ -102,7 +102,7 @@ class TrajectoryWriter:
         finally:
             self._handle.close()
         if self._part != self._path:
-            # Without a frame it is no trajectory.
+            # Without a frame it is not a trajectory.
             self._part.unlink(missing_ok=True)
 
     def sync(self) -> None:
@@ -138,7 +138,7 @@ class TrajectoryWriter:
         everything["mass"] = self._mass
         everything["id"] = np.arange(self._count)[self._storage.kept()]
         options = _PACKED[self._storage.compression]
-        # A compressed chunk is written once: one that grows would move, and a kill would find it nowhere.
+        # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
         deep = 1 if options else _CHUNK[0]
         options = {**options, "rdcc_nbytes": self._cache()}
         for name in PARTS:
@@ -165,7 +165,7 @@ class TrajectoryWriter:
         return min(_LARGEST_CACHE, chunks * _CHUNK[0] * _CHUNK[1] * 24)
 
     def _begin(self) -> None:
-        """From here on nothing is created, which is what that mode of HDF5 asks for."""
+        """Switch to SWMR, after which nothing can be created."""
         self._file.swmr_mode = True
         self._flush()
 
@@ -212,7 +212,7 @@ class TrajectoryWriter:
         self._size = os.fstat(self._handle.fileno()).st_size
 
     def _take_name(self) -> None:
-        """Be the trajectory, in place of what was there; its checkpoint is none of this run."""
+        """Take the name of the trajectory from an older file, and remove the checkpoint of that one."""
         try:
             os.replace(self._part, self._path)
             self._part = self._path
@@ -226,7 +226,7 @@ class TrajectoryWriter:
         paths.checkpoint_of(self._path).unlink(missing_ok=True)
 
     def _require_file(self) -> None:
-        """Raise a FileError if somebody took the file away, or a part of it: HDF5 would write on into the void."""
+        """Raise a FileError if the file was removed or truncated, which HDF5 would not notice."""
         mine = os.fstat(self._handle.fileno())
         try:
             there = os.stat(self._part)
@@ -236,36 +236,36 @@ class TrajectoryWriter:
             raise FileError(f"the trajectory {self._path} was deleted or replaced while the run was writing it")
         if mine.st_size < self._size:
             raise FileError(
-                f"the trajectory {self._path} was cut while the run was writing it, from {self._size} to "
+                f"the trajectory {self._path} was truncated while the run was writing it, from {self._size} to "
                 f"{mine.st_size} bytes"
             )
 
     def _abandon(self) -> None:
-        """Let nothing more reach the file: what HDF5 still holds of a frame that failed would spoil those before it."""
+        """Let no further write reach the file: what HDF5 holds of a failed frame would damage those before it."""
         try:
-            # HDF5 is not asked: of a file that it could not close it takes the process down with it.
+            # HDF5 is not asked: it crashes the process if it could not close the file.
             if not os.path.samestat(os.fstat(self._descriptor), os.fstat(self._handle.fileno())):
                 return  # abandoned already
         except (OSError, ValueError):
             return  # closed
-        void = os.open(os.devnull, os.O_RDWR)
-        os.dup2(void, self._descriptor)
-        os.close(void)
+        null = os.open(os.devnull, os.O_RDWR)
+        os.dup2(null, self._descriptor)
+        os.close(null)
 
 
 def _descriptor_of(file: h5py.File) -> int:
-    """The system's number of an open file."""
+    """The file descriptor of an open file."""
     return int(file.id.get_vfd_handle())
 
 
 def _reason(error: Exception) -> str:
-    """What the system said, without HDF5's addresses."""
+    """The message of the system, without HDF5's addresses."""
     found = re.search(r"error message = '([^']*)'", str(error))
     return found.group(1) if found else str(error)
 
 
 def _put(dataset: Any, first: int, values: Any) -> None:
-    """Entries from row `first` on. h5py's indexing takes four times as long, and a frame writes to some fifteen."""
+    """Write entries from row `first` on. h5py's indexing takes four times as long, for fifteen datasets a frame."""
     handle = dataset.id
     count, *shape = handle.shape
     entries = np.ascontiguousarray(values, dtype=dataset.dtype)
@@ -277,7 +277,7 @@ def _put(dataset: Any, first: int, values: Any) -> None:
 
 
 def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, str]:
-    """What makes a run another one, as texts."""
+    """The texts that identify a run."""
     return {
         "scene": tomli_w.dumps(tables.scene_table(scene)),
         "method": tomli_w.dumps(tables.table_of(method)),

@@ -3,6 +3,7 @@
 import functools
 import math
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
@@ -17,31 +18,33 @@ from ..methods.base import Method
 from ..particles import Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
+from .tiers import Tier
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
 # A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
 _OUTSIDE = 1e-9
-# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it is free
-# to take an interrupt.
+# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it stays
+# free to handle an interrupt.
 _SHORT_FRAME = 0.05
-# Frames of less work than this [s] are for the caller's thread alone: to wake another takes some 0.1 ms.
+# The caller's thread alone does frames of less work than this [s]: waking another takes some 0.1 ms.
 _LITTLE_WORK = 2e-4
-# A frame that takes longer to write than this part of the work in it.
+# A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
 
 
 class Run:
-    """The state of a run and the threads that advance it."""
+    """The state of a run and the threads that advance it; the arrays of the particles become a part of the state."""
 
     def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None
-    ) -> None:
+        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        compile: str = "always",
+    ) -> None:  # fmt: skip
         n = len(particles)
         self.state = State(
-            particles.position.copy(),
-            particles.velocity.copy(),
-            particles.mass.copy(),
+            particles.position,
+            particles.velocity,
+            particles.mass,
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
@@ -56,7 +59,7 @@ class Run:
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         self._method, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
-        observables.start_energies(self._law, self._chain, self._gravity, scene.finite_size(), self.state)
+        self._escaping = self._chain, self._gravity, self._far, self._faces, self.state
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._draws = math.ceil(n / self._size)
@@ -64,12 +67,16 @@ class Run:
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._halt = np.full(1, blocks.NEVER)
         self._done = np.zeros(n, np.bool_)
-        self._halted = lanes.nobody(len(self._owners))
+        self._halted = lanes.none_halted(len(self._owners))
         self._cut_short = False
         self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._pace = math.inf  # work of the last frame [s], over its span
+        self._tier = Tier(compile, (self._method, self._law, self._chain), n)
+        starting = self._law, self._chain, self._gravity, scene.finite_size(), self.state
+        self._tier.call(observables.start_energies, starting)
+        self._choose_tier()
 
     def __enter__(self) -> "Run":
         return self
@@ -89,26 +96,30 @@ class Run:
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
 
-        If not, `halt` was called, or `latest` has come [s of time.monotonic], and the next call goes on with the frame,
-        bit by bit as if it had not been cut short. `writing` a frame takes seconds.
+        If not, `halt` was called, or `latest` has come [s of time.monotonic], or the time of plain Python is over, and
+        the next call goes on with the frame, bit by bit as if it had not been cut short. `writing` a frame takes
+        seconds.
         """
         if not self._cut_short:
             self._done.fill(False)
+        if self._tier.is_plain and self._tier.left <= 0.0:
+            self._choose_tier()
         status, particle = self._all_shares(span, writing, latest)
         if status == Status.HARD_CONTACT:
             self._hard = blocks.Hard(blocks.MOST_HITS)
+            self._choose_tier()
             status, particle = self._all_shares(span, writing, latest)
         self._cut_short = status == Status.INTERRUPTED
         self._halt[0] = blocks.NEVER
         if status not in (Status.DONE, Status.INTERRUPTED):
-            told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
+            sentence = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
             if status == Status.TOO_FAST:
-                told += f", {self._too_fast()}"
+                sentence += f", {self._too_fast()}"
             multipliers = self.state.multipliers
             if status == Status.UNCONVERGED and multipliers is not None:
                 left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-                told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
-            raise RunError(told)
+                sentence += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
+            raise RunError(sentence)
         return not self._cut_short
 
     def share_done(self, span: float) -> float:
@@ -130,6 +141,9 @@ class Run:
         # A thread that writes for as long as one computes has a processor of its own: three that share two of them wait
         # for one another.
         threads = max(1, self._threads - (writing > _MUCH_WRITING * work))
+        if self._tier.is_plain:
+            # Python runs one thread at a time.
+            threads, latest = 1, min(latest, time.monotonic() + self._tier.left)
         others = threads - helps if work > _LITTLE_WORK else 0
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
@@ -137,13 +151,39 @@ class Run:
         if latest < math.inf and wait(shares, max(0.0, latest - time.monotonic())).not_done:
             self.halt()
         ends += [share.result() for share in shares]
+        self._tier.left -= time.perf_counter() - began
         status, particle, _ = max(ends, key=lambda end: end[:2])
         if status == Status.INTERRUPTED:
             self._keep([left for *_, left in ends if left is not None])
         elif span > 0.0:
-            self._halted = lanes.nobody(len(self._owners))
+            self._halted = lanes.none_halted(len(self._owners))
             self._pace = (time.perf_counter() - began) * (others + helps) / span
         return status, particle
+
+    def _lanes(self) -> tuple[lanes.Draws, lanes.Lanes]:
+        """What a thread alone needs: what it has drawn, and its lanes."""
+        return lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64)), lanes.empty(len(self._owners))
+
+    def _advancing(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> tuple[Any, ...]:
+        """Arguments of `advance_block`."""
+        share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
+        return self._method, self._chain, self._gravity, self._hard, share, mine
+
+    def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
+        """Arguments of `observe`."""
+        return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
+
+    def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        """Every kernel that frames call, with arguments of the types that it is called with from now on."""
+        draws, mine = self._lanes()
+        yield blocks.advance_block, self._advancing(0.0, draws, mine)
+        yield observables.observe, self._observing(draws.mine)
+        if self._far < math.inf:
+            yield observables.count_escaped, self._escaping
+
+    def _choose_tier(self) -> None:
+        if self._tier.choose(self._calls()):
+            self._pace = math.inf
 
     def _keep(self, left_behind: list[lanes.Halted]) -> None:
         """What a halt left in the lanes, and what an earlier one left that no lane has picked up since."""
@@ -157,19 +197,10 @@ class Run:
 
     def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
         """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
-        mine = lanes.empty(len(self._owners))
-        draws = lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64))
-        # Without the compiler too, a division by zero is an infinity that a select throws away.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            status, particle, drawn = blocks.advance_block(
-                self._method, self._chain, self._gravity, self._hard, self.state, self._done, self._halted,
-                span, draws, self._halt, mine,
-            )  # fmt: skip
-            if status == Status.DONE:
-                drawn_here = draws.mine[:drawn]
-                observables.observe(
-                    self._law, self._chain, self._gravity, self.state, drawn_here, self._size, self._partial
-                )
+        draws, mine = self._lanes()
+        status, particle, drawn = self._tier.call(blocks.advance_block, self._advancing(span, draws, mine))
+        if status == Status.DONE:
+            self._tier.call(observables.observe, self._observing(draws.mine[:drawn]))
         if status != Status.INTERRUPTED:
             return status, particle, None
         live, particle = particle, 0
@@ -194,8 +225,7 @@ class Run:
         seen = observables.summary(self._partial, self.state, self._owners)
         escaped = 0
         if self._far < math.inf:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                escaped = int(observables.count_escaped(self._chain, self._gravity, self._far, self._faces, self.state))
+            escaped = int(self._tier.call(observables.count_escaped, self._escaping))
         return {**seen, "escaped": escaped}
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:

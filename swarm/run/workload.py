@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..kernel.gravity import Gravity
+from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import chain as walls
 from ..surfaces import flights
-from ..surfaces.chain import Chain
+from ..surfaces import fold as walls
+from ..surfaces.fold import Chain
 
 _LOG = logging.getLogger("swarm")
 # A particle takes some 10 ns an impact: minutes a frame, in which nothing is seen; and days of a processor.
@@ -93,7 +94,7 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
             length, ahead, wall = _chord(chain, point, way)
             if not length < math.inf:
                 return Flights(math.inf, -1)
-            normal = np.array(walls.unit_normal(chain, float(wall), *(point + ahead * way)))
+            normal = np.array(walls.unit_normal(chain, float(wall), vec(point + ahead * way)))
             point = point + (ahead - length * random.random()) * way
             speed = math.sqrt(velocity @ velocity + pull * length)
             if k >= _CHORDS - _COUNTED and length > 0.0 and speed > 0.0:
@@ -122,7 +123,7 @@ def _hit(
     total = 0.0
     gravity = np.zeros(3) if pull is None else np.array(pull)
     for _part in range(_PARTS):
-        time, wall = flights.first_hit(chain, pull, *position, *velocity)
+        time, wall = flights.first_hit(chain, pull, vec(position), vec(velocity))
         total += float(time)
         if wall >= 0.0 or not time < math.inf:
             return total, int(wall)

@@ -1,8 +1,13 @@
-"""The surfaces by their kind in a scene file."""
+"""The surfaces by their kind in a scene file.
+
+To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a NamedTuple of its numbers,
+for kernels. For the type of the numbers register, with contract.py, which describes all functions: `phi`, `gradient`
+and one of `first_hit`, `course` and `bend`; for methods with steps in contact also `hessian` and `farthest_push`. All
+others have a default. Then name the class in ALL_SURFACES below. examples/own_surface.py is a complete surface; if a
+method needs a function that is missing, an error says so before the run.
+"""
 
 # These only register their definitions.
-from . import smooth as _smooth  # noqa: F401
-from .base import Surface
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes import rotated as _rotated  # noqa: F401
@@ -17,6 +22,7 @@ from .shapes.quadric import Quadric
 from .shapes.slab import Slab
 from .shapes.sphere import Sphere
 from .shapes.torus import Torus
+from .surface import Surface
 
 __all__ = [
     "ALL_SURFACES",

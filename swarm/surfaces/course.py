@@ -5,10 +5,12 @@ first root is found by safe steps: none is skipped, however close to a double on
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..kernel.jit import inlined, select
+from ..kernel.vector import cross, dot, square
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
 SAFE_STEPS = 5
@@ -21,6 +23,20 @@ _CLOSE = 1e-16
 _FAR = 32.0
 # The length of a last step that found no hit: no time is changed by it.
 _NO_HIT = float(np.finfo(np.float64).tiny)
+
+
+class Quartic(NamedTuple):
+    """The level of a fall, c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4, and the time in which it crosses the surface's size.
+
+    The window is infinite where the level is a parabola; from afar both are as `level_and_window` says.
+    """
+
+    c: float
+    b: float
+    a2: float
+    a3: float
+    a4: float
+    window: float
 
 
 @inlined
@@ -59,14 +75,11 @@ def _outer_root(c, b, a, discriminant):
 
 
 @inlined
-def ball_rise_time(side, radius2, dx, dy, dz, vx, vy, vz):
+def ball_rise_time(side, radius2, d, v):
     """`rise_time` for |d + v t|^2 - R^2, from however far."""
-    c = dx * dx + dy * dy + dz * dz - radius2
-    b = dx * vx + dy * vy + dz * vz
-    a = vx * vx + vy * vy + vz * vz
+    c, b, a = square(d) - radius2, dot(d, v), square(v)
     # b^2 - a c = R^2 |v|^2 - |d x v|^2, Lagrange's identity; near the wall the first form is the better one.
-    wx, wy, wz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
-    from_afar = radius2 * a - (wx * wx + wy * wy + wz * wz)
+    from_afar = radius2 * a - square(cross(d, v))
     return rise_time_by(side * c, side * b, side * a, select(c > radius2, from_afar, b * b - a * c))
 
 
@@ -83,11 +96,11 @@ def level_and_window(c, own, size, speed2, pull2):
 
 
 @inlined
-def safe_rise_time(c, b, a2, a3, a4, window):
-    """A time up to |window| during which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 surely stays <= 0."""
-    window = abs(window)
-    time = rise_time(c, b, a2 + _rise_by(_steepest(a3, a4, window), window))
-    return select(c > 0.0, 0.0, select(time < window, time, window))
+def safe_rise_time(level):
+    """A time up to |window| during which a level surely stays <= 0."""
+    window = abs(level.window)
+    time = rise_time(level.c, level.b, level.a2 + _rise_by(_steepest(level.a3, level.a4, window), window))
+    return select(level.c > 0.0, 0.0, select(time < window, time, window))
 
 
 @inlined
@@ -104,16 +117,16 @@ def _rise_by(slope, window):
 
 
 @inlined
-def leave(c, b, a2, a3, a4, window):
+def leave(level):
     """The first safe step of a flight that does not rise at once: (t, what `safe_step` takes as the last length).
 
     Where c <= 0 and b <= 0 the level is below t (2 b + a2 t + s t^2), one power of t nearer to it than the parabola of
     a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under a
     ceiling needs: the parabola of the whole window rises at once there.
     """
-    window = abs(window)
-    time = rise_time(2.0 * b, 0.5 * a2, _steepest(a3, a4, window))
-    time = select(b <= 0.0, select(time < window, time, window), 0.0)
+    window = abs(level.window)
+    time = rise_time(2.0 * level.b, 0.5 * level.a2, _steepest(level.a3, level.a4, window))
+    time = select(level.b <= 0.0, select(time < window, time, window), 0.0)
     return time, select(time < math.inf, math.inf, 0.0)
 
 
@@ -125,8 +138,8 @@ def close(window):
 
 
 @inlined
-def safe_step(may_be_far, c, b, a2, a3, a4, window, nearly, t, last):
-    """One step towards the first rise of the level c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 through 0: (t, its length).
+def safe_step(may_be_far, level, nearly, t, last):
+    """One step towards the first rise of a level through 0: (t, its length).
 
     It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
     double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
@@ -134,15 +147,16 @@ def safe_step(may_be_far, c, b, a2, a3, a4, window, nearly, t, last):
     next to it with a negative window, that is from afar: no hit, but a place to begin again from. `nearly` is what
     `close` says of the window.
     """
-    there = 0.0
+    there, window = 0.0, level.window
     if may_be_far:
         there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
     reach = select(2.0 * last < window, 2.0 * last, window)
     # The Taylor coefficients at t, by Horner's scheme of what Horner's scheme leaves
-    a3t = a3 + t * a4
-    a2t = a2 + t * a3t
-    twice_bt = 2.0 * b + t * a2t
-    ct = c + t * twice_bt
+    a4 = level.a4
+    a3t = level.a3 + t * a4
+    a2t = level.a2 + t * a3t
+    twice_bt = 2.0 * level.b + t * a2t
+    ct = level.c + t * twice_bt
     a3t = a3t + t * a4
     a2t = a2t + t * a3t
     bt = 0.5 * (twice_bt + t * a2t)
@@ -164,11 +178,11 @@ def arrived(last):
 
 
 @inlined
-def first_rise(may_be_far, c, b, a2, a3, a4, window):
-    """`first_hit` for that level, by safe steps."""
-    t, last = leave(c, b, a2, a3, a4, window)
+def first_rise(may_be_far, level):
+    """`first_hit` for a level, by safe steps."""
+    t, last = leave(level)
     for _step in range(SAFE_STEPS + MORE_STEPS):
-        t, last = safe_step(may_be_far, c, b, a2, a3, a4, window, close(window), t, last)
+        t, last = safe_step(may_be_far, level, close(level.window), t, last)
         if arrived(last):
             break
     return t, arrived(last)

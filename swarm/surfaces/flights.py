@@ -1,86 +1,106 @@
-"""When a free flight meets the walls of a scene: the hits and free times of one surface, folded over the chain."""
+"""When a free flight meets the walls of a scene: the hits and free times of one wall, folded over the chain."""
 
 import math
+from typing import NamedTuple
 
-from ..kernel.gravity import Gravity, Nothing
-from ..kernel.jit import by_type, select
-from . import base
-from .chain import Chain, outside
-from .course import arrived, close, leave, safe_step
+from ..kernel.gravity import Gravity, Nothing, as_vector
+from ..kernel.jit import by_type, inlined, select
+from . import contract
+from .course import Quartic, arrived, close, leave, safe_step
+from .fold import Chain, outside
+
+
+class Hit(NamedTuple):
+    """Time of a hit and the wall's number.
+
+    The number is -1 where the flight is surely free until then, and more is not known yet.
+    """
+
+    time: float
+    wall: float
+
+
+# No hit, ever.
+NEVER = Hit(math.inf, 0.0)
 
 
 def of_flights(falls):
     """What the free flights of a method ask of every wall, with gravity or without."""
-    return (base.falling_hit if falls else base.first_hit,)
+    return (contract.falling_hit if falls else contract.first_hit,)
 
 
 def of_steps(falls):
     """The same for whole steps, some of which are jumped over."""
     # The loops of a fall are compiled for every method.
-    free = (base.safe_time, base.falling_hit) if falls else (base.first_hit,)
-    return *free, base.inner, base.level_of
+    free = (contract.safe_time, contract.falling_hit) if falls else (contract.first_hit,)
+    return *free, contract.inner, contract.level_of
 
 
 @by_type
-def hit(gravity, surface, x, y, z, vx, vy, vz):
-    """When the free flight leaves the admissible side of one surface: (time, whether it does then)."""
+def hit(gravity, surface, r, v):
+    """When the free flight leaves the admissible side of one wall: (time, whether it does then)."""
     raise NotImplementedError
 
 
 @hit.register(Nothing)
-def _(gravity, surface, x, y, z, vx, vy, vz):
-    return base.first_hit(surface, x, y, z, vx, vy, vz)
+def _(gravity, surface, r, v):
+    return contract.first_hit(surface, r, v)
 
 
 @hit.register(Gravity)
-def _(gravity, surface, x, y, z, vx, vy, vz):
-    return base.falling_hit(surface, x, y, z, vx, vy, vz, gravity.x, gravity.y, gravity.z)
+def _(gravity, surface, r, v):
+    return contract.falling_hit(surface, r, v, as_vector(gravity))
 
 
 @by_type
-def first_hit(chain, gravity, x, y, z, vx, vy, vz):
-    """Time of the first hit of a free flight, and the index of the surface.
-
-    The index is -1 where the flight is surely free until then, and more is not known yet.
-    """
+def first_hit(chain, gravity, r, v):
+    """The first `Hit` of a free flight."""
     raise NotImplementedError
 
 
 @first_hit.register(Chain)
-def _(chain, gravity, x, y, z, vx, vy, vz):
-    time, found = hit(gravity, chain.first, x, y, z, vx, vy, vz)
-    later, index = first_hit(chain.rest, gravity, x, y, z, vx, vy, vz)
-    sooner = later < time
-    here = select(found, 0.0, -1.0)
-    return select(sooner, later, time), select(sooner, select(index < 0.0, -1.0, index + 1.0), here)
+def _(chain, gravity, r, v):
+    time, found = hit(gravity, chain.first, r, v)
+    return _sooner(time, found, first_hit(chain.rest, gravity, r, v))
 
 
 @first_hit.register(Nothing)
-def _(chain, gravity, x, y, z, vx, vy, vz):
-    return math.inf, 0.0
+def _(chain, gravity, r, v):
+    return NEVER
 
+
+@inlined
+def _sooner(time, found, later):
+    """The sooner one of the hit of the first wall and that of the rest."""
+    sooner = later.time < time
+    wall = select(later.wall < 0.0, -1.0, later.wall + 1.0)
+    return Hit(select(sooner, later.time, time), select(sooner, wall, select(found, 0.0, -1.0)))
+
+
+# --- Falls in lanes --------------------------------------------------------------------------------------
 
 # A falling flight in lanes: what the safe steps of each wall know, in this many rows a wall.
 COURSE = 9
+_WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 
 
 @by_type
-def begin_fall(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
+def begin_fall(chain, course, row, lane, r, v, pull):
     """The course of a falling flight for every wall into course[row:, lane]."""
 
 
 @begin_fall.register(Chain)
-def _(chain, course, row, lane, x, y, z, vx, vy, vz, gx, gy, gz):
-    if base.is_quartic(chain.first):
-        c, b, a2, a3, a4, window = base.course(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
-        course[row, lane], course[row + 1, lane], course[row + 2, lane] = c, b, a2
-        course[row + 3, lane], course[row + 4, lane], course[row + 5, lane] = a3, a4, window
-        course[row + 6, lane], course[row + 7, lane] = leave(c, b, a2, a3, a4, window)
-        course[row + 8, lane] = close(window)
+def _(chain, course, row, lane, r, v, pull):
+    if contract.is_quartic(chain.first):
+        level = contract.course(chain.first, r, v, pull)
+        course[row, lane], course[row + 1, lane], course[row + 2, lane] = level.c, level.b, level.a2
+        course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane] = level.a3, level.a4, level.window
+        course[row + _TIME, lane], course[row + _LAST, lane] = leave(level)
+        course[row + _CLOSE, lane] = close(level.window)
     else:
-        time, found = base.falling_hit(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
-        course[row + 6, lane], course[row + 7, lane] = time, select(found, 0.0, math.inf)
-    begin_fall(chain.rest, course, row + COURSE, lane, x, y, z, vx, vy, vz, gx, gy, gz)
+        time, found = contract.falling_hit(chain.first, r, v, pull)
+        course[row + _TIME, lane], course[row + _LAST, lane] = time, select(found, 0.0, math.inf)
+    begin_fall(chain.rest, course, row + COURSE, lane, r, v, pull)
 
 
 @by_type
@@ -90,11 +110,14 @@ def step_fall(chain, course, row, lane):
 
 @step_fall.register(Chain)
 def _(chain, course, row, lane):
-    if base.is_quartic(chain.first):
-        course[row + 6, lane], course[row + 7, lane] = safe_step(
-            base.may_be_far(chain.first), course[row, lane], course[row + 1, lane], course[row + 2, lane],
-            course[row + 3, lane], course[row + 4, lane], course[row + 5, lane], course[row + 8, lane],
-            course[row + 6, lane], course[row + 7, lane],
+    if contract.is_quartic(chain.first):
+        level = Quartic(
+            course[row, lane], course[row + 1, lane], course[row + 2, lane],
+            course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane],
+        )  # fmt: skip
+        course[row + _TIME, lane], course[row + _LAST, lane] = safe_step(
+            contract.may_be_far(chain.first), level, course[row + _CLOSE, lane],
+            course[row + _TIME, lane], course[row + _LAST, lane],
         )  # fmt: skip
     step_fall(chain.rest, course, row + COURSE, lane)
 
@@ -107,115 +130,114 @@ def end_fall(chain, course, row, lane):
 
 @end_fall.register(Chain)
 def _(chain, course, row, lane):
-    time, found = course[row + 6, lane], arrived(course[row + 7, lane])
-    later, index = end_fall(chain.rest, course, row + COURSE, lane)
-    here = select(found, 0.0, -1.0)
-    sooner = later < time
-    return select(sooner, later, time), select(sooner, select(index < 0.0, -1.0, index + 1.0), here)
+    found = arrived(course[row + _LAST, lane])
+    return _sooner(course[row + _TIME, lane], found, end_fall(chain.rest, course, row + COURSE, lane))
 
 
 @end_fall.register(Nothing)
 def _(chain, course, row, lane):
-    return math.inf, 0.0
+    return NEVER
+
+
+# --- Of one wall, and of all but one ---------------------------------------------------------------------
 
 
 @by_type
-def hit_of(chain, gravity, index, x, y, z, vx, vy, vz):
-    """`hit` of surface `index`."""
+def hit_of(chain, gravity, wall, r, v):
+    """`hit` of the wall with this number."""
     raise NotImplementedError
 
 
 @hit_of.register(Chain)
-def _(chain, gravity, index, x, y, z, vx, vy, vz):
-    time, found = hit(gravity, chain.first, x, y, z, vx, vy, vz)
-    other, found_other = hit_of(chain.rest, gravity, index - 1.0, x, y, z, vx, vy, vz)
-    here = index == 0.0
+def _(chain, gravity, wall, r, v):
+    time, found = hit(gravity, chain.first, r, v)
+    other, found_other = hit_of(chain.rest, gravity, wall - 1.0, r, v)
+    here = wall == 0.0
     return select(here, time, other), (here & found) | ((not here) & found_other)
 
 
 @hit_of.register(Nothing)
-def _(chain, gravity, index, x, y, z, vx, vy, vz):
+def _(chain, gravity, wall, r, v):
     return math.inf, True
 
 
 @by_type
-def other_hit(chain, index, x, y, z, vx, vy, vz):
-    """Time until which a straight flight is free of any surface but `index`, one of the chain's, and the next one."""
+def other_hit(chain, wall, r, v):
+    """The first hit of a straight flight with any wall but this one, which is one of the chain's."""
     raise NotImplementedError
 
 
 @other_hit.register(Chain)
-def _(chain, index, x, y, z, vx, vy, vz):
-    return _other_hit(chain.rest, chain, index, x, y, z, vx, vy, vz)
+def _(chain, wall, r, v):
+    return _other_hit(chain.rest, chain, wall, r, v)
 
 
 @by_type
-def _other_hit(rest, chain, index, x, y, z, vx, vy, vz):
+def _other_hit(rest, chain, wall, r, v):
     raise NotImplementedError
 
 
 @_other_hit.register(Nothing)
-def _(rest, chain, index, x, y, z, vx, vy, vz):
-    # The only surface has no other: without this the compiler would compute its hit and throw it away at run time.
-    return math.inf, 0.0
+def _(rest, chain, wall, r, v):
+    # The only wall has no other: without this the compiler would compute its hit and throw it away at run time.
+    return NEVER
 
 
 @_other_hit.register(Chain)
-def _(rest, chain, index, x, y, z, vx, vy, vz):
-    return _hit_but(chain, index, x, y, z, vx, vy, vz)
+def _(rest, chain, wall, r, v):
+    return _hit_but(chain, wall, r, v)
 
 
 @by_type
-def _hit_but(chain, index, x, y, z, vx, vy, vz):
+def _hit_but(chain, wall, r, v):
     raise NotImplementedError
 
 
 @_hit_but.register(Chain)
-def _(chain, index, x, y, z, vx, vy, vz):
-    time, _found = base.first_hit(chain.first, x, y, z, vx, vy, vz)
-    later, other = _hit_but(chain.rest, index - 1.0, x, y, z, vx, vy, vz)
-    use = (later < time) | (index == 0.0)
-    return select(use, later, time), select(use, other + 1.0, 0.0)
+def _(chain, wall, r, v):
+    time, _found = contract.first_hit(chain.first, r, v)
+    other = _hit_but(chain.rest, wall - 1.0, r, v)
+    use = (other.time < time) | (wall == 0.0)
+    return Hit(select(use, other.time, time), select(use, other.wall + 1.0, 0.0))
 
 
 @_hit_but.register(Nothing)
-def _(chain, index, x, y, z, vx, vy, vz):
-    return math.inf, 0.0
+def _(chain, wall, r, v):
+    return NEVER
 
 
 # --- Free time, with and without gravity -----------------------------------------------------------------
 
 
 @by_type
-def free_time(gravity, chain, x, y, z, vx, vy, vz):
+def free_time(gravity, chain, r, v):
     """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
     raise NotImplementedError
 
 
 @free_time.register(Nothing)
-def _(gravity, chain, x, y, z, vx, vy, vz):
-    time, _index = first_hit(chain, gravity, x, y, z, vx, vy, vz)
-    return select(outside(chain, -1.0, x, y, z), 0.0, time)
+def _(gravity, chain, r, v):
+    return select(outside(chain, -1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
 
 
 @free_time.register(Gravity)
-def _(gravity, chain, x, y, z, vx, vy, vz):
-    return safe_time(chain, x, y, z, vx, vy, vz, gravity.x, gravity.y, gravity.z)
+def _(gravity, chain, r, v):
+    return safe_time(chain, r, v, as_vector(gravity))
 
 
 @by_type
-def safe_time(chain, x, y, z, vx, vy, vz, gx, gy, gz):
-    """The smallest safe time of all surfaces."""
+def safe_time(chain, r, v, pull):
+    """The smallest safe time of all walls."""
     raise NotImplementedError
 
 
 @safe_time.register(Chain)
-def _(chain, x, y, z, vx, vy, vz, gx, gy, gz):
-    time = base.safe_time(chain.first, x, y, z, vx, vy, vz, gx, gy, gz)
-    other = safe_time(chain.rest, x, y, z, vx, vy, vz, gx, gy, gz)
+def _(chain, r, v, pull):
+    time = contract.safe_time(chain.first, r, v, pull)
+    other = safe_time(chain.rest, r, v, pull)
     return select(other < time, other, time)
 
 
 @safe_time.register(Nothing)
-def _(chain, x, y, z, vx, vy, vz, gx, gy, gz):
+def _(chain, r, v, pull):
     return math.inf

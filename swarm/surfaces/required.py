@@ -1,53 +1,30 @@
 """What a surface must give for what is done with it: asked before anything is compiled, and said in one sentence.
 
-A function of a wall that its file does not give has a definition in base.py or smooth.py, which is made of others. One
-that has none there, such as `hessian`, must be given where it is asked for, or something that is made of it is.
+Which functions a definition in contract.py is made of is read from its code. One that has no definition there, such as
+`hessian`, must be given where it is asked for, or something that is made of it is.
 """
 
+import types
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..errors import SceneError
-from . import base, smooth
-from .chain import Chain
+from . import contract
+from .fold import Chain
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
+from .surface import Surface
 
-_MARCH = (smooth.bend, smooth.slope, base.inner, base.level_of)
-# What the definitions in base.py and smooth.py are made of.
-_MADE_OF = {
-    **{generic.dispatch(object): made_of for generic, made_of in (
-        (base.safe_time, ()),
-        (base.inner, (base.phi,)),
-        (base.gap_of, ()),
-        (base.level_of, ()),
-        (base.gap_slope, ()),
-        (base.unit_normal, (base.gradient,)),
-        (base.distance, (base.gradient, base.gap_of, base.inner)),
-        (base.gap_scale, (base.gradient,)),
-        (base.settle, (base.gradient, base.phi)),
-        (base.inner_gradient, (smooth.slope, smooth.difference)),
-        (base.push, (smooth.hessian, base.inner_gradient)),
-        (base.resolve, (smooth.hessian, smooth.slope)),
-        (base.rise, (smooth.hessian, smooth.slope, base.inner_gradient)),
-        (base.chord_guess, (base.chord_improve,)),
-        (base.chord_improve, (base.rise,)),
-        (base.chord_normal, (base.push, base.inner_gradient)),
-        (smooth.slope, (base.gradient,)),
-        (smooth.difference, (base.inner,)),
-    )},
-    **dict.fromkeys(smooth.MARCHES, _MARCH),
-}  # fmt: skip
 # Their definitions hold for the inner function q = phi only: who gives another q gives these too.
-_OF_PHI = (base.gap_of, base.level_of, base.gap_slope, smooth.slope)
-# Their definitions take the sign from the field `side`.
-_SIDED = (base.gap_of, base.level_of, base.gap_slope, base.unit_normal, base.chord_normal)
+_OF_PHI = (contract.gap_of, contract.gap_slope, contract.slope)
 # What a solid of several parts asks of each.
-_OF_PARTS = (base.phi, base.gradient, base.distance, base.gap_scale, base.unit_normal, base.first_hit)
+_OF_PARTS = (
+    contract.phi, contract.gradient, contract.distance, contract.gap_scale, contract.unit_normal, contract.first_hit,
+)  # fmt: skip
 _DESCRIPTION = ("size", "bounds", "extent")
 
 
-def require(surfaces: Sequence[base.Surface], purpose: str, asked: Iterable[Any]) -> None:
+def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[Any]) -> None:
     """Raise a `SceneError` where a surface does not give what the functions `asked` of its walls are made of."""
     asked = tuple(asked)
     for i, surface in enumerate(surfaces):
@@ -58,21 +35,21 @@ def require(surfaces: Sequence[base.Surface], purpose: str, asked: Iterable[Any]
                     raise SceneError(
                         f"surfaces[{i}] ({type(surface).__name__}) must give what {purpose} needs, got "
                         f"{type(part).__name__} without {' and '.join(lacking)}; register what is missing as the files "
-                        "in swarm/surfaces do"
+                        "in swarm/surfaces/shapes do"
                     )
 
 
-def require_description(surfaces: Sequence[base.Surface]) -> None:
+def require_description(surfaces: Sequence[Surface]) -> None:
     """Raise a `SceneError` where the class of a surface lacks a method, or its walls phi and gradient."""
     for i, surface in enumerate(surfaces):
         kind = type(surface)
-        lacking = [name for name in _DESCRIPTION if getattr(kind, name) is getattr(base.Surface, name)]
-        if kind.numbers is base.Surface.numbers and kind.walls is base.Surface.walls:
+        lacking = [name for name in _DESCRIPTION if getattr(kind, name) is getattr(Surface, name)]
+        if kind.numbers is Surface.numbers and kind.walls is Surface.walls:
             lacking.append("numbers")
         if lacking:
             names = " and ".join(f"{name}()" for name in lacking)
             raise SceneError(f"surfaces[{i}] must have every method of a surface, got {kind.__name__} without {names}")
-    require(surfaces, "a scene", (base.phi, base.gradient))
+    require(surfaces, "a scene", (contract.phi, contract.gradient))
 
 
 def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any, ...]]]:
@@ -82,7 +59,7 @@ def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[An
         return
     yield wall, asked
     if isinstance(wall, SolidNumbers):
-        falls = tuple(one for one in asked if one in (base.falling_hit, base.safe_time))
+        falls = tuple(one for one in asked if one in (contract.falling_hit, contract.safe_time))
         parts = wall.parts
         while isinstance(parts, Chain):
             yield from _asked_of(parts.first, (*_OF_PARTS, *falls))
@@ -91,27 +68,38 @@ def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[An
 
 def _lacking(wall: Any, function: Any) -> Iterator[str]:
     """What must be registered before a function of a wall's numbers works."""
-    definition, default = function.dispatch(type(wall)), function.dispatch(object)
-    if function is base.falling_hit and base.is_quartic(wall) and not _gives(wall, base.course):
-        yield _named(base.course)
-    if definition not in _MADE_OF:
-        if definition is default:
-            yield _named(function)
+    definition = function.dispatch(type(wall))
+    if function is contract.falling_hit and contract.is_quartic(wall) and not _gives(wall, contract.course):
+        yield _named(contract.course)
+    if definition.__module__ != contract.__name__:
         return
-    if function in _OF_PHI and _gives(wall, base.inner):
+    if function in _OF_PHI and _gives(wall, contract.inner):
         yield f"{_named(function)} for its `inner`"
         return
-    if function in _SIDED and not hasattr(wall, "side"):
-        yield "the field `side`"
-    for part in _MADE_OF[definition]:
-        yield from _lacking(wall, part)
+    for name in _names_in(definition):
+        if name == "NotImplementedError":
+            yield _named(function)
+        elif name == "side" and not hasattr(wall, "side"):
+            yield "the field `side`"
+        elif hasattr(getattr(contract, name, None), "dispatch"):
+            yield from _lacking(wall, getattr(contract, name))
+
+
+def _names_in(definition: types.FunctionType) -> Iterator[str]:
+    """The names that a definition uses, in the functions of contract.py that it calls too."""
+    for name in definition.__code__.co_names:
+        yield name
+        called = getattr(contract, name, None)
+        is_helper = isinstance(called, types.FunctionType) and not hasattr(called, "dispatch")
+        if is_helper and called.__module__ == contract.__name__:
+            yield from _names_in(called)  # type: ignore[arg-type]
 
 
 def _gives(wall: Any, function: Any) -> bool:
-    return function.dispatch(type(wall)) is not function.dispatch(object)
+    return bool(function.dispatch(type(wall)).__module__ != contract.__name__)
 
 
 def _named(function: Any) -> str:
-    name = f"{function.__module__.removeprefix('swarm.surfaces.')}.{function.__name__}"
-    follows = function in (base.first_hit, base.falling_hit)
-    return f"{name} (or smooth.bend, which finds it by safe steps)" if follows else name
+    name = f"contract.{function.__name__}"
+    follows = function in (contract.first_hit, contract.falling_hit)
+    return f"{name} (or contract.bend, from which it follows by safe steps)" if follows else name

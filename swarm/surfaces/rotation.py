@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..checks import Vector, number, vector
 from ..errors import SceneError
+from ..kernel.vector import Vec, vec
 
 Quaternion = tuple[float, float, float, float]
 # By this much the length of what `unit` or a table of axis and angle gives may differ from 1.
@@ -115,20 +116,19 @@ def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
 
 
 class Rotated(NamedTuple):
-    """A surface `body` in its own frame, and the matrix from that frame to the scene's."""
+    """A surface `body` in its own frame, and the rows of the matrix from that frame to the scene's."""
 
     body: Any
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
+    x: Vec
+    y: Vec
+    z: Vec
+
+
+def framed(axes: NDArray[np.float64], body: Any) -> Any:
+    """What kernels take of a surface whose own axes are these columns."""
+    return body if np.array_equal(axes, np.eye(3)) else Rotated(body, *map(vec, axes.tolist()))
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:
     """What kernels take of a rotated surface; `body` has its centre in its own frame, `turned_back(turn, center)`."""
-    return body if turn is None else Rotated(body, *map(float, matrix(turn).ravel()))
+    return framed(matrix(turn), body)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 import swarm
 from swarm.contact import discrete_gradient as forms
 from swarm.contact import regularisation as laws
-from swarm.surfaces import base
+from swarm.contact.records import Step
+from swarm.kernel.vector import vec
+from swarm.surfaces import contract
 
 SMOOTH = [law for law in LAWS.values() if exponent_of(law) > 1.0]
 CONVEX = ["sphere", "ellipsoid", "plane"]
@@ -30,10 +32,15 @@ pairs = {
 }
 
 
+def vector(function, *arguments):
+    """What a kernel's function gives, as an array."""
+    return np.array(call(function, *arguments))
+
+
 def frame(surface, point, direction):
     """A point of the wall, its normal out of the admissible side and a unit tangent."""
     wall = wall_point(surface, point)
-    normal = np.array(call(base.unit_normal, surface, wall))
+    normal = vector(contract.unit_normal, surface, wall)
     along = direction - (direction @ normal) * normal
     if np.linalg.norm(along) < 1e-3:
         along = np.cross(normal, [0.6, 0.0, 0.8])
@@ -50,9 +57,9 @@ def constraint(law, surface, point):
     return call(laws.constraint, law, gap(surface, point))
 
 
-def doubt(surface, *points):
+def uncertainty(surface, *points):
     """How far gaps move when positions move by round-off."""
-    return 16 * EPSILON * max(call(base.gap_scale, surface, point) for point in points)
+    return 16 * EPSILON * max(call(contract.gap_scale, surface, point) for point in points)
 
 
 def steepest(law, surface, *points):
@@ -62,12 +69,44 @@ def steepest(law, surface, *points):
 
 def gap_gradient(surface, point):
     """The gradient of the gap."""
-    q = call(base.inner, surface, point)
-    return call(base.gap_slope, surface, q, q)[0] * np.array(call(base.inner_gradient, surface, point, point))
+    q = call(contract.inner, surface, point)
+    return call(contract.gap_slope, surface, q, q)[0] * vector(contract.inner_gradient, surface, point, point)
 
 
 def size(vector):
     return float(np.linalg.norm(vector))
+
+
+def scalar_form(law, radius, r0, r1):
+    """The paper's (9) for the cavity |r| <= radius, as it stands there: 0/0 where |r1| = |r0|."""
+    q0, q1 = r0 @ r0, r1 @ r1
+    phi0, phi1 = (call(laws.constraint, law, math.sqrt(q) - radius) for q in (q0, q1))
+    return (phi1 - phi0) / (q1 - q0) * (r0 + r1)
+
+
+def mean_value(law, surface, r0, r1):
+    """D = grad Phi(r_beta), r_beta = (1 - beta) r0 + beta r1, and beta (NaN if none was found)."""
+
+    def miss(beta):
+        return call(forms.identity_miss, law, surface, r0, r1, beta)
+
+    # Phi need not be convex along the step: the first part of it whose ends miss to different sides.
+    low, f_low = 0.0, miss(0.0)
+    high, f_high = low, f_low
+    for i in range(16):
+        if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
+            break
+        low, f_low, high = high, f_high, (i + 1.0) / 16
+        f_high = miss(high)
+    beta = low if f_low == 0.0 else high if f_high == 0.0 else math.nan
+    if f_low * f_high < 0.0:
+        for _i in range(200):
+            beta = forms.illinois(low, f_low, high, f_high)
+            f = miss(beta)
+            if f == 0.0 or high - low <= 2.0 * EPSILON:
+                break
+            low, f_low, high, f_high = forms.narrowed(low, f_low, high, f_high, beta, f)
+    return vector(forms.constraint_gradient, law, surface, r0 + beta * (r1 - r0)), beta
 
 
 # --- The identity ----------------------------------------------------------------------------------------
@@ -81,23 +120,23 @@ def test_composite_is_a_discrete_gradient(name, **pair):
     surface = numbers_of(name)
     r0, r1 = pair_of(surface, **pair)
     for law in LAWS.values():
-        d = np.array(call(forms.composite, law, surface, r0, r1))
+        d = vector(forms.composite, law, surface, r0, r1)
         rise = constraint(law, surface, r1) - constraint(law, surface, r0)
         slack = 16 * EPSILON * size(d) * size(r1 - r0)
-        slack += 2.0 * steepest(law, surface, r0, r1) * doubt(surface, r0, r1)
+        slack += 2.0 * steepest(law, surface, r0, r1) * uncertainty(surface, r0, r1)
         assert abs(d @ (r1 - r0) - rise) <= slack, law
 
 
 def _is_a_mean_value(law, surface, r0, r1):
     """D is grad Phi at a point between and keeps the identity, as far as Phi' knows: it is steep for exponents < 3."""
-    unsure = doubt(surface, r0, r1)
-    *d, beta = call(forms.mean_value, law, surface, r0, r1)
+    unsure = uncertainty(surface, r0, r1)
+    d, beta = mean_value(law, surface, r0, r1)
     if not 0.0 <= beta <= 1.0:
         return False
     between = r0 + beta * (r1 - r0)
     low, high = (call(laws.constraint_gradient, law, gap(surface, between) + s) for s in (-unsure, unsure))
     blur = (high - low) * size(gap_gradient(surface, between)) + 16 * EPSILON * size(d)
-    if size(np.subtract(d, call(forms.constraint_gradient, law, surface, between))) > blur:
+    if size(d - vector(forms.constraint_gradient, law, surface, between)) > blur:
         return False
     miss = d @ (r1 - r0) - (constraint(law, surface, r1) - constraint(law, surface, r0))
     return abs(miss) <= blur * size(r1 - r0) + 2.0 * steepest(law, surface, r0, r1) * unsure
@@ -142,9 +181,9 @@ def test_mean_value_of_close_points(name):
             r1 = r0 + near * (end - r0)
             for law in SMOOTH:
                 assert _is_a_mean_value(law, surface, r0, r1), law
-                gradient = call(forms.constraint_gradient, law, surface, r0)
-                d = call(forms.mean_value, law, surface, r0, r1)[:3]
-                assert size(np.subtract(d, gradient)) <= 30.0 * near * size(gradient), law
+                gradient = vector(forms.constraint_gradient, law, surface, r0)
+                d, _beta = mean_value(law, surface, r0, r1)
+                assert size(d - gradient) <= 30.0 * near * size(gradient), law
 
 
 @every_surface
@@ -159,9 +198,9 @@ def test_close_points_outside_have_the_gradient_at_their_middle(name, **pair):
         if min(gap(surface, r) for r in (r0, r1)) < 0.01:
             continue
         for law in LAWS.values():
-            d = call(forms.composite, law, surface, r0, r1)
-            middle = call(forms.constraint_gradient, law, surface, 0.5 * (r0 + r1))
-            assert size(np.subtract(d, middle)) <= (1e-11 + 4e3 * (r1 - r0) @ (r1 - r0)) * size(middle), law
+            d = vector(forms.composite, law, surface, r0, r1)
+            middle = vector(forms.constraint_gradient, law, surface, 0.5 * (r0 + r1))
+            assert size(d - middle) <= (1e-11 + 4e3 * (r1 - r0) @ (r1 - r0)) * size(middle), law
 
 
 @given(r0=directions, r1=directions, radius=st.floats(0.1, 1.0))
@@ -172,11 +211,11 @@ def test_scalar_form_is_the_composite_on_a_sphere(r0, r1, radius):
         return
     surface = swarm.Sphere(radius).numbers()
     for law in LAWS.values():
-        scalar, composite = call(forms.scalar, law, radius, r0, r1), call(forms.composite, law, surface, r0, r1)
+        scalar, composite = scalar_form(law, radius, r0, r1), vector(forms.composite, law, surface, r0, r1)
         phi0, phi1 = (constraint(law, surface, r) for r in (r0, r1))
         slack = 64 * EPSILON * (phi0 + phi1 + steepest(law, surface, r0, r1))
         assert scalar == pytest.approx(composite, rel=1e-12, abs=slack / apart)
-        assert np.array(scalar) @ (r1 - r0) == pytest.approx(phi1 - phi0, rel=1e-12, abs=slack)
+        assert scalar @ (r1 - r0) == pytest.approx(phi1 - phi0, rel=1e-12, abs=slack)
 
 
 # --- Limits ----------------------------------------------------------------------------------------------
@@ -192,7 +231,7 @@ def test_one_point_has_the_gradient(name, point, depth):
     r = wall + depth * normal
     for law in LAWS.values():
         expected = call(laws.constraint_gradient, law, gap(surface, r)) * gap_gradient(surface, r)
-        for d in (call(forms.composite, law, surface, r, r), call(forms.constraint_gradient, law, surface, r)):
+        for d in (vector(forms.composite, law, surface, r, r), vector(forms.constraint_gradient, law, surface, r)):
             assert d == pytest.approx(expected, rel=64 * EPSILON, abs=64 * EPSILON * size(expected))
             if gap(surface, r) < 0.0:
                 assert tuple(d) == (0.0, 0.0, 0.0)
@@ -207,9 +246,9 @@ def test_close_points_tend_to_the_gradient(name, point, direction, depth, along)
     r0, end = pair_of(surface, point, direction, depth, depth + 0.01, along)
     for near in (1e-2, 1e-4, 1e-6, 1e-8):
         for law in LAWS.values():
-            gradient = call(forms.constraint_gradient, law, surface, r0)
-            d = call(forms.composite, law, surface, r0, r0 + near * (end - r0))
-            assert size(np.subtract(d, gradient)) <= (1e-11 + 30.0 * near) * size(gradient), law
+            gradient = vector(forms.constraint_gradient, law, surface, r0)
+            d = vector(forms.composite, law, surface, r0, r0 + near * (end - r0))
+            assert size(d - gradient) <= (1e-11 + 30.0 * near) * size(gradient), law
 
 
 @pytest.mark.parametrize("name", ["sphere", "ball", "ellipsoid", "egg", "plane"])
@@ -221,15 +260,15 @@ def test_equal_levels_take_the_one_sided_limit(name, point, depth, direction):
     wall, normal, tangent = frame(surface, point, direction)
     r0 = wall + depth * normal
     # Along a plane, else the mirror image in x.
-    r1 = r0 + 0.2 * tangent if name == "plane" else np.array([2.0 * surface.cx - r0[0], *r0[1:]])
-    outward = np.array(call(base.unit_normal, surface, wall_point(surface, r1)))
-    q0 = call(base.inner, surface, r0)
+    r1 = r0 + 0.2 * tangent if name == "plane" else np.array([2.0 * surface.center.x - r0[0], *r0[1:]])
+    outward = vector(contract.unit_normal, surface, wall_point(surface, r1))
+    q0 = call(contract.inner, surface, r0)
     for law in LAWS.values():
-        slope = call(laws.constraint_gradient, law, gap(surface, r0)) * call(base.gap_slope, surface, q0, q0)[0]
+        slope = call(laws.constraint_gradient, law, gap(surface, r0)) * call(contract.gap_slope, surface, q0, q0)[0]
         for shift in (0.0, 1e-12, 1e-8, -1e-8, 1e-4, -1e-4):
             end = r1 + shift * outward
-            d = np.array(call(forms.composite, law, surface, r0, end))
-            level = np.array(call(base.inner_gradient, surface, r0, end))
+            d = vector(forms.composite, law, surface, r0, end)
+            level = vector(contract.inner_gradient, surface, r0, end)
             # Phi'' Delta g relative to Phi' is (a - 1)/2 Delta g/g.
             slack = 1e-11 + 100.0 * abs(shift) * exponent_of(law) / gap(surface, r0)
             assert size(d - slope * level) <= slack * size(slope * level) + 1e-15, law
@@ -245,10 +284,10 @@ def test_on_the_surface_at_both_ends(law):
         (swarm.Plane((0.0, 1.0, 0.0)).numbers(), [0.5, 0.0, 0.0], [0.0, 0.0, 2.0]),
     ):
         r0, r1 = np.array(r0), np.array(r1)
-        q0 = call(base.inner, surface, r0)
-        slope = call(base.gap_slope, surface, q0, q0)[0] * (1.0 if exponent_of(law) == 1.0 else 0.0)
-        expected = slope * np.array(call(base.inner_gradient, surface, r0, r1))
-        assert call(forms.composite, law, surface, r0, r1) == pytest.approx(expected, rel=8 * EPSILON, abs=0.0)
+        q0 = call(contract.inner, surface, r0)
+        slope = call(contract.gap_slope, surface, q0, q0)[0] * (1.0 if exponent_of(law) == 1.0 else 0.0)
+        expected = slope * vector(contract.inner_gradient, surface, r0, r1)
+        assert vector(forms.composite, law, surface, r0, r1) == pytest.approx(expected, rel=8 * EPSILON, abs=0.0)
 
 
 @every_surface
@@ -259,12 +298,12 @@ def test_one_point_inside_and_one_outside(name, point, direction, inside, outsid
     surface = numbers_of(name)
     r0, r1 = pair_of(surface, point, direction, -inside, outside, 0.02)
     assert gap(surface, r0) < 0.0 < gap(surface, r1)
-    rise = call(base.inner, surface, r1) - call(base.inner, surface, r0)
+    rise = call(contract.inner, surface, r1) - call(contract.inner, surface, r0)
     for law in LAWS.values():
-        d = call(forms.composite, law, surface, r0, r1)
-        expected = constraint(law, surface, r1) / rise * np.array(call(base.inner_gradient, surface, r0, r1))
+        d = vector(forms.composite, law, surface, r0, r1)
+        expected = constraint(law, surface, r1) / rise * vector(contract.inner_gradient, surface, r0, r1)
         assert d == pytest.approx(expected, rel=1e-12, abs=1e-12 * size(expected))
-        assert call(forms.composite, law, surface, r1, r0) == pytest.approx(d, rel=1e-12, abs=1e-12 * size(d))
+        assert vector(forms.composite, law, surface, r1, r0) == pytest.approx(d, rel=1e-12, abs=1e-12 * size(d))
 
 
 @every_surface
@@ -275,10 +314,10 @@ def test_inside_there_is_none(name, point, direction, first, last):
     r0, r1 = pair_of(surface, point, direction, -first - 0.05, -last - 0.05, 0.02)
     assert max(gap(surface, r) for r in (r0, r1)) < 0.0
     for law in LAWS.values():
-        assert tuple(call(forms.composite, law, surface, r0, r1)) == (0.0, 0.0, 0.0)
-        assert tuple(call(forms.constraint_gradient, law, surface, r0)) == (0.0, 0.0, 0.0)
+        assert tuple(vector(forms.composite, law, surface, r0, r1)) == (0.0, 0.0, 0.0)
+        assert tuple(vector(forms.constraint_gradient, law, surface, r0)) == (0.0, 0.0, 0.0)
         if exponent_of(law) > 1.0:
-            assert tuple(call(forms.mean_value, law, surface, r0, r1)[:3]) == (0.0, 0.0, 0.0)
+            assert tuple(mean_value(law, surface, r0, r1)[0]) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("gradient", "kind"), [("composite", forms.Composite), ("mean-value", forms.MeanValue)])
@@ -303,7 +342,7 @@ steps = {
 MULTIPLIERS = [None, 0.0, 0.01, 0.3]
 
 
-class Step:
+class Contact:
     """A step next to the wall."""
 
     def __init__(self, name, point, direction, lean, depth, length, stiffness):
@@ -322,10 +361,12 @@ class Step:
         return None if part is None else part * self.stop / self.c(law)
 
     def reaction(self, form, law, part):
-        """The displacement, r1, Phi1 as told, and whether it was found."""
+        """The displacement, r1, Phi1 of the reaction, and whether it was solved."""
         c, multiplier = self.c(law), self.multiplier(law, part)
-        *held, told, solved = call(forms.reaction, form, law, multiplier, self.surface, self.start, self.free, c)
-        return np.array(held), self.start + (self.free - held), told, solved
+        step = Step(vec(self.start), vec(self.free), np.float64(c))
+        found = call(forms.reaction, form, law, multiplier, self.surface, step)
+        held = np.array(found.vector)
+        return held, self.start + (self.free - held), found.constraint, found.solved
 
     def force(self, law, part, g0, g1):
         """c (alpha Phi_mean + lambda) Phi[g0, g1]"""
@@ -334,7 +375,7 @@ class Step:
     def slack(self, law, part, end):
         """How far the reaction moves when both gaps move by round-off."""
         g0, g1 = gap(self.surface, self.start), gap(self.surface, end)
-        unsure = doubt(self.surface, self.start, end, self.start + self.free)
+        unsure = uncertainty(self.surface, self.start, end, self.start + self.free)
         forces = [self.force(law, part, g0 + i * unsure, g1 + j * unsure) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         slope = max(size(gap_gradient(self.surface, r)) for r in (self.start, end))
         return 2.0 * slope * (max(forces) - min(forces)) + 64 * EPSILON * slope * max(forces)
@@ -345,16 +386,16 @@ class Step:
 @given(**steps)
 def test_reaction_of_the_composite_form_solves_its_step(name, **step):
     """r0 + p - r1 = c D(r0, r1) (alpha (Phi0 + Phi1)/2 + lambda)."""
-    step = Step(name, **step)
+    step = Contact(name, **step)
     for law in LAWS.values():
         for part in MULTIPLIERS:
             held, end, told, solved = step.reaction(COMPOSITE, law, part)
             assert solved, (law, part)
-            d = np.array(call(forms.composite, law, step.surface, step.start, end))
+            d = vector(forms.composite, law, step.surface, step.start, end)
             first, last = (constraint(law, step.surface, r) for r in (step.start, end))
             expected = step.c(law) * d * (0.5 * law.alpha * (first + last) + (step.multiplier(law, part) or 0.0))
             assert size(held - expected) <= step.slack(law, part, end), (law, part)
-            unsure = 2.0 * steepest(law, step.surface, step.start, end) * doubt(step.surface, step.start, end)
+            unsure = 2.0 * steepest(law, step.surface, step.start, end) * uncertainty(step.surface, step.start, end)
             assert told == pytest.approx(last, rel=1e-12, abs=unsure), (law, part)
 
 
@@ -364,11 +405,11 @@ def _mean_value_step(name, law, part, lean, depth, length, stiffness):
     held.(r1 - r0) = c (Phi1 - Phi0)(alpha (Phi0 + Phi1)/2 + lambda), up to round-off of the kinetic energy.
     """
     point, direction = np.array([0.4, -0.7, 0.5]), np.array([0.3, 0.5, -0.6])
-    step = Step(name, point, direction, lean, depth, length, stiffness)
+    step = Contact(name, point, direction, lean, depth, length, stiffness)
     held, end, told, solved = step.reaction(MEAN_VALUE, law, part)
     first, last = (constraint(law, step.surface, r) for r in (step.start, end))
     strength = step.c(law) * (0.5 * law.alpha * (first + last) + (step.multiplier(law, part) or 0.0))
-    unsure = 4.0 * steepest(law, step.surface, step.start, end) * doubt(step.surface, step.start, end)
+    unsure = 4.0 * steepest(law, step.surface, step.start, end) * uncertainty(step.surface, step.start, end)
     miss = abs(held @ (end - step.start) - strength * (last - first))
     slack = strength * unsure + 4.0 * step.slack(law, part, end) * size(end - step.start) + 8 * EPSILON * length**2
     assert not solved or told == pytest.approx(last, rel=1e-12, abs=unsure)
@@ -384,9 +425,9 @@ def test_reaction_of_the_mean_value_form_solves_its_step(name, law):
             solved, balanced, (step, held, end, strength) = _mean_value_step(name, law, part, lean, depth, length, 1.0)
             assert solved
             assert balanced
-            *d, beta = call(forms.mean_value, law, step.surface, step.start, end)
+            d, beta = mean_value(law, step.surface, step.start, end)
             assert 0.0 <= beta <= 1.0
-            assert held == pytest.approx(strength * np.array(d), rel=1e-7, abs=1e-9 * size(held))
+            assert held == pytest.approx(strength * d, rel=1e-7, abs=1e-9 * size(held))
 
 
 @pytest.mark.parametrize("name", CONVEX)

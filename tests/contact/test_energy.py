@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.contact import regularisation
-from swarm.contact.energy import contact_energy, energy_doubt
+from swarm.contact.energy import contact_energy, energy_uncertainty
 
 NAMES = ("sphere", "egg", "plane")
 
@@ -26,10 +26,10 @@ def test_rigid_walls_store_none(point):
 
 @every_law
 @given(point=directions, shift=st.tuples(*[st.floats(-1e-7, 1e-7)] * 3).map(np.array))
-def test_doubt_bounds_the_change_of_the_energy(law, point, shift):
+def test_uncertainty_bounds_the_change_of_the_energy(law, point, shift):
     """Up to (a + 1)/2, for the shift of a point, at the centre of a sphere too."""
     chain, size = scene_of(*NAMES).chain(), np.abs(shift) + 1e-12
     for place in (point, np.array([0.2, -0.3, 0.1])):
         change = call(contact_energy, law, chain, 2.0, place + shift) - call(contact_energy, law, chain, 2.0, place)
-        doubt = call(energy_doubt, chain, law, 2.0, place, size)
-        assert abs(change) <= 1.01 * 0.5 * (exponent_of(law) + 1.0) * doubt + 1e-9
+        uncertainty = call(energy_uncertainty, chain, law, 2.0, place, size)
+        assert abs(change) <= 1.01 * 0.5 * (exponent_of(law) + 1.0) * uncertainty + 1e-9

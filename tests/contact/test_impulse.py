@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from swarm.contact import impulse
 from swarm.contact import regularisation as laws
-from swarm.surfaces import base
-from swarm.surfaces.chain import Chain
+from swarm.contact.records import Step
+from swarm.kernel.vector import Vec, vec
+from swarm.surfaces import contract
+from swarm.surfaces.fold import Chain
 
 mp.mp.dps = 50
 some_laws = pytest.mark.parametrize("law", [LAWS["1.0"], LAWS["1.5"], LAWS["2.0"]], ids=["1", "1.5", "2"])
@@ -28,13 +30,18 @@ steps = {
 }
 
 
-class Step:
+def exactly(point):
+    """A point with 50 digits."""
+    return Vec(*map(mp.mpf, point))
+
+
+class Contact:
     """One step next to the wall: where from, how far the free flight goes, how stiff the wall is for the mass."""
 
     def __init__(self, name, law, point, direction, lean, depth, length, stiffness, reachable=False):
         self.law, self.surface = law, numbers_of(name)
         wall = wall_point(self.surface, point)
-        normal = np.array(call(base.unit_normal, self.surface, wall))
+        normal = np.array(call(contract.unit_normal, self.surface, wall))
         along = direction - (direction @ normal) * normal
         along /= max(np.linalg.norm(along), 1e-3)
         self.start = wall - depth * normal
@@ -48,10 +55,10 @@ class Step:
             self.start = wall - depth * normal
 
     def inner_slope(self, point):
-        return call(base.inner_gradient, self.surface, point, point)
+        return call(contract.inner_gradient, self.surface, point, point)
 
     def gap(self, point):
-        return side_of(self.surface) * base.phi(self.surface, *point)
+        return side_of(self.surface) * contract.phi(self.surface, vec(point))
 
     def energy(self, point):
         """V with 50 digits; its exponent from the law."""
@@ -60,42 +67,48 @@ class Step:
 
     def end(self, kappa):
         """r1 = r0 + p - kappa D(r0, r1), from D alone: it is affine in r1, D0 + B r1."""
-        start, corners = list(map(mp.mpf, self.start)), [[mp.mpf(i == k) for i in range(3)] for k in range(-1, 3)]
-        zero, *along = (base.inner_gradient(self.surface, *start, *corner) for corner in corners)
+        start = exactly(self.start)
+        corners = [Vec(*(mp.mpf(i == k) for i in range(3))) for k in range(-1, 3)]
+        zero, *along = (contract.inner_gradient(self.surface, start, corner) for corner in corners)
         matrix = mp.matrix(3, 3)
         for i, k in itertools.product(range(3), range(3)):
             matrix[i, k] = (i == k) + kappa * (along[k][i] - zero[i])
         right = [r + mp.mpf(p) - kappa * d for r, p, d in zip(start, self.free, zero, strict=True)]
-        return list(mp.lu_solve(matrix, mp.matrix(right)))
+        return vec(mp.lu_solve(matrix, mp.matrix(right)))
 
     def residual(self, kappa):
         """kappa - c (V1 - V0)/(q1 - q0)."""
-        start, end = list(map(mp.mpf, self.start)), self.end(mp.mpf(float(kappa)))
-        q0, q1 = base.inner(self.surface, *start), base.inner(self.surface, *end)
+        start, end = exactly(self.start), self.end(mp.mpf(float(kappa)))
+        q0, q1 = contract.inner(self.surface, start), contract.inner(self.surface, end)
         if q0 == q1:
             return mp.mpf(float(kappa))
         return mp.mpf(float(kappa)) - mp.mpf(self.c) * (self.energy(end) - self.energy(start)) / (q1 - q0)
 
     def slack(self):
         """How far kappa moves when positions move by round-off, in the stiffest place of the step."""
-        depth = max(call(base.gap_of, self.surface, call(base.inner, self.surface, r)) for r in (self.start, self.far))
+        depth = max(
+            call(contract.gap_of, self.surface, call(contract.inner, self.surface, r)) for r in (self.start, self.far)
+        )
         reach = np.linalg.norm(self.start) + np.linalg.norm(self.free) + 1.0
         force = self.c * call(laws.stiffness, self.law, max(depth, 1e-3)) * 2.0
         return 64 * EPSILON * force * reach / np.linalg.norm(self.inner_slope(self.start))
+
+    def step(self):
+        return Step(vec(self.start), vec(self.free), np.float64(self.c))
 
     @property
     def far(self):
         return self.start + self.free
 
     def careful(self):
-        return call(impulse.careful, self.law, None, self.surface, self.start, self.free, self.c)
+        return call(impulse.careful, self.law, None, self.surface, self.step())
 
 
 @every_quadric
 @some_laws
 @given(**steps)
 def test_careful_solves_the_equation(name, law, **step):
-    step = Step(name, law, **step)
+    step = Contact(name, law, **step)
     kappa, solved = step.careful()
     assert solved
     assert abs(step.residual(kappa)) <= 8 * EPSILON * abs(kappa) + step.slack()
@@ -107,7 +120,7 @@ def test_careful_solves_the_equation(name, law, **step):
 @given(**steps)
 def test_careful_finds_the_smallest_root(name, law, **step):
     """No change of sign of the residual before the root; a wall pushes, a cavity with kappa >= 0, a solid <= 0."""
-    step = Step(name, law, **step, reachable=True)
+    step = Contact(name, law, **step, reachable=True)
     kappa, _ = step.careful()
     assert kappa * side_of(step.surface) >= 0.0
     sign = mp.sign(step.residual(0.0))
@@ -121,14 +134,14 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 @given(**steps)
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
     """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""
-    step = Step(name, law, **step, reachable=True)
+    step = Contact(name, law, **step, reachable=True)
     chain = Chain(step.surface, None)
     expected, _ = step.careful()
-    kappa, unsolved = call(impulse.guess, chain, 0, law, step.start, step.free, step.c), True
+    kappa, unsolved = call(impulse.guess, chain, 0, law, step.step()), True
     for _ in range(impulse.NEWTON_STEPS):
         if unsolved:
-            change, unsolved, *_loop = call(impulse.improve, chain, 0, law, None, step.start, step.free, step.c, kappa)
-            kappa -= change
+            newton = call(impulse.improve, chain, 0, law, None, step.step(), kappa)
+            kappa, unsolved = kappa - newton.step, newton.more
     if not unsolved:
         assert kappa == pytest.approx(expected, rel=1e-12, abs=step.slack())
     else:
@@ -138,15 +151,15 @@ def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
 @every_quadric
 @some_laws
 def test_a_free_step_has_no_impulse(name, law):
-    step = Step(name, law, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0]), -0.5, 0.05, 0.1, 30.0)
+    step = Contact(name, law, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0]), -0.5, 0.05, 0.1, 30.0)
     assert step.careful() == (0.0, True)
 
 
 @some_laws
 def test_a_head_on_plane_by_hand(law):
     """Fully inside the wall at both ends (K) is kappa = c V[g0, g1] with g1 = g0 + p - kappa."""
-    numbers, c, g0, p = numbers_of("plane")._replace(nx=1.0, ny=0.0, nz=0.0, offset=0.0), 1e-4, 0.2, 0.1
-    kappa, solved = call(impulse.careful, law, None, numbers, np.array([g0, 0.0, 0.0]), np.array([p, 0.0, 0.0]), c)
+    numbers, c, g0, p = numbers_of("plane")._replace(normal=Vec(1.0, 0.0, 0.0), offset=0.0), 1e-4, 0.2, 0.1
+    kappa, solved = call(impulse.careful, law, None, numbers, Step(Vec(g0, 0.0, 0.0), Vec(p, 0.0, 0.0), c))
     assert solved
     assert kappa == pytest.approx(c * call(laws.energy_slope, law, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
     if isinstance(law, laws.Linear):
@@ -167,10 +180,10 @@ def test_a_head_on_plane_by_hand(law):
 )
 def test_careful_solves_steps_across_the_cavity(name, law, **step):
     """Free flights of many sizes, deep into the far wall: a root, on this side of the pole of a solid."""
-    step = Step(name, law, **step)
+    step = Contact(name, law, **step)
     kappa, solved = step.careful()
     assert solved
-    side, pole = side_of(step.surface), abs(base.farthest_push(step.surface))
+    side, pole = side_of(step.surface), abs(contract.farthest_push(step.surface))
     assert 0.0 <= kappa * side < pole
     # F changes its sign within the round-off of the positions.
     width = 1e-9 * abs(kappa) + step.slack()

@@ -4,11 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from conftest import EPSILON, SURFACES, wall_point
+from conftest import EPSILON, SURFACES, call, wall_point
 
 import swarm
 from swarm.contact import projection, sliding
-from swarm.surfaces import chain as walls
+from swarm.kernel.vector import vec
+from swarm.surfaces.fold import chain_of
 
 # Normals: in any direction, in nearly the same one, or nearly in one of two opposite ones, as in a cusp.
 SPREADS = ["any", *itertools.product(("same", "opposite"), (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8))]
@@ -32,7 +33,7 @@ def projected(normals, w):
     """u, and what each wall takes."""
     held = np.zeros(len(normals))
     touched = np.ones(len(normals), bool)
-    return np.array(projection.project(touched, normals.copy(), held, *map(float, w))), held
+    return np.array(projection.project(touched, normals.T, held, vec(w))), held
 
 
 def nearest(normals, w):
@@ -91,19 +92,9 @@ def test_a_sliding_step_keeps_the_energy(name):
             point = wall_point(surface.walls()[0], random.uniform(-0.5, 0.5, 3))
             normal = random.standard_normal(3)
             plane = swarm.Plane(normal, float(normal @ point) / float(np.linalg.norm(normal)))
-            chain = walls.chain_of([surface, plane][:count])
+            chain = chain_of([surface, plane][:count])
             w = random.standard_normal(3)
-            held = np.zeros(count)
-            u = held_velocity(chain, count, held, point, w, h)
+            touch = sliding.Touch(np.ones(count, bool), np.zeros((3, count)), np.zeros(count), np.zeros(count))
+            u = np.array(call(sliding.velocity_along, chain, touch, point, w, h))
             assert np.linalg.norm(2.0 * u - w) == pytest.approx(np.linalg.norm(w), rel=16 * EPSILON)
-            assert (held >= 0.0).all()
-
-
-def held_velocity(chain, count, held, point, w, h):
-    with np.errstate(all="ignore"):
-        return np.array(
-            sliding._held(
-                chain, np.ones(count, bool), np.zeros((count, 3)), held,
-                *map(np.float64, point), *map(np.float64, w), h, 1.0,
-            )
-        )  # fmt: skip
+            assert (touch.held >= 0.0).all()

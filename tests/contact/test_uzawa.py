@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.contact import uzawa
+from swarm.contact.records import Step
 from swarm.contact.regularisation import regularisation
-from swarm.surfaces import base
-from swarm.surfaces import chain as walls
+from swarm.kernel.vector import vec
+from swarm.surfaces import contract
+from swarm.surfaces import fold as walls
 
 few = settings(max_examples=3)
 ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
@@ -21,6 +23,11 @@ ALPHA, C = 1e4, 2e-4  # c alpha/2 = 1: each sweep halves the gap of a flat wall 
 
 
 ORIGIN = [0.0, 0.0, 0.0]
+
+
+def step_of(start, free, c):
+    """A step as kernels take it."""
+    return Step(vec(map(np.float64, start)), vec(map(np.float64, free)), np.float64(c))
 
 
 class Loop:
@@ -32,31 +39,29 @@ class Loop:
         self.method = swarm.AugmentedLagrangian(
             1.0, ALPHA, exponent, tolerance=tolerance, max_sweeps=max_sweeps, acceleration=acceleration
         ).numbers(swarm.Scene([swarm.Sphere(1.0)]))
-        self.step = (*map(np.float64, (*start, *free)), np.float64(c))
+        self.step = step_of(start, free, c)
         self.start, self.free = np.array(start), np.array(free)
 
     def run(self):
         reactions = np.zeros((walls.length(self.chain), 4))
         with np.errstate(all="ignore"):
-            *end, sweeps, stored, solved, converged = uzawa.loop(
-                self.method, self.law, self.chain, *self.step, reactions
-            )
-        self.end, self.sweeps, self.stored, self.converged = np.array(end), sweeps, stored, converged
-        assert solved
+            loop = uzawa.loop(self.method, self.law, self.chain, self.step, reactions)
+        self.end, self.sweeps, self.stored, self.converged = np.array(loop.r), loop.sweeps, loop.stored, loop.converged
+        assert loop.solved
         self.held = reactions[:, :3].sum(axis=0)
         return self
 
     def constraints(self):
         """Phi1 of each sweep of one wall."""
-        multipliers, before, misses, reactions = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 4))
+        multipliers, before, reactions = np.zeros(1), uzawa.Before(np.zeros(1), np.zeros(1)), np.zeros((1, 4))
         found = []
         with np.errstate(all="ignore"):
             for sweep in range(self.method.max_sweeps):
-                *_, stored, _solved = uzawa.sweep_all(
-                    self.method, self.law, self.chain, *self.step, multipliers, before, misses, sweep, reactions
+                swept = uzawa.sweep_all(
+                    self.method, self.law, self.chain, self.step, multipliers, before, sweep, reactions
                 )
                 found.append(float(reactions[0, 3]))
-                if stored <= self.method.tolerance:
+                if swept.stored <= self.method.tolerance:
                     break
         return np.array(found)
 
@@ -80,7 +85,7 @@ def state_one(name, point, direction, lean, length):
     """A wall point of the surface, and a free displacement out of its admissible side."""
     surface = numbers_of(name)
     start = wall_point(surface, np.asarray(point))
-    normal = np.array(call(base.unit_normal, surface, start))
+    normal = np.array(call(contract.unit_normal, surface, start))
     along = direction - (direction @ normal) * normal
     along /= max(np.linalg.norm(along), 1e-3)
     return surface, start, length * (lean * normal + math.sqrt(1.0 - lean * lean) * along)
@@ -88,7 +93,7 @@ def state_one(name, point, direction, lean, length):
 
 def stiff(surface, start, times=1.0):
     """c for which a sweep takes 1/(1 + times) off the gap of the wall, were it flat."""
-    slope = np.linalg.norm(call(base.gradient, surface, start))
+    slope = np.linalg.norm(call(contract.gradient, surface, start))
     return times * C / slope**2
 
 
@@ -113,7 +118,7 @@ def test_the_limit_is_the_reflection(name, acceleration, **contact):
     if gap(surface, start + free) <= 1e-3 * contact["length"]:
         return
     kappa = chord_of(surface, start, free)
-    chord = np.array(call(base.push, surface, start, free, kappa))
+    chord = np.array(call(contract.push, surface, start, free, kappa))
     loop = Loop([Described(surface)], start, free, acceleration, c=stiff(surface, start, 10.0)).run()
     assert loop.converged
     assert loop.stored <= 1e-28
@@ -236,12 +241,12 @@ def test_the_reflection_multiplier_is_the_fixed_point():
         surface, start, free = state_one(name, [0.4, -0.7, 0.5], np.array([0.3, 0.5, -0.6]), 0.8, 0.03)
         c = stiff(surface, start)
         chain, law = walls.Chain(surface, None), regularisation(ALPHA, 1.0)
-        kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, start, free, c)
+        kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, step_of(start, free, c))
         assert kappa == pytest.approx(chord_of(surface, start, free), rel=1e-6)
         loop = Loop([Described(surface)], start, free, c=c).run()
-        gradient = call(base.inner_gradient, surface, start, loop.end)
-        q = call(base.inner, surface, start)
-        slope = call(base.gap_slope, surface, q, q)[0]
+        gradient = call(contract.inner_gradient, surface, start, loop.end)
+        q = call(contract.inner, surface, start)
+        slope = call(contract.gap_slope, surface, q, q)[0]
         assert multiplier * c * abs(slope) * np.linalg.norm(gradient) == pytest.approx(
             np.linalg.norm(loop.held), rel=1e-6
         )
@@ -320,7 +325,7 @@ def test_the_edge_of_a_sphere_and_a_plane(acceleration):
 def contact_on(name, depth, acceleration, exponent=1.0, tolerance=1e-10):
     """A step of 0.0125 that starts `depth` inside and meets the wall, 50 sweeps at most."""
     surface, start, free = state_one(name, [0.4, -0.7, 0.5], np.array([0.3, 0.5, -0.6]), 0.8, 0.0125)
-    start = start - depth * np.array(call(base.unit_normal, surface, start))
+    start = start - depth * np.array(call(contract.unit_normal, surface, start))
     # As stiff as a linear spring at the depth 0.01.
     c = stiff(surface, start, 3.0) * 0.01 ** (1.0 - exponent)
     return Loop([Described(surface)], start, free, acceleration, tolerance, 50, c, exponent).run()

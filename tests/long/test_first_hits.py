@@ -26,13 +26,14 @@ from roots import EARLY, EXACT, MISSED, TOUCHED, Course, Exact, Terms, exact_cou
 import swarm
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
-from swarm.surfaces import base
-from swarm.surfaces.chain import chain_of
+from swarm.kernel.vector import column, square, vec
+from swarm.surfaces import contract
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.formulas.owned import OwnNumbers
+from swarm.surfaces.fold import chain_of
+from swarm.surfaces.formulas.march import OwnNumbers
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
-from swarm.surfaces.shapes.rotated import _own
+from swarm.surfaces.shapes.rotated import own
 from swarm.surfaces.shapes.solid import SolidNumbers
 from swarm.surfaces.shapes.torus import TorusNumbers
 
@@ -115,8 +116,8 @@ def _distance(surface, points):
     sign, off = -1.0 if surface.is_solid() else 1.0, -math.inf
     with np.errstate(all="ignore"):
         for wall in surface.walls():
-            slope = np.sqrt(sum(part * part for part in base.gradient(wall, *points)))
-            off = np.maximum(off, sign * base.phi(wall, *points) / slope)
+            slope = np.sqrt(square(contract.gradient(wall, vec(points))))
+            off = np.maximum(off, sign * contract.phi(wall, vec(points)) / slope)
     return off
 
 
@@ -168,19 +169,15 @@ def flights(surface, scale, n, falls, seed):
 def straight_hits(chain, position, velocity, pull, times, index):
     """`first_hit` of every straight flight."""
     for i in range(times.size):
-        times[i], index[i] = first_hit(
-            chain, None, position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i]
-        )
+        times[i], index[i] = first_hit(chain, None, column(position, 0, i), column(velocity, 0, i))
 
 
 @kernel
 def falling_hits(chain, position, velocity, pull, times, index):
     """`first_hit` of every falling flight, each with an acceleration of its own."""
     for i in range(times.size):
-        times[i], index[i] = first_hit(
-            chain, Gravity(pull[0, i], pull[1, i], pull[2, i]),
-            position[0, i], position[1, i], position[2, i], velocity[0, i], velocity[1, i], velocity[2, i],
-        )  # fmt: skip
+        gravity = Gravity(pull[0, i], pull[1, i], pull[2, i])
+        times[i], index[i] = first_hit(chain, gravity, column(position, 0, i), column(velocity, 0, i))
 
 
 # --- The level along a flight ----------------------------------------------------------------------------
@@ -189,25 +186,25 @@ def falling_hits(chain, position, velocity, pull, times, index):
 def levels(surface, kind, position, velocity, half_pull):
     """How the polynomials of a surface make its level, and these, as courses of `kind`."""
     rows = [position, velocity] if half_pull is None else [position, velocity, half_pull]
-    path = [kind([kind.number(row[i]) for row in rows]) for i in range(3)]
+    path = vec(kind([kind.number(row[i]) for row in rows]) for i in range(3))
     found = surface.walls()
     body = found[0].body if isinstance(found[0], Rotated) else found[0]
     if isinstance(body, SolidNumbers):
         parts, rest = [], body.parts
         while rest is not None:
-            parts, rest = [*parts, base.level_of(rest.first, base.inner(rest.first, *path))], rest.rest
+            parts, rest = [*parts, contract.level_of(rest.first, contract.inner(rest.first, path))], rest.rest
         return 1, parts
     if isinstance(body, (TorusNumbers, CapsuleNumbers, OwnNumbers)):
-        path = _own(found[0], *path) if isinstance(found[0], Rotated) else path
-        return _by_hand(surface, body, *(axis - c for axis, c in zip(path, body[:3], strict=True)))
-    return 0, [base.level_of(wall, base.inner(wall, *path)) for wall in found]
+        path = own(found[0], path) if isinstance(found[0], Rotated) else path
+        return _by_hand(surface, body, *(path - body.center))
+    return 0, [contract.level_of(wall, contract.inner(wall, path)) for wall in found]
 
 
 def _by_hand(surface, body, x, y, z):
     """The same for what is no quadric."""
     if isinstance(body, TorusNumbers):
         # (|r|^2 + R^2 - a^2)^2 - 4 R^2 rho^2
-        major, minor = Fraction(body.major), Fraction(body.minor)
+        major, minor = Fraction(body.major), Fraction(body.radius)
         both = x * x + y * y + z * z + (major**2 - minor**2)
         return 0, [body.side * (both * both - 4 * major**2 * (x * x + y * y))]
     if isinstance(body, CapsuleNumbers):

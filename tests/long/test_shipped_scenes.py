@@ -21,6 +21,7 @@ WITNESSES = {
     "groove": [sideways],
     "multipliers": [spin],
     "obstacles": [],
+    "splash": [spin],
 }
 
 

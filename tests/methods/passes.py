@@ -1,4 +1,4 @@
-"""Passes and runs in plain Python: what lanes.py does for a lane, in the one place that tests share."""
+"""Passes and runs in plain Python: what swarm/lanes does for a lane, in the one place that tests share."""
 
 from typing import NamedTuple
 from unittest import mock
@@ -7,13 +7,12 @@ import numpy as np
 from conftest import call
 
 import swarm
-from swarm import observables
 from swarm.contact import energy as energies
 from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
 from swarm.kernel.gravity import potential
-from swarm.lanes import block as blocks
-from swarm.methods import base
+from swarm.kernel.vector import vec
+from swarm.methods import contract
 from swarm.status import Status
 from swarm.surfaces import flights
 
@@ -44,46 +43,44 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
-    constants = call(base.lane_constants, numbers, mass, energy / mass, velocity)
-    # What blocks.py seeks.
-    time, wall = call(flights.first_hit, chain, gravity, position, velocity)
-    *state, left, surface = call(
-        base.flight, numbers, chain, gravity, position, velocity, left, *constants, float(time), float(wall), 1.0
-    )
+    constants = call(contract.constants, numbers, mass, energy / mass, velocity)
+    own = call(contract.own, numbers, *map(float, constants))
+    lane = contract.Lane(vec(position), vec(velocity), np.float64(left), 1.0, own)
+    if contract.lands(numbers):
+        end = call(contract.land, numbers, chain, gravity, lane, call(flights.first_hit, chain, gravity, *lane[:2]))
+    else:
+        end = call(contract.flight, numbers, chain, gravity, lane)
+    lane = contract.Lane(end.r, end.v, end.left, 1.0, own)
     kappa, unsolved = 0.0, False
-    if base.most_sweeps(numbers, chain) > 0:
-        kappa, unsolved = call(base.guess, numbers, chain, gravity, *state, left, constants[0], surface)
-    for _ in range(base.most_sweeps(numbers, chain)):
-        kappa, unsolved, *_loop = call(
-            base.improve, numbers, chain, gravity, *state, left, constants[0], surface, kappa, unsolved, 0.0
-        )
-    turned = (0.0, 0.0, 0.0, 0.0)
-    if base.turns(numbers):
-        turned = call(base.turn, numbers, chain, gravity, *state, left, *constants[:2], surface, kappa)
-    *state, left, surface, given, hits, _energy = call(
-        base.contact, numbers, chain, gravity, *state, left, *constants, surface, kappa, unsolved, *turned
-    )
-    impulse = np.zeros((len(scene.surfaces), 1))
-    hard = surface <= base.HARD
+    if contract.most_sweeps(numbers, chain) > 0:
+        kappa, unsolved = call(contract.guess, numbers, chain, gravity, lane, end.wall)
+    for _ in range(contract.most_sweeps(numbers, chain)):
+        solution = contract.Solution(kappa, unsolved, contract.NOT_TURNED)
+        kappa, unsolved, _record = call(contract.improve, numbers, chain, gravity, lane, end.wall, solution, 0.0)
+    turned = contract.NOT_TURNED
+    if contract.turns(numbers):
+        turned = call(contract.turn, numbers, chain, gravity, lane, end.wall, kappa)
+    solution = contract.Solution(kappa, unsolved, turned)
+    contact = call(contract.contact, numbers, chain, gravity, lane, end.wall, solution)
+    impulse, wall = np.zeros((len(scene.surfaces), 1)), contact.wall
+    hard = wall <= contract.HARD
     if hard:
-        surface = base.HARD - surface
+        wall, lanes = contract.HARD - wall, _Lanes(impulse, np.zeros((uzawa.RECORDS, 1)))
+        lane = contract.Lane(contact.r, contact.v, contact.left, 1.0, own)
         with np.errstate(all="ignore"):
-            *state, left, hits, _energy, status = base.hard_pass(
-                numbers,
-                chain,
-                gravity,
-                *state,
-                left,
-                *map(float, constants),
-                surface,
-                impulse,
-                np.zeros((uzawa.RECORDS, 1)),
-                0,
-            )
+            contact, status = contract.hard_pass(numbers, chain, gravity, lane, wall, lanes, 0)
         assert status == Status.DONE, Status(status).name
-    elif surface >= 0.0:
-        impulse[int(surface), 0] += given
-    return Pass(np.array(state[:3]), np.array(state[3:]), left, surface, hard, impulse[:, 0], hits)
+    elif wall >= 0.0:
+        impulse[int(wall), 0] += contact.impulse
+    ends = np.array(contact.r), np.array(contact.v)
+    return Pass(*ends, contact.left, wall, hard, impulse[:, 0], contact.hits)
+
+
+class _Lanes(NamedTuple):
+    """What `hard_pass` writes into."""
+
+    impulse: np.ndarray
+    record: np.ndarray
 
 
 def run(method, scene, position, velocity, left, mass=1.0, restores=True):
@@ -102,15 +99,4 @@ def run(method, scene, position, velocity, left, mass=1.0, restores=True):
 
 def simulate(scene, particles, method, until, every=None):
     """`swarm.simulate` without the compiler."""
-    with (
-        mock.patch.multiple(blocks, advance_block=_plain(blocks.advance_block)),
-        mock.patch.multiple(
-            observables, start_energies=_plain(observables.start_energies), observe=_plain(observables.observe)
-        ),
-        np.errstate(all="ignore"),
-    ):
-        return swarm.simulate(scene, particles, method, until=until, every=every, threads=1)
-
-
-def _plain(kernel):
-    return getattr(kernel, "py_func", kernel)
+    return swarm.simulate(scene, particles, method, until=until, every=every, compile="never")

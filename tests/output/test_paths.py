@@ -28,7 +28,7 @@ def test_what_is_no_path(name, value):
 def test_two_outputs_are_two_files(tmp_path, monkeypatch, recording):
     monkeypatch.chdir(tmp_path)
     Path("link.h5").symlink_to("run.h5")
-    with pytest.raises(swarm.SceneError, match=r"recording: .* is the (trajectory|checkpoint) too"):
+    with pytest.raises(swarm.SceneError, match=r"recording: .* is also the (trajectory|checkpoint)"):
         run("run.h5", recording=recording, overwrite=True)
     assert sorted(os.listdir()) == ["link.h5"]
 
@@ -36,7 +36,7 @@ def test_two_outputs_are_two_files(tmp_path, monkeypatch, recording):
 def test_a_hard_link_is_the_same_file(tmp_path):
     (tmp_path / "a").touch()
     os.link(tmp_path / "a", tmp_path / "b")
-    with pytest.raises(swarm.SceneError, match=r"picture: .*b is the trajectory too"):
+    with pytest.raises(swarm.SceneError, match=r"picture: .*b is also the trajectory"):
         paths.check_distinct({"picture": tmp_path / "b"}, {"trajectory": tmp_path / "a"})
     paths.check_distinct({"picture": tmp_path / "c", "nothing": None}, {"trajectory": tmp_path / "a"})
 

@@ -156,7 +156,7 @@ def test_the_checksum_is_that_of_hdf5(tmp_path):
     ("harm", "message"),
     [
         (os.remove, "was deleted or replaced while the run was writing it"),
-        (lambda path: os.truncate(path, 3000), "was cut while the run was writing it, from .* to 3000 bytes"),
+        (lambda path: os.truncate(path, 3000), "was truncated while the run was writing it, from .* to 3000 bytes"),
         (lambda path: shutil.copy(path, f"{path}.x") and os.replace(f"{path}.x", path), "was deleted or replaced"),
     ],
     ids=["deleted", "truncated", "replaced"],

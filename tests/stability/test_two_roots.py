@@ -6,7 +6,9 @@ from conftest import call
 
 import swarm
 from swarm.contact import impulse
+from swarm.contact.records import Step
 from swarm.contact.regularisation import regularisation
+from swarm.kernel.vector import vec
 
 pytestmark = pytest.mark.physics
 
@@ -49,7 +51,8 @@ def roots(axes, start, free, alpha):
 def taken(axes, start, free, alpha):
     """The root that a contact takes."""
     (numbers,) = swarm.Ellipsoid(tuple(axes)).walls()
-    kappa, solved = call(impulse.careful, regularisation(alpha, 1.0), None, numbers, start, free, 1.0)
+    step = Step(vec(start), vec(free), np.float64(1.0))
+    kappa, solved = call(impulse.careful, regularisation(alpha, 1.0), None, numbers, step)
     assert solved
     return kappa
 

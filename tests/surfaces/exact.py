@@ -9,10 +9,12 @@ import numpy as np
 from conftest import EPSILON, body_of, call
 from numpy.polynomial import Polynomial
 
-from swarm.surfaces import base
+from swarm.kernel.vector import vec
+from swarm.surfaces import contract
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
-from swarm.surfaces.shapes.rotated import _own
+from swarm.surfaces.shapes.quadratic import QuadricNumbers
+from swarm.surfaces.shapes.rotated import own
 from swarm.surfaces.shapes.torus import TorusNumbers
 
 mp.mp.dps = 50
@@ -28,7 +30,7 @@ def flight(surface, position, velocity, acceleration=_REST):
     """The coordinates of a flight in the surface's own frame, as exact polynomials of time."""
     halves = exact(acceleration) / 2
     path = [Polynomial(np.array(axis)) for axis in zip(exact(position), exact(velocity), halves, strict=True)]
-    return _own(surface, *path) if isinstance(surface, Rotated) else path
+    return own(surface, vec(path)) if isinstance(surface, Rotated) else vec(path)
 
 
 class Level(NamedTuple):
@@ -75,12 +77,12 @@ def level_along(surface, position, velocity, acceleration=_REST):
     unit = mp.mpf(surface_size(surface) / max(np.linalg.norm(velocity), 1e-300))
     if isinstance(body, TorusNumbers):
         # (|r|^2 + R^2 - a^2)^2 - 4 R^2 rho^2
-        x, y, z = path[0] - mp.mpf(body.cx), path[1] - mp.mpf(body.cy), path[2] - mp.mpf(body.cz)
-        major, minor = mp.mpf(body.major), mp.mpf(body.minor)
+        x, y, z = path - vec(map(mp.mpf, body.center))
+        major, minor = mp.mpf(body.major), mp.mpf(body.radius)
         both = x * x + y * y + z * z + (major**2 - minor**2)
         return Level([body.side * (both * both - 4 * major**2 * (x * x + y * y))], [mp.inf], unit)
     if isinstance(body, CapsuleNumbers):
-        x, y, z = path[0] - mp.mpf(body.cx), path[1] - mp.mpf(body.cy), path[2] - mp.mpf(body.cz)
+        x, y, z = path - vec(map(mp.mpf, body.center))
         half = mp.mpf(body.half)
         ends = sorted(root for end in (-half, half) for root in real_roots(z - end, unit) if root > 0)
         inner = []
@@ -89,14 +91,14 @@ def level_along(surface, position, velocity, acceleration=_REST):
             w = z - half if middle > half else z + half if middle < -half else Polynomial([mp.mpf(0)])
             inner.append(x * x + y * y + w * w)
         return Level([body.side * (q - mp.mpf(body.radius) ** 2) for q in inner], [*ends, mp.inf], unit)
-    return Level([base.level_of(surface, base.inner(body, *path))], [mp.inf], unit)
+    return Level([contract.level_of(surface, contract.inner(body, path))], [mp.inf], unit)
 
 
 def surface_size(surface):
     """A length of the surface, for times."""
     body = body_of(surface)
-    curvature = max(abs(getattr(body, axis, 0.0)) for axis in ("ax", "ay", "az"))
-    return getattr(body, "minor", None) or getattr(body, "radius", None) or (curvature or 1.0) ** -0.5
+    curvature = _curvature(surface) if isinstance(body, QuadricNumbers) else 1.0
+    return getattr(body, "radius", None) or (curvature or 1.0) ** -0.5
 
 
 def _ways(velocity, time, acceleration):
@@ -108,14 +110,16 @@ def _factor(surface, far):
     """How much larger than the level its stand-in here is at most, at this distance from the origin."""
     body = body_of(surface)
     # (rho + R)^2 + z^2 - a^2
-    return (2.0 * (far + body.major + abs(body.cx) + abs(body.cy))) ** 2 if isinstance(body, TorusNumbers) else 1.0
+    if not isinstance(body, TorusNumbers):
+        return 1.0
+    return (2.0 * (far + body.major + abs(body.center.x) + abs(body.center.y))) ** 2
 
 
 def steepness(surface, position, velocity, time=0.0, acceleration=_REST):
     """The largest derivative of the level that a flight of this speed can have."""
     ways = _ways(velocity, time, acceleration)
     bend = abs(_curvature(surface))
-    slope = np.linalg.norm(call(base.inner_gradient, surface, position, position)) + 2.0 * bend * ways
+    slope = np.linalg.norm(call(contract.inner_gradient, surface, position, position)) + 2.0 * bend * ways
     fastest = np.linalg.norm(velocity) + np.linalg.norm(acceleration) * time
     return slope * fastest * _factor(surface, np.linalg.norm(position) + ways)
 
@@ -123,8 +127,8 @@ def steepness(surface, position, velocity, time=0.0, acceleration=_REST):
 def _curvature(surface):
     """The largest eigenvalue of H, about."""
     body = body_of(surface)
-    if hasattr(body, "ax"):
-        return max(abs(body.ax), abs(body.ay), abs(body.az))
+    if isinstance(body, QuadricNumbers):
+        return max(map(abs, body.a))
     return 0.0 if hasattr(body, "offset") else 1.0
 
 
@@ -132,8 +136,8 @@ def noise(surface, level, position, velocity, time=0.0, acceleration=_REST):
     """The round-off of the level at a time of a flight: a few units in the last place of its largest terms."""
     ways = _ways(velocity, time, acceleration)
     far = np.linalg.norm(position) + ways
-    slope = np.linalg.norm(call(base.inner_gradient, surface, position, position))
-    terms = abs(call(base.inner, surface, position)) + abs(base.level_of(surface, 0.0))
+    slope = np.linalg.norm(call(contract.inner_gradient, surface, position, position))
+    terms = abs(call(contract.inner, surface, position)) + abs(contract.level_of(surface, 0.0))
     terms += slope * far + _curvature(surface) * ways * ways
     # A torus may be seen from its axis, where slopes are steep.
     terms += far * far if isinstance(body_of(surface), TorusNumbers) else 0.0

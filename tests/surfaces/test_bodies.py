@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.surfaces import rotation
-from swarm.surfaces.chain import chain_of
 from swarm.surfaces.flights import first_hit
+from swarm.surfaces.fold import chain_of
 from swarm.surfaces.shapes.plane import PlaneNumbers
 from swarm.surfaces.shapes.slab import SlabNumbers
 
@@ -155,21 +155,3 @@ def test_a_beam_along_the_axis_of_a_cone_comes_back_from_the_apex():
     assert result.observables["energy_error"].max() <= 1e-14
     # The flight at the apex is a double root, of which half the digits are known.
     assert result.observables["max_penetration"].max() <= 1e-8
-
-
-@pytest.mark.parametrize(
-    ("build", "parts"),
-    [
-        (lambda: swarm.Box((1.0, 0.0, 1.0)), ["half_widths[1]", "above 0", "got 0"]),
-        (lambda: swarm.Box((1.0, 1.0)), ["half_widths", "three numbers", "got 2"]),
-        (lambda: swarm.Box((1, 1, 1), open=["+w"]), ["open[0]", "'+x'", "got '+w'"]),
-        (lambda: swarm.Box((1, 1, 1), open=["+x", "-y", "+x"]), ["open", "'+x' twice"]),
-        (lambda: swarm.Box((1, 1, 1), open="+x"), ["open", "list of faces", "'+x'"]),
-        (lambda: swarm.Box((1, 1, 1), open=["-x", "+x", "-y", "+y", "-z", "+z"]), ["open", "all six"]),
-        (lambda: swarm.Box((1, 1, 1), side="outside", open=["+x"]), ["open", "outside", "['+x']"]),
-    ],
-)
-def test_errors_name_the_argument(build, parts):
-    with pytest.raises(swarm.SceneError) as caught:
-        build()
-    assert all(part in str(caught.value) for part in parts), str(caught.value)

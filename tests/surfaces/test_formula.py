@@ -1,6 +1,7 @@
 """Formulas against the surfaces they describe, and the bounds that make their first hits sure."""
 
 import math
+import types
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm import tables
-from swarm.surfaces import base, smooth
-from swarm.surfaces.formulas import own
+from swarm.surfaces import contract
+from swarm.surfaces.formulas import derivatives, march
 from swarm.surfaces.formulas.interval import Interval, bounds_of
+from swarm.surfaces.surface import UNBOUNDED
 
 ELLIPSOID = "x**2/0.09 + y**2/0.16 + z**2/0.25 - 1"
 PILL = "x**2/0.09 + y**2/0.09 + z**4/0.13 - 1"
@@ -36,26 +38,24 @@ def test_derivatives(text):
     exact = sympy.sympify(text)
     at = {axis: sympy.Float(float(value), 40) for axis, value in zip(axes, point, strict=True)}
     value = lambda expression: float(expression.evalf(40, subs=at))  # noqa: E731
-    assert call(base.phi, numbers, point) == pytest.approx(value(exact), rel=1e-13, abs=1e-14)
+    assert call(contract.phi, numbers, point) == pytest.approx(value(exact), rel=1e-13, abs=1e-14)
     gradient = [value(exact.diff(axis)) for axis in axes]
-    assert call(base.gradient, numbers, point) == pytest.approx(gradient, rel=1e-13, abs=1e-13)
+    assert call(contract.gradient, numbers, point) == pytest.approx(gradient, rel=1e-13, abs=1e-13)
     x, y, z = axes
     seconds = [value(exact.diff(*pair)) / 2 for pair in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))]
-    assert call(smooth.hessian, numbers, point) == pytest.approx(seconds, rel=1e-12, abs=1e-13)
+    assert call(contract.hessian, numbers, point) == pytest.approx(seconds, rel=1e-12, abs=1e-13)
 
 
 def test_small_powers_are_products(monkeypatch):
     written = []
-    monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_none()))
-    from swarm.surfaces.formulas import derivatives
-
+    monkeypatch.setattr("builtins.exec", lambda text, scope: written.append(text) or scope.update(_functions()))
     derivatives.derived.__wrapped__("x**4 + y**3 + z**-2 + x**2.5 - 1", ())
     assert written
     assert not any("**" in text for text in written)
 
 
-def _none():
-    return dict.fromkeys(("phi", "gradient", "hessian"))
+def _functions():
+    return {name: types.SimpleNamespace() for name in ("phi", "gradient", "hessian")}
 
 
 # --- Against the surfaces with a closed form -------------------------------------------------------------
@@ -75,10 +75,10 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
     compared = 0
     while compared < 200:
         point, velocity = np.array(center) + random.uniform(-1.2, 1.2, 3), random.standard_normal(3)
-        if other.side * call(base.phi, other, point) > -1e-6:
+        if other.side * call(contract.phi, other, point) > -1e-6:
             continue
         compared += 1
-        (time, found), (expected, _) = (call(base.first_hit, one, point, velocity) for one in (formula, other))
+        (time, found), (expected, _) = (call(contract.first_hit, one, point, velocity) for one in (formula, other))
         assert found
         # A flight that all but touches may hit for one and miss for the other.
         if math.isfinite(time) and math.isfinite(expected):
@@ -89,7 +89,7 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
 
 def _grazes(surface, point, velocity, time):
     place = point + time * velocity
-    normal = np.array(call(base.unit_normal, surface, place))
+    normal = np.array(call(contract.unit_normal, surface, place))
     return abs(normal @ velocity) < 1e-6 * np.linalg.norm(velocity)
 
 
@@ -142,7 +142,7 @@ EXPRESSIONS = [
 @pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
 @given(across=_ends, along=_ends)
 def test_an_interval_holds_every_value(expression, across, along):
-    found = bounds_of(expression, {X: Interval(*across), Y: Interval(*along)}, {})
+    found = bounds_of(expression, {X: Interval(*across), Y: Interval(*along)})
     value = sympy.lambdify((X, Y), expression, "numpy")
     points = np.meshgrid(np.linspace(*across, 9), np.linspace(*along, 9))
     with np.errstate(all="ignore"):
@@ -175,9 +175,9 @@ def test_the_bend_bounds_second_derivatives(text, side):
     numbers = form.numbers((0.0, 0.0, 0.0))
     low, high = np.array(form.box)
     for point in random.uniform(low, high, (200, 3)):
-        if numbers.side * call(base.phi, numbers, point) > 0.0:
+        if numbers.side * call(contract.phi, numbers, point) > 0.0:
             continue
-        xx, yy, zz, xy, yz, zx = (numbers.side * part for part in call(smooth.hessian, numbers, point))
+        xx, yy, zz, xy, yz, zx = (numbers.side * part for part in call(contract.hessian, numbers, point))
         matrix = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
         values = np.linalg.eigvalsh(matrix)
         assert form.bend.least <= values[0] + 1e-12
@@ -190,7 +190,7 @@ def test_the_bend_bounds_second_derivatives(text, side):
 @pytest.mark.long
 def test_an_open_volume_is_open():
     tube = swarm.Formula("x**2 + y**2 - 0.25")
-    assert tube.bounds() == base.UNBOUNDED
+    assert tube.bounds() == UNBOUNDED
     scene = swarm.Scene([tube, swarm.Plane((0, 0, 1), 0.5), swarm.Plane((0, 0, -1), 0.5)])
     start = swarm.Particles([[0.1], [0.0], [0.0]], [[1.0], [0.0], [0.5]])
     result = swarm.simulate(scene, start, swarm.Impact(), until=1.0)
@@ -317,7 +317,7 @@ def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
     for point, velocity in zip(start.T, start.T[::-1] + 0.1, strict=True):
         (numbers,) = surface.walls()
         for _ in range(5):
-            time, found = call(base.first_hit, numbers, point, velocity)
+            time, found = call(contract.first_hit, numbers, point, velocity)
             if time == math.inf:
                 break
             along = point[:, None] + velocity[:, None] * time * np.linspace(0.0, 1.0, 50)
@@ -325,8 +325,8 @@ def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
             if not found:
                 point = along[:, -1]
                 continue
-            point = call(base.settle, numbers, along[:, -1])
-            normal = np.array(call(base.unit_normal, numbers, np.array(point)))
+            point = call(contract.settle, numbers, along[:, -1])
+            normal = np.array(call(contract.unit_normal, numbers, np.array(point)))
             point, velocity = np.array(point), velocity - 2.0 * (normal @ velocity) * normal
 
 
@@ -373,4 +373,4 @@ def test_a_scene_file_names_its_key(table, said):
 def test_other_values_of_parameters_are_the_same_code():
     kinds = {swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": r})._form.kind for r in (0.1, 2.0)}
     assert len(kinds) == 1
-    assert issubclass(kinds.pop(), own.OwnNumbers)
+    assert issubclass(kinds.pop(), march.OwnNumbers)

@@ -5,6 +5,7 @@ import pytest
 
 import swarm
 from swarm.kernel.gravity import Gravity, accelerated, displacement
+from swarm.kernel.vector import vec
 from swarm.surfaces import rotation as rotations
 from swarm.surfaces.flights import first_hit
 
@@ -32,17 +33,17 @@ FALLS = {"straight": None, "falling": Gravity(0.3, -0.5, -1.0)}
 
 def follow(chain, gravity, position, velocity, until):
     """Where the flight hits, or None if it does not until then; and when."""
-    time = 0.0
+    time, position, velocity = 0.0, vec(position), vec(velocity)
     for _leg in range(_LEGS):
         with np.errstate(divide="ignore", invalid="ignore"):
-            wait, wall = first_hit(chain, gravity, *position, *velocity)
+            wait, wall = first_hit(chain, gravity, position, velocity)
         if time + wait > until:
             return None, until
-        position = position + displacement(gravity, *velocity, wait)
-        velocity = np.array(accelerated(gravity, *velocity, wait))
+        position = position + displacement(gravity, velocity, wait)
+        velocity = accelerated(gravity, velocity, wait)
         time += wait
         if wall >= 0.0:
-            return position, time
+            return np.array(position), time
     raise AssertionError(f"no hit, and no end, in {_LEGS} legs")
 
 
@@ -91,7 +92,7 @@ def test_a_flight_past_a_ball_does_not_meet_it(fall, size):
     scene, gravity, random = swarm.Scene([SOLIDS["ball"](size)]), FALLS[fall], np.random.default_rng(8)
     for _flight in range(20):
         start, velocity, there = aimed(CENTER, gravity, random)
-        across = np.cross(accelerated(gravity, *velocity, there), random.standard_normal(3))
+        across = np.cross(accelerated(gravity, vec(velocity), there), random.standard_normal(3))
         past = (1.0 + 1e-3) * size * across / np.linalg.norm(across)
         hit, _time = follow(scene.chain(), gravity, start + past, velocity, 2.0 * there)
         assert hit is None

@@ -16,10 +16,12 @@ from conftest import call
 
 import swarm
 from swarm import tables
-from swarm.kernel import jit as _jit
+from swarm.kernel import cache, frozen
+from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
-from swarm.surfaces import base, smooth
-from swarm.surfaces.formulas import frozen, own
+from swarm.surfaces import contract
+from swarm.surfaces.formulas import code, march
+from swarm.surfaces.surface import UNBOUNDED
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
 
@@ -67,11 +69,11 @@ def test_first_hits_are_those_of_the_ellipsoid(side, curvature):
     compared = 0
     while compared < 200:
         point, velocity = random.uniform(-0.8, 0.8, 3), random.standard_normal(3)
-        if reference.side * call(base.phi, reference, point) <= -1e-6:
+        if reference.side * call(contract.phi, reference, point) <= -1e-6:
             compared += 1
-            time, found = call(base.first_hit, numbers, point, velocity)
+            time, found = call(contract.first_hit, numbers, point, velocity)
             assert found
-            assert time == pytest.approx(call(base.first_hit, reference, point, velocity)[0], rel=1e-9)
+            assert time == pytest.approx(call(contract.first_hit, reference, point, velocity)[0], rel=1e-9)
 
 
 def test_a_flight_that_falls_meets_the_solid_again():
@@ -91,7 +93,7 @@ def sum_of_hits(surface, point, velocity, pull):
     """The time of the first hit, in as many parts as it takes; infinite far below."""
     total = 0.0
     while point[2] > -2.0:
-        time, found = call(base.falling_hit, surface, point, velocity, pull)
+        time, found = call(contract.falling_hit, surface, point, velocity, pull)
         total += time
         if found:
             return total
@@ -100,7 +102,7 @@ def sum_of_hits(surface, point, velocity, pull):
 
 
 def test_second_derivatives_are_differences():
-    xx, yy, zz, xy, yz, zx = call(smooth.hessian, ellipsoid().numbers(), np.array([0.1, 0.2, 0.3]))
+    xx, yy, zz, xy, yz, zx = call(contract.hessian, ellipsoid().numbers(), np.array([0.1, 0.2, 0.3]))
     assert (xx, yy, zz) == pytest.approx((1 / 0.09, 1 / 0.16, 1 / 0.25), rel=1e-8)
     assert (xy, yz, zx) == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
 
@@ -108,8 +110,8 @@ def test_second_derivatives_are_differences():
 def test_bounds_and_table():
     surface = ellipsoid(center=(1.0, 0.0, 0.0))
     assert surface.bounds() == ((0.69, -0.41, -0.51), (1.31, 0.41, 0.51))
-    assert ellipsoid(side="outside").bounds() == base.UNBOUNDED
-    assert ellipsoid(bounds=((-0.2, -0.2, -0.2), (0.4, 0.4, 0.4))).bounds() == base.UNBOUNDED
+    assert ellipsoid(side="outside").bounds() == UNBOUNDED
+    assert ellipsoid(bounds=((-0.2, -0.2, -0.2), (0.4, 0.4, 0.4))).bounds() == UNBOUNDED
     table = tables.table_of(surface)
     assert table["kind"] == "own"
     assert table["parameters"] == {"a": 0.3, "b": 0.4, "c": 0.5}
@@ -356,24 +358,22 @@ def test_a_constant_that_changes_is_another_surface():
     scope["C"] = 4.0
     two = build()
     assert type(one.numbers()) is not type(two.numbers())
-    flights = [first_hit_of(surface.numbers(), 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)[0] for surface in (one, two)]
+    flights = [first_hit_of(surface.numbers(), Vec(0.0, 0.0, 0.0), Vec(1.0, 0.0, 0.0))[0] for surface in (one, two)]
     assert flights == [1.0, 2.0]
 
 
-first_hit_of = numba.njit(error_model="numpy")(
-    lambda surface, x, y, z, u, v, w: base.first_hit(surface, x, y, z, u, v, w)
-)
+first_hit_of = numba.njit(error_model="numpy")(lambda surface, r, v: contract.first_hit(surface, r, v))
 
 
 def test_the_class_of_another_process_is_found_by_its_name():
     name = "Own_0123456789abcdef"
-    kind = getattr(own, name)
-    assert kind is getattr(own, name)
-    assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.formulas.own", name)
-    assert issubclass(kind, own.OwnNumbers)
+    kind = getattr(code, name)
+    assert kind is getattr(code, name)
+    assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.formulas.code", name)
+    assert issubclass(kind, march.OwnNumbers)
     for wrong in ("Own_0123", "Own_0123456789abcdeg", "Own", "Own_0123456789abcdef0"):
         with pytest.raises(AttributeError):
-            getattr(own, wrong)
+            getattr(code, wrong)
 
 
 # --- The cache, with real processes ----------------------------------------------------------------------
@@ -383,7 +383,7 @@ import sys
 from typing import NamedTuple
 import kernel, shapes, swarm
 from shapes import halved
-from swarm.surfaces import base
+from swarm.kernel.vector import Vec
 
 class Parameters(NamedTuple):
     r: float
@@ -398,7 +398,7 @@ def gradient(p, x, y, z):
 
 surface = swarm.OwnSurface(Parameters(0.5), phi, gradient, size=0.5, curvature=100.0)
 {extra}
-total = kernel.total(surface.numbers(), 0.1, 0.2, 0.05, 0.3, -0.2, 0.1)
+total = kernel.total(surface.numbers(), Vec(0.1, 0.2, 0.05), Vec(0.3, -0.2, 0.1))
 stats = kernel.total.stats
 print(total, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
@@ -409,18 +409,18 @@ def halved(x): return {halved}
 """
 # A kernel of the package's kind that compiles in seconds.
 KERNEL = """
-from swarm._jit import kernel
-from swarm.surfaces import base
+from swarm.kernel.jit import kernel
+from swarm.kernel.vector import dot
+from swarm.surfaces import contract
 
 @kernel
-def total(surface, x, y, z, vx, vy, vz):
+def total(surface, r, v):
     sum = 0.0
     for i in range(5):
-        t, found = base.first_hit(surface, x, y, z, vx, vy, vz)
-        x, y, z = x + t * vx, y + t * vy, z + t * vz
-        nx, ny, nz = base.unit_normal(surface, x, y, z)
-        b = 2.0 * (vx * nx + vy * ny + vz * nz)
-        vx, vy, vz = vx - b * nx, vy - b * ny, vz - b * nz
+        t, found = contract.first_hit(surface, r, v)
+        r = r + t * v
+        n = contract.unit_normal(surface, r)
+        v = v - (2.0 * dot(v, n)) * n
         sum += t
     return sum
 """
@@ -503,7 +503,7 @@ def test_processes_that_share_a_cache_do_not_break_one_another(run):
 SIMULATE = """
 particles = swarm.Particles([[0.1], [0.2], [0.05]], [[0.3], [-0.2], [0.1]])
 result = swarm.simulate(swarm.Scene([surface]), particles, swarm.Impact(), until=20.0)
-from swarm import blocks
+from swarm.lanes import block as blocks
 stats = blocks.advance_block.stats
 print(result.particles.position[0, 0], sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 sys.exit()
@@ -530,4 +530,5 @@ def test_sympy_is_loaded_only_for_a_formula():
 
 def test_kernels_of_the_package_are_known_by_its_folder():
     assert "swarm" in frozen._VERSIONS
-    assert _jit.cache_folder().name == _jit._source_hash()
+    assert cache.cache_folder().parent == cache._base()
+    assert set(cache.sources()) >= set(Path(swarm.__file__).parent.glob("surfaces/**/*.py"))

@@ -10,7 +10,7 @@ from exact import level_along, noise
 from test_surfaces import check_hit, start
 
 import swarm
-from swarm.surfaces import base, smooth
+from swarm.surfaces import contract
 from swarm.surfaces import rotation as rotations
 
 every_march = pytest.mark.parametrize("name", ITERATED)
@@ -31,7 +31,7 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
         pull = heavy * scale * rng.uniform(-1.0, 1.0, 3)
         left = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
         for _ask in range(100):
-            time, found = call(smooth._march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
+            time, found = call(contract.march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
             check_hit(surface, position, velocity, pull, time, found, left)
             left -= time
             if found or left < 0.0:
@@ -43,7 +43,7 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
 
 def in_own_frame(surface, *vectors):
     """Vectors as the surface's body sees them."""
-    turn = np.array(surface[1:]).reshape(3, 3) if surface is not body_of(surface) else np.eye(3)
+    turn = np.array(surface[1:]) if surface is not body_of(surface) else np.eye(3)
     return [turn.T @ vector for vector in vectors]
 
 
@@ -55,7 +55,7 @@ def test_a_long_fall_does_not_outrun_its_clearance(name, speed):
     position, pull = np.array([0.5, 0.2, 40.0]), np.array([0.0, 0.0, -9.81])
     velocity, total = np.array([0.0, 0.0, -speed]), 0.0
     for _ask in range(50):
-        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        time, found = call(contract.falling_hit, surface, position, velocity, pull)
         level = level_along(surface, position, velocity, pull)
         assert level.highest(time) <= noise(surface, level, position, velocity, time, pull)
         total += time
@@ -63,7 +63,7 @@ def test_a_long_fall_does_not_outrun_its_clearance(name, speed):
         if found:
             break
     assert found
-    assert abs(call(base.phi, surface, position)) <= 1e-14
+    assert abs(call(contract.phi, surface, position)) <= 1e-14
 
 
 # --- The capsule -----------------------------------------------------------------------------------------
@@ -75,10 +75,10 @@ def test_the_closed_form_of_the_capsule_is_the_march(side):
     hits = 0
     for _ in range(500):
         position, velocity = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
-        if capsule.side * call(base.phi, capsule, position) > 0.0:
+        if capsule.side * call(contract.phi, capsule, position) > 0.0:
             continue
-        time, found = call(base.first_hit, capsule, position, velocity)
-        marched, _found = call(smooth._march, capsule, position, velocity, np.zeros(3))
+        time, found = call(contract.first_hit, capsule, position, velocity)
+        marched, _found = call(contract.march, capsule, position, velocity, np.zeros(3))
         assert found
         if time == math.inf:
             assert marched > 1e9
@@ -96,13 +96,16 @@ def test_along_the_axis_of_a_capsule(scale):
         for sign in (1.0, -1.0):
             way = np.array([0.0, 0.0, sign])
             exact = mp.mpf(1) + mp.sqrt(mp.mpf(0.5 * scale) ** 2 - mp.mpf(off * scale) ** 2) / mp.mpf(scale)
-            time, _found = call(base.first_hit, cavity, scale * np.array([off, 0.0, 0.0]), way)
+            time, _found = call(contract.first_hit, cavity, scale * np.array([off, 0.0, 0.0]), way)
             assert time == pytest.approx(float(exact) * scale, rel=1e-14, abs=1e-7 * scale * (off > 0.4))
     rod = cavity._replace(side=-1.0)
-    time, _found = call(base.first_hit, rod, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
+    time, _found = call(contract.first_hit, rod, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
     assert time == pytest.approx(4.0 - 0.4, rel=1e-14)
     for position in ([0.3, 0.0, 5.0], [0.6, 0.0, -5.0], [0.5 + 1e-12, 0.0, 0.0]):
-        assert call(base.first_hit, rod, scale * np.array(position), np.array([0.0, 0.0, scale])) == (math.inf, True)
+        assert call(contract.first_hit, rod, scale * np.array(position), np.array([0.0, 0.0, scale])) == (
+            math.inf,
+            True,
+        )
 
 
 def test_a_capsule_of_no_length_is_a_sphere():
@@ -112,7 +115,7 @@ def test_a_capsule_of_no_length_is_a_sphere():
     assert capsule.phi(points) == pytest.approx(sphere.phi(points), abs=1e-15)
     for _ in range(50):
         position, velocity = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
-        times = [call(base.first_hit, surface.numbers(), position, velocity)[0] for surface in (capsule, sphere)]
+        times = [call(contract.first_hit, surface.numbers(), position, velocity)[0] for surface in (capsule, sphere)]
         assert times[0] == pytest.approx(times[1], rel=1e-14)
 
 
@@ -135,8 +138,8 @@ def test_the_discrete_gradient_is_exact_across_the_end_of_the_cylinder():
     for step in (1e-12, 1e-6, 1e-2):
         first = np.array([0.3, 0.4, 0.5 - 0.5 * step])
         second = first + step * np.array([0.1, -0.2, 1.0])
-        discrete = np.array(call(base.inner_gradient, capsule, first, second))
-        rise = call(smooth.difference, capsule, first, second)
+        discrete = np.array(call(contract.inner_gradient, capsule, first, second))
+        rise = call(contract.difference, capsule, first, second)
         assert discrete @ (second - first) == pytest.approx(rise, abs=4 * EPSILON * step)
         assert discrete == pytest.approx([0.6, 0.8, 0.0], abs=2.0 * step + 1e-15)
 

@@ -1,20 +1,19 @@
-"""What is derived from a formula: derivatives by SymPy; bounds of them, and its box, by interval arithmetic."""
+"""What is derived from a formula: derivatives by SymPy, functions of them; their bounds, and its box, by intervals."""
 
 import functools
 import itertools
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import SceneError
-from .. import base
-from . import corners
+from ..surface import Box, side_sign
 from .expression import COORDINATES, Piece, parse
 from .form import Form
-from .generated import function_of
-from .interval import Interval, bounds_of
-from .owned import Bend
+from .interval import Cells, check_constants, check_smooth
+from .march import Bend
 
 # Operations of the derivatives: beyond, deriving and compiling them would take minutes.
 _MOST_OPERATIONS = 4000
@@ -36,23 +35,13 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
     pieces: list[Piece] = []
     phi = parse(text, names, pieces)
     x, y, z = axes = tuple(map(sympy.Symbol, COORDINATES))
-    gradient = [sympy.diff(phi, axis) for axis in axes]
+    gradient = tuple(sympy.diff(phi, axis) for axis in axes)
     _check_length(gradient)
-    pairs = [(0, x), (1, y), (2, z), (0, y), (1, z), (2, x)]
-    hessian = [sympy.diff(gradient[i], axis) / 2 for i, axis in pairs]
+    pairs = ((0, x), (1, y), (2, z), (0, y), (1, z), (2, x))
+    hessian = tuple(sympy.diff(gradient[i], axis) / 2 for i, axis in pairs)
     _check_length(hessian)
-    functions = (
-        function_of(name, rows) for name, rows in (("phi", [phi]), ("gradient", gradient), ("hessian", hessian))
-    )
-    return Derived(
-        phi,
-        tuple(gradient),
-        tuple(hessian),
-        tuple(pieces),
-        tuple(sympy.Symbol(f"p{i}") for i in range(len(names))),
-        axes,
-        *functions,
-    )
+    functions = (_function("phi", (phi,)), _function("gradient", gradient), _function("hessian", hessian))
+    return Derived(phi, gradient, hessian, tuple(pieces), axes, functions)
 
 
 def _check_length(rows: Sequence[Any]) -> None:
@@ -64,50 +53,36 @@ def _check_length(rows: Sequence[Any]) -> None:
 
 
 class Derived(NamedTuple):
-    """A formula, its first and (half) its second derivatives as expressions, and as functions."""
+    """A formula, its gradient and H, half its second derivatives, as expressions and as functions."""
 
-    expression: Any
-    slopes: tuple[Any, ...]
-    seconds: tuple[Any, ...]
-    pieces: tuple[Piece, ...]
-    symbols: tuple[Any, ...]
-    axes: tuple[Any, ...]
     phi: Any
-    gradient: Any
-    hessian: Any
+    gradient: tuple[Any, ...]
+    hessian: tuple[Any, ...]
+    pieces: tuple[Piece, ...]
+    axes: tuple[Any, ...]
+    functions: tuple[Any, ...]
 
     def with_values(self, values: tuple[float, ...]) -> "Derived":
         """The expressions with numbers in place of the parameters."""
         import sympy
 
-        numbers = {symbol: sympy.Rational(value) for symbol, value in zip(self.symbols, values, strict=True)}
+        numbers = {sympy.Symbol(f"p{i}"): sympy.Rational(value) for i, value in enumerate(values)}
         pieces = tuple(one._replace(argument=one.argument.subs(numbers)) for one in self.pieces)
-        corners.check_constants(pieces)
-        slopes, seconds = (tuple(one.subs(numbers) for one in rows) for rows in (self.slopes, self.seconds))
-        return self._replace(expression=self.expression.subs(numbers), slopes=slopes, seconds=seconds, pieces=pieces)
+        check_constants(pieces)
+        gradient, hessian = (tuple(one.subs(numbers) for one in rows) for rows in (self.gradient, self.hessian))
+        return Derived(self.phi.subs(numbers), gradient, hessian, pieces, self.axes, self.functions)
 
-    def in_cells(self, cells: dict[Any, Interval]) -> Interval:
-        """Bounds of phi."""
-        return bounds_of(self.expression, cells, {})
-
-    def cells(self, box: Any, shape: tuple[int, ...]) -> tuple[Any, Any, dict[Any, Interval]]:
-        """The corners of the cells of a box, (3, cells) each, and the cells of the coordinates."""
-        low, high = np.array(box)[:, :, None, None, None]
-        index, counts = np.indices(shape), np.array(shape)[:, None, None, None]
-        lower, upper = ((low + (high - low) * ((index + end) / counts)).reshape(3, -1) for end in (0, 1))
-        return lower, upper, {axis: Interval(lower[i], upper[i]) for i, axis in enumerate(self.axes)}
-
-    def found_box(self) -> base.Box | None:
+    def found_box(self) -> Box | None:
         """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open."""
         for power in range(_LARGEST, _SMALLEST, -1):
             half = 2.0**power
-            lower, upper, cells = self.cells(((-half,) * 3, (half,) * 3), (8, 8, 8))
-            shell = (np.maximum(-lower, upper) > 0.5 * half).any(axis=0)
-            if not (self.in_cells(cells).low + 0.0 * lower[0] > 0.0)[shell].all():
+            cells = Cells.grid(self.axes, ((-half,) * 3, (half,) * 3), (8, 8, 8))
+            shell = (np.maximum(-cells.lower, cells.upper) > 0.5 * half).any(axis=0)
+            if not (cells.bounds(self.phi).low > 0.0)[shell].all():
                 return None if power == _LARGEST else self._tightened(half)
         raise SceneError("phi must be 0 somewhere, got above 0 everywhere")
 
-    def _tightened(self, half: float) -> base.Box:
+    def _tightened(self, half: float) -> Box:
         """The cube without the layers that surely hold none of phi <= 0."""
         box = np.array([[-half] * 3, [half] * 3])
         for part in _LAYERS:
@@ -121,34 +96,23 @@ class Derived(NamedTuple):
 
     def _is_empty(self, layer: Any) -> bool:
         thin = layer[1] - layer[0]
-        shape = tuple(np.where(thin < 0.5 * thin.max(), 1, _LAYER_CELLS).tolist())
-        lower, upper, cells = self.cells(layer, shape)
-        if (self.in_cells(cells).low > 0.0).all():
+        cells = Cells.grid(self.axes, layer, np.where(thin < 0.5 * thin.max(), 1, _LAYER_CELLS))
+        if (cells.bounds(self.phi).low > 0.0).all():
             return True
-        # phi(r) >= phi(m) - sum |d phi| |r - m|, m the middle: closer for small cells where a coordinate occurs twice
-        middle = {axis: Interval(m, m) for axis, m in zip(self.axes, 0.5 * (lower + upper), strict=True)}
-        least, known = self.in_cells(middle).low, dict[Any, Interval]()
-        for half, slope in zip(0.5 * (upper - lower), self.slopes, strict=True):
-            change = bounds_of(slope, cells, known)
-            with np.errstate(invalid="ignore"):
-                least = least - half * np.maximum(np.abs(change.low), np.abs(change.high)) * (1.0 + 1e-12)
-        return bool((least > 0.0).all())
+        return bool((cells.centred(self.phi, self.gradient).low > 0.0).all())
 
-    def _varies(self) -> bool:
-        return any(one.free_symbols for one in self.seconds)
-
-    def check_box(self, form: Form) -> None:
-        """Raise if there is no box to find the bend in, and H is no constant."""
-        if form.box is None and self._varies():
+    def check(self, form: Form, needs_box: bool) -> None:
+        """Raise if phi may have a corner or a pole where particles go, or the box is needed and there is none."""
+        if needs_box and form.box is None and self._varies():
             raise SceneError(
                 "bounds must be given: none were found that hold all of phi <= 0; or give curvature, a number that the "
                 "second derivative of phi in any direction never exceeds"
             )
+        # Bounds of second derivatives may not show it.
+        check_smooth(self.pieces, self.phi, self.axes, side_sign(form.side), form.domain(), form.reach())
 
-    def check_smooth(self, form: Form) -> None:
-        """Raise if phi may have a corner or a pole where particles go; second derivatives may not show it."""
-        side = base.side_sign(form.side)
-        corners.check(self.pieces, self.expression, self.axes, side, form.domain(), form.reach())
+    def _varies(self) -> bool:
+        return any(one.free_symbols for one in self.hessian)
 
     def bend(self, form: Form) -> Bend:
         """Bounds of side H over the box of a form, a solid's with its margin.
@@ -156,26 +120,22 @@ class Derived(NamedTuple):
         Raises:
             SceneError: H is not bounded there.
         """
-        side = base.side_sign(form.side)
+        side = side_sign(form.side)
         if not self._varies():
-            entries = side * np.array([float(one) for one in self.seconds])
-            return Bend.of_entries(entries[:, None], entries[:, None])
-        lower, _upper, cells = self.cells(form.domain(), (_CELLS, _CELLS, _CELLS))
-        phi = self.in_cells(cells)
+            entries = side * np.array([float(one) for one in self.hessian])[:, None]
+            return Bend.of_entries(entries, entries)
+        cells = Cells.grid(self.axes, form.domain(), (_CELLS, _CELLS, _CELLS))
         # Flights are in the admissible part only, so its cells are enough.
-        admissible = ~((phi.low if side > 0.0 else -phi.high) + 0.0 * lower[0] > 0.0)
-        known: dict[Any, Interval] = {}
-        parts = [bounds_of(one, cells, known) for one in self.seconds]
+        admissible = cells.may_be_admissible(self.phi, side)
+        parts = [cells.bounds(one) for one in self.hessian]
         ends = [(part.low, part.high) if side > 0.0 else (-part.high, -part.low) for part in parts]
-        lows, highs = (
-            np.array([np.broadcast_to(pair[i], lower[0].shape)[admissible] for pair in ends]) for i in (0, 1)
-        )
-        if not (np.isfinite(lows).all() and np.isfinite(highs).all()):
+        low, high = np.array(ends)[:, :, admissible].transpose(1, 0, 2)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
             raise SceneError(
                 f"curvature must be given: the second derivatives of phi are not bounded in the bounds {form.box}; "
                 "it is a number that the second derivative in any direction never exceeds"
             )
-        return Bend.of_entries(lows, highs)
+        return Bend.of_entries(low, high)
 
 
 def _layer(box: Any, axis: int, end: int, part: float) -> Any:
@@ -183,3 +143,91 @@ def _layer(box: Any, axis: int, end: int, part: float) -> Any:
     layer = box.copy()
     layer[1 - end, axis] = box[end, axis] + part * (box[1 - end, axis] - box[end, axis])
     return layer
+
+
+# --- Functions from text that is written here: one assignment for every operation ------------------------
+
+
+def _function(name: str, rows: Sequence[Any]) -> Any:
+    """A function (p, x, y, z) of these expressions."""
+    import sympy
+
+    shared, rows = sympy.cse(rows, symbols=sympy.numbered_symbols("s"), order="none")
+    writer = _Writer()
+    for symbol, expression in shared:
+        writer.known[symbol] = writer.name_of(expression)
+    results = ", ".join(map(writer.name_of, rows))
+    lines = [f"def {name}(p, x, y, z):", *writer.lines, f"return {results}"]
+    scope: dict[str, Any] = {"np": np, "__name__": __name__}
+    exec("\n    ".join(lines), scope)
+    scope[name].same_in_python = writer.same_in_python
+    return scope[name]
+
+
+class _Writer:
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.known: dict[Any, str] = {}
+        # Whether there is only + - * / and sqrt.
+        self.same_in_python = True
+
+    def name_of(self, expression: Any) -> str:
+        """The name that holds an expression, or the number itself."""
+        if expression not in self.known:
+            self.known[expression] = self._written(expression)
+        return self.known[expression]
+
+    def _assign(self, text: str) -> str:
+        self.lines.append(f"t{len(self.lines)} = {text}")
+        return f"t{len(self.lines) - 1}"
+
+    def _written(self, expression: Any) -> str:
+        if expression.is_number:
+            return _literal(expression)
+        if expression.is_Symbol:
+            name = str(expression.name)
+            return self._assign(f"p[{int(name[1:])}]") if name.startswith("p") else name
+        if expression.is_Add:
+            return self._assign(" + ".join(map(self.name_of, expression.args)))
+        if expression.is_Mul:
+            return self._product(expression)
+        if expression.is_Pow:
+            return self._power(self.name_of(expression.base), expression.exp)
+        self.same_in_python = False
+        return self._assign(f"np.{expression.func.__name__}({self.name_of(expression.args[0])})")
+
+    def _product(self, expression: Any) -> str:
+        above: list[str] = []
+        below: list[str] = []
+        for factor in expression.args:
+            divides = factor.is_Pow and factor.exp.is_number and factor.exp < 0
+            (below if divides else above).append(self.name_of(1 / factor if divides else factor))
+        top = " * ".join(above) or "1.0"
+        return self._assign(f"({top}) / ({' * '.join(below)})" if below else top)
+
+    def _power(self, base: str, exponent: Any) -> str:
+        if exponent < 0:
+            return self._assign(f"1.0 / {self._power(base, -exponent)}")
+        if not (2 * exponent).is_Integer:
+            self.same_in_python = False
+            return self._assign(f"{base} ** {_literal(exponent)}")
+        factors = [self._assign(f"np.sqrt({base})")] if not exponent.is_Integer else []
+        n, square = int(exponent), base
+        while n:
+            if n % 2:
+                factors.append(square)
+            n //= 2
+            if n:
+                square = self._assign(f"{square} * {square}")
+        return self._assign(" * ".join(factors)) if len(factors) > 1 else factors[0]
+
+
+def _literal(number: Any) -> str:
+    """A constant as a float; in parentheses where it has a sign."""
+    try:
+        value = float(number)
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise SceneError(f"phi must have constants that are real numbers, got {number} in it or its derivatives")
+    return f"({value!r})" if value < 0.0 else repr(value)

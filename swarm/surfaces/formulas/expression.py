@@ -28,29 +28,15 @@ _BITS = 1000
 
 _WANTED = {"sqrt": "above 0", "log": "above 0", "tan": "no pole"}
 _NOT_SMOOTH = ("abs", "min", "max", "floor", "ceil", "round", "sign", "fabs")
-_PLAIN_WORDS: dict[type, str] = {
-    ast.Attribute: "an attribute",
-    ast.Subscript: "an index",
-    ast.Lambda: "a lambda",
-    ast.Compare: "a comparison",
-    ast.BoolOp: "'and' or 'or'",
-    ast.IfExp: "'if'",
-    ast.JoinedStr: "a string",
-    ast.NamedExpr: "an assignment",
-    ast.Tuple: "a tuple",
-    ast.List: "a list",
-    ast.Dict: "a dict",
-    ast.Set: "a set",
-    ast.ListComp: "a comprehension",
-    ast.GeneratorExp: "a comprehension",
-    ast.Starred: "a star",
-}
+_WORDS: dict[type, str] = {
+    ast.Attribute: "an attribute", ast.Subscript: "an index", ast.Lambda: "a lambda", ast.Compare: "a comparison",
+    ast.BoolOp: "'and' or 'or'", ast.IfExp: "'if'", ast.JoinedStr: "a string", ast.NamedExpr: "an assignment",
+    ast.Tuple: "a tuple", ast.List: "a list", ast.Dict: "a dict", ast.Set: "a set", ast.Starred: "a star",
+    ast.ListComp: "a comprehension", ast.GeneratorExp: "a comprehension",
+}  # fmt: skip
 _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
 
 
 class Piece(NamedTuple):
@@ -85,8 +71,7 @@ def parse(text: Any, parameters: Iterable[str] = (), pieces: list[Piece] | None 
     lead = len(line) - len(line.lstrip())
     names = {name: sympy.Symbol(name) for name in COORDINATES}
     names |= {name: sympy.Symbol(f"p{i}") for i, name in enumerate(parameters)}
-    reader = _Reader(line.strip(), lead, names, sympy, [] if pieces is None else pieces)
-    expression = reader.read(reader.tree().body, 0)
+    expression = _Reader(line.strip(), lead, names, sympy, [] if pieces is None else pieces).expression()
     if not expression.free_symbols & {names[name] for name in COORDINATES}:
         raise SceneError(f"phi must depend on x, y or z, got {text.strip()!r}")
     return expression
@@ -99,19 +84,20 @@ class _Reader:
         self._text, self._lead, self._names, self._sympy, self._pieces = text, lead, names, sympy, pieces
         self._nodes = 0
 
-    def tree(self) -> ast.Expression:
+    def expression(self) -> Any:
         try:
             with warnings.catch_warnings():
                 # Such as "invalid decimal literal", which come as errors below.
                 warnings.simplefilter("ignore")
-                return ast.parse(self._text, mode="eval")
+                tree = ast.parse(self._text, mode="eval")
         except SyntaxError as error:
             column = (error.offset or 1) + self._lead
             raise SceneError(f"phi is not a formula: {error.msg} at column {column} of {self._text!r:.80}") from None
         except (ValueError, RecursionError, MemoryError):
             raise SceneError("phi is not a formula: it is nested too deeply, or holds a zero character") from None
+        return self._read(tree.body, 0)
 
-    def read(self, node: ast.expr, depth: int) -> Any:
+    def _read(self, node: ast.expr, depth: int) -> Any:
         """The expression of a node."""
         self._nodes += 1
         if self._nodes > _MOST_NODES:
@@ -124,30 +110,26 @@ class _Reader:
             case ast.Name():
                 return self._name(node)
             case ast.UnaryOp(op=ast.USub()):
-                return -self.read(node.operand, depth + 1)
+                return -self._read(node.operand, depth + 1)
             case ast.UnaryOp(op=ast.UAdd()):
-                return self.read(node.operand, depth + 1)
-            case ast.BinOp():
-                return self._operation(node, depth)
+                return self._read(node.operand, depth + 1)
+            case ast.BinOp(op=ast.BitXor()):
+                self._refuse(node, "phi has ^, write ** for a power")
+            case ast.BinOp() if type(node.op) in (ast.Pow, *_OPERATORS):
+                return self._operation(node, self._read(node.left, depth + 1), self._read(node.right, depth + 1))
             case ast.Call():
                 return self._call(node, depth)
-        return self._unlisted(node)
+        what = _WORDS.get(type(node), "this")
+        return self._refuse(
+            node, f"phi must not have {what}, only numbers, x, y, z, + - * / ** and {', '.join(FUNCTIONS)}"
+        )
 
-    def _unlisted(self, node: ast.expr) -> NoReturn:
-        what = _PLAIN_WORDS.get(type(node), "this")
-        self._refuse(node, f"phi must not have {what}, only numbers, x, y, z, + - * / ** and {', '.join(FUNCTIONS)}")
-
-    def _operation(self, node: ast.BinOp, depth: int) -> Any:
-        if isinstance(node.op, ast.BitXor):
-            self._refuse(node, "phi has ^, write ** for a power")
-        if not isinstance(node.op, (*_OPERATORS, ast.Pow)):
-            self._unlisted(node)
-        left, right = self.read(node.left, depth + 1), self.read(node.right, depth + 1)
+    def _operation(self, node: ast.BinOp, left: Any, right: Any) -> Any:
         if isinstance(node.op, ast.Pow):
             return self._power(node, left, right)
-        if isinstance(node.op, ast.Div) and right == 0:
-            self._refuse(node, "phi divides by 0")
         if isinstance(node.op, ast.Div):
+            if right == 0:
+                self._refuse(node, "phi divides by 0")
             self._note(node, right, "not 0")
         return self._checked(node, _OPERATORS[type(node.op)](left, right))
 
@@ -193,7 +175,7 @@ class _Reader:
             self._refuse(node, f"phi must call only {', '.join(FUNCTIONS)}", hint)
         if len(node.args) != 1 or node.keywords:
             self._refuse(node, f"phi must call {node.func.id} with one argument")
-        argument = self.read(node.args[0], depth + 1)
+        argument = self._read(node.args[0], depth + 1)
         if argument.is_number:
             return self._computed(node, lambda: FUNCTIONS[node.func.id](float(argument)))  # type: ignore[attr-defined]
         if node.func.id in _WANTED:

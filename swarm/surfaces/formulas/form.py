@@ -2,33 +2,96 @@
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import checks
 from ...checks import Vector
 from ...errors import SceneError
-from .. import base
-from .owned import Bend
+from ...kernel.vector import Vec, vec
+from .. import contract
+from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
+from .march import Bend
 
+_EPSILON = 2.220446049250313e-16
 # Central differences lose least at the cube root of round-off, relative to the length.
-_DIFFERENCE = 2.220446049250313e-16 ** (1.0 / 3.0)
+_DIFFERENCE = _EPSILON ** (1.0 / 3.0)
 # Where second derivatives are only sampled: how many points, by how much their range is widened, and what they miss.
 _SAMPLES = 4096
 _SAFETY = 2.0
 _NOISE = 1e-6
 # Room around a solid, relative to its box's smallest width, within which the bound of the second derivatives holds.
-MARGIN = 0.25
+_MARGIN = 0.25
 # Points of a check that are moved onto the surface, and the moves.
 _ONTO, _MOVES = 256, 60
 # A gradient this small, relative to |phi|/size in the bounds, is none; one this far from differences of phi is wrong.
 _FLAT, _WRONG = 1e-8, 1e-4
-_EPSILON = 2.220446049250313e-16
+
+_STRAIGHT = Bend.of_magnitude(0.0)
 
 Floats = NDArray[np.float64]
-_STRAIGHT = Bend.of_magnitude(0.0)
+
+
+class FormSurface(Surface):
+    """A surface whose numbers are those of a `Form`: what `Formula` and `OwnSurface` share."""
+
+    # Fields of the subclasses; `bounds` and `size` are methods.
+    box: Box | None
+    length: float | None
+    center: Vector
+    side: str
+    curvature: float | None
+    _form: "Form"
+
+    def _set(self, common: dict[str, Any], **given: Any) -> None:
+        """Set the fields from the arguments of `__init__`."""
+        for one in fields(self):  # type: ignore[arg-type]
+            if one.name not in given:
+                given[one.name] = common.pop(one.name, one.default)
+        for name in common:
+            raise SceneError(f"{type(self).__name__} has no argument {name!r}{checks.closest(name, given)}")
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        box, length, curvature = _box_of(self.box), self.length, self.curvature
+        object.__setattr__(self, "box", box)
+        object.__setattr__(self, "length", None if length is None else checks.length("size", length))
+        checked = None if curvature is None else checks.at_least("curvature", curvature, 0.0)
+        object.__setattr__(self, "curvature", checked)
+        object.__setattr__(self, "_form", self._made())
+
+    def _made(self) -> "Form":
+        raise NotImplementedError
+
+    def numbers(self) -> Any:
+        return self._form.numbers(self.own_center())
+
+    def size(self) -> float:
+        return self._form.size
+
+    def bounds(self) -> Box:
+        return self._form.bounds(self.center, self.rotation)
+
+    def extent(self) -> float:
+        return farthest(self.center) + self._form.reach()
+
+
+def _box_of(bounds: Any) -> Box | None:
+    """The argument `bounds`, checked."""
+    if bounds is None:
+        return None
+    if isinstance(bounds, (str, bytes)) or not hasattr(bounds, "__len__") or len(bounds) != 2:
+        raise SceneError(f"bounds must be two corners ((x, y, z), (x, y, z)), got {bounds!r}")
+    low, high = (checks.vector(f"bounds[{i}]", corner) for i, corner in enumerate(bounds))
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise SceneError(f"bounds must be a lower and an upper corner, got {low} and {high}")
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -37,71 +100,68 @@ class Form:
 
     kind: Any
     parameters: tuple[float, ...]
-    box: base.Box | None
+    box: Box | None
     size: float
     side: str
     bend: Bend = _STRAIGHT
 
-    def bent(self, bend: Bend) -> "Form":
-        """The same with these bounds of the second derivatives."""
-        return replace(self, bend=bend)
-
     def numbers(self, center: Vector) -> Any:
-        """What kernels take."""
-        low, high = self.box or base.UNBOUNDED
+        """The numbers that kernels take."""
+        low, high = self.box or UNBOUNDED
         scale = self.size if math.isfinite(self.size) else 1.0
         narrowest = min(b - a for a, b in zip(low, high, strict=True))
         closed = 1.0 if self.box is not None and self.side == "outside" else 0.0
-        side = base.side_sign(self.side)
         return self.kind(
-            *center, side, _DIFFERENCE * scale, scale, self.bend, low, high, closed, MARGIN * narrowest, self.parameters
-        )
+            Vec(*center), side_sign(self.side), _DIFFERENCE * scale, scale, self.bend, Vec(*low), Vec(*high), closed,
+            _MARGIN * narrowest, self.parameters,
+        )  # fmt: skip
 
     def reach(self) -> float:
-        """How far the surface goes from its centre."""
+        """How far the surface goes from its center."""
         if self.box is None:
             return self.size if math.isfinite(self.size) else 1.0
-        return max(base.farthest(corner) for corner in self.box)
+        return max(farthest(corner) for corner in self.box)
 
-    def domain(self) -> base.Box | None:
-        """The box, a solid's with the margin in which its bend must be known."""
+    def domain(self) -> Box | None:
+        """The box in which the bend must be known: a solid's has the margin on each side."""
         if self.box is None:
             return None
         low, high = np.array(self.box)
-        room = 0.5 * self.outer_margin() * (high - low).min()
+        room = _MARGIN * (high - low).min() if self.side == "outside" else 0.0
         return tuple((low - room).tolist()), tuple((high + room).tolist())
 
     @functools.cached_property
     def encloses(self) -> bool:
-        """Whether phi is above 0 on the faces of the box."""
-        assert self.box is not None
+        """Whether phi is not below 0 on the faces of the box."""
         (low, high), s = np.array(self.box), np.linspace(0.0, 1.0, 33)
         u, v = (grid.ravel() for grid in np.meshgrid(s, s))
         faces = [np.insert([u, v], axis, end, axis=0) for axis in range(3) for end in (0.0, 1.0)]
         return bool((self.value(low[:, None] + (high - low)[:, None] * np.hstack(faces)) >= 0.0).all())
 
-    def bounds(self, center: Vector, rotation: Any) -> base.Box:
+    def bounds(self, center: Vector, rotation: Any) -> Box:
         """`Surface.bounds`."""
         if self.side == "outside" or self.box is None or not self.encloses:
-            return base.UNBOUNDED
+            return UNBOUNDED
         low, high = (tuple(a + c for a, c in zip(corner, center, strict=True)) for corner in self.box)
-        return base.rotated_box(rotation, (low, high), center)  # type: ignore[arg-type]
+        return rotated_box(rotation, (low, high), center)  # type: ignore[arg-type]
 
     def value(self, points: Floats) -> Floats:
-        """phi at points (3, N) relative to the centre."""
+        """phi at points (3, N) relative to the center."""
         with np.errstate(all="ignore"):
-            return np.broadcast_to(base.phi(self.numbers((0.0, 0.0, 0.0)), *points), points.shape[1:])
+            return np.broadcast_to(contract.phi(self.numbers((0.0, 0.0, 0.0)), vec(points)), points.shape[1:])
 
     def slope(self, points: Floats) -> Floats:
         """Its gradient."""
         with np.errstate(all="ignore"):
-            parts = base.gradient(self.numbers((0.0, 0.0, 0.0)), *points)
+            parts = contract.gradient(self.numbers((0.0, 0.0, 0.0)), vec(points))
             return np.array(np.broadcast_arrays(*parts, points[0])[:3])
 
     def points(self, n: int) -> Floats:
-        """Random points of the box, or about the centre where there is none."""
+        """Random points of the box, or about the center where there is none."""
         low, high = np.array(self.box or ((-self.reach(),) * 3, (self.reach(),) * 3))[:, :, None]
         return np.asarray(low + (high - low) * np.random.default_rng(0).random((3, n)))
+
+    # --- Checks ------------------------------------------------------------------------------------------
 
     def check_gradient(self) -> None:
         """Raise if the gradient is not that of phi."""
@@ -109,14 +169,14 @@ class Form:
         step = _DIFFERENCE * self.reach()
         ends = points[:, :, None, None] + step * np.eye(3)[:, None, :, None] * np.array([1.0, -1.0])
         values = self.value(ends.reshape(3, -1)).reshape(_ONTO, 3, 2)
-        measured, said = (values[:, :, 0] - values[:, :, 1]).T / (2.0 * step), self.slope(points)
-        scale = np.abs(said).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
-        off = np.abs(measured - said).max(axis=0) > _WRONG * scale
+        measured, given = (values[:, :, 0] - values[:, :, 1]).T / (2.0 * step), self.slope(points)
+        scale = np.abs(given).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
+        off = np.abs(measured - given).max(axis=0) > _WRONG * scale
         # At a few points phi itself may have a kink.
         if np.count_nonzero(off) > 0.1 * _ONTO:
             i = int(np.argmax(off))
             raise SceneError(
-                f"gradient must be the gradient of phi, got {_shown(said[:, i])} at {_shown(points[:, i])}, where "
+                f"gradient must be the gradient of phi, got {_shown(given[:, i])} at {_shown(points[:, i])}, where "
                 f"differences of phi give {_shown(measured[:, i])}"
             )
 
@@ -129,8 +189,7 @@ class Form:
             i = int(np.argmax(wrong))
             raise SceneError(f"phi must be a finite number in the bounds, got {values[i]} at {_shown(points[:, i])}")
         near = self._onto(points[:, np.argsort(np.abs(values))[:_ONTO]])
-        found = (values < 0.0).any() and (values > 0.0).any()
-        if not found and not (near.shape[1] and (self.value(near) <= 0.0).any() and (self.value(near) >= 0.0).any()):
+        if not any((signs <= 0.0).any() and (signs >= 0.0).any() for signs in (values, self.value(near))):
             sign = "below" if values[0] < 0.0 else "above"
             raise SceneError(f"phi must be 0 somewhere in the bounds, got {sign} 0 everywhere in {self.box}")
         slopes = np.sqrt((self.slope(near) ** 2).sum(axis=0))
@@ -140,6 +199,17 @@ class Form:
             raise SceneError(
                 f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {_shown(near[:, i])}"
             )
+
+    def _onto(self, points: Floats) -> Floats:
+        """Points moved onto the surface along the gradient; those that stay in the box."""
+        low, high = np.array(self.box)[:, :, None]
+        start = np.abs(self.value(points)).max()
+        for _ in range(_MOVES):
+            slope = self.slope(points)
+            with np.errstate(all="ignore"):
+                points = points - self.value(points) / (slope**2).sum(axis=0) * slope
+        inside = ((points >= low) & (points <= high)).all(axis=0)
+        return points[:, inside & (np.abs(self.value(points)) <= 1e-6 * start)]
 
     def check_bend(self) -> None:
         """Raise if safe steps away from the wall may be as short as the round-off of a position."""
@@ -151,24 +221,12 @@ class Form:
                 f"derivative must be below {limit:.3g}, got up to {2.0 * most:.3g}; where less is known, give curvature"
             )
 
-    def _onto(self, points: Floats) -> Floats:
-        """Points moved onto the surface along the gradient; those that stay in the box."""
-        assert self.box is not None
-        low, high = np.array(self.box)[:, :, None]
-        start = np.abs(self.value(points)).max()
-        for _ in range(_MOVES):
-            slope = self.slope(points)
-            with np.errstate(all="ignore"):
-                points = points - self.value(points) / (slope**2).sum(axis=0) * slope
-        inside = ((points >= low) & (points <= high)).all(axis=0)
-        return points[:, inside & (np.abs(self.value(points)) <= 1e-6 * start)]
-
     def sampled_bend(self) -> Bend:
         """The bend by differences of the gradient at some points, its range doubled."""
-        assert self.box is not None
         (low, high), points = np.array(self.box), self.points(_SAMPLES)
-        points = points + self.outer_margin() * (points - 0.5 * (low + high)[:, None])
-        side = base.side_sign(self.side)
+        # Of a solid in a box that is larger by twice the margin
+        points = points + (2.0 * _MARGIN if self.side == "outside" else 0.0) * (points - 0.5 * (low + high)[:, None])
+        side = side_sign(self.side)
         # Flights are in the admissible part only.
         points = points[:, side * self.value(points) <= 0.0]
         step = _DIFFERENCE * self.size * np.eye(3)[:, :, None]
@@ -177,18 +235,13 @@ class Form:
         if not entries.size or not np.isfinite(entries).all():
             raise SceneError("curvature must be given: the gradient is not finite everywhere in the bounds")
         least, most = entries.min(axis=1), entries.max(axis=1)
-        room = 0.5 * (_SAFETY - 1.0) * (most - least) + _NOISE * np.abs(entries).max()
-        # Of the eigenvalues at the points, too, which are closer together than those of any entries in these ranges.
-        bend, single = (
-            Bend.of_entries((least - room)[:, None], (most + room)[:, None]),
-            Bend.of_entries(entries, entries),
-        )
-        wider = 0.5 * (_SAFETY - 1.0) * (single.most - single.least) + _NOISE * np.abs(entries).max()
-        return bend._replace(least=float(single.least - wider), most=float(single.most + wider))
-
-    def outer_margin(self) -> float:
-        """How much larger than the box that one is in which the bend must be known, on each side, in half widths."""
-        return 2.0 * MARGIN if self.side == "outside" else 0.0
+        noise = _NOISE * np.abs(entries).max()
+        room = 0.5 * (_SAFETY - 1.0) * (most - least) + noise
+        bend = Bend.of_entries((least - room)[:, None], (most + room)[:, None])
+        # The eigenvalues at the points are closer together than those of any entries in these ranges.
+        exact = Bend.of_entries(entries, entries)
+        wider = 0.5 * (_SAFETY - 1.0) * (exact.most - exact.least) + noise
+        return bend._replace(least=float(exact.least - wider), most=float(exact.most + wider))
 
 
 def _shown(point: Any) -> str:

@@ -1,10 +1,16 @@
-"""Intervals in arrays: bounds that hold for every point of many cells at once."""
+"""Interval arithmetic: bounds that hold for every point of many cells at once, and where a formula is surely smooth."""
 
+import itertools
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ..surface import Box
+from .expression import Piece
 
 Floats = NDArray[np.float64]
 # The functions of the system's library are off by less than this.
@@ -16,9 +22,6 @@ class Interval:
 
     def __init__(self, low: Any, high: Any) -> None:
         self.low, self.high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-
-    def __neg__(self) -> "Interval":
-        return Interval(-self.high, -self.low)
 
     def __add__(self, other: "Interval") -> "Interval":
         return _wider(self.low + other.low, self.high + other.high, 1)
@@ -37,63 +40,48 @@ class Interval:
         with np.errstate(divide="ignore"):
             low, high = 1.0 / self.high, 1.0 / self.low
         # A zero at one end leaves a half line, one between the ends the whole.
-        low = np.where((self.low < 0.0) & (self.high >= 0.0), -np.inf, low)
-        high = np.where((self.low <= 0.0) & (self.high > 0.0), np.inf, high)
-        none = (self.low == 0.0) & (self.high == 0.0)
-        return _wider(np.where(none, -np.inf, low), np.where(none, np.inf, high), 1)
+        whole = (self.low == 0.0) & (self.high == 0.0)
+        low = np.where(whole | ((self.low < 0.0) & (self.high >= 0.0)), -np.inf, low)
+        high = np.where(whole | ((self.low <= 0.0) & (self.high > 0.0)), np.inf, high)
+        return _wider(low, high, 1)
 
     def power(self, n: int) -> "Interval":
         """[low, high]**n for a whole n."""
         if n < 0:
             return self.power(-n).inverse()
-        low, high = self.low**n, self.high**n
-        if n % 2 == 0:
-            smallest = np.where((self.low <= 0.0) & (self.high >= 0.0), 0.0, np.minimum(low, high))
-            low, high = smallest, np.maximum(low, high)
-        wide = _wider(low, high, _ULPS)
-        return Interval(np.maximum(wide.low, 0.0), wide.high) if n % 2 == 0 else wide
+        if n % 2:
+            return self.monotonic(lambda x: x**n)
+        wide = self.monotonic(lambda x: x**n, bottom=0.0)
+        return Interval(np.maximum(wide.low, 0.0), wide.high)
 
-    def root(self, exponent: float) -> "Interval":
-        """[low, high]**exponent for any exponent; nothing is known where all of it is below 0."""
-        low, high = np.maximum(self.low, 0.0), np.maximum(self.high, 0.0)
+    def monotonic(self, function: Callable[[Floats], Any], bottom: float | None = None) -> "Interval":
+        """A function that rises or falls everywhere or, with a bottom, rises from it to both sides of 0."""
         with np.errstate(divide="ignore"):
-            a, b = low**exponent, high**exponent
-        return self._where_known(np.minimum(a, b), np.maximum(a, b))
+            a, b = function(self.low), function(self.high)
+        low = np.minimum(a, b)
+        if bottom is not None:
+            low = np.where((self.low <= 0.0) & (self.high >= 0.0), bottom, low)
+        return _wider(low, np.maximum(a, b), _ULPS)
 
-    def log(self) -> "Interval":
-        """The logarithm; nothing is known where all of it is below 0."""
-        with np.errstate(divide="ignore"):
-            return self._where_known(np.log(np.maximum(self.low, 0.0)), np.log(np.maximum(self.high, 0.0)))
-
-    def _where_known(self, low: Floats, high: Floats) -> "Interval":
+    def above_zero(self, function: Callable[[Floats], Any]) -> "Interval":
+        """A monotonic function of numbers from 0 on; nothing is known where there are none."""
+        found = Interval(np.maximum(self.low, 0.0), np.maximum(self.high, 0.0)).monotonic(function)
         known = self.high >= 0.0
-        return _wider(np.where(known, low, -np.inf), np.where(known, high, np.inf), _ULPS)
-
-    def rising(self, name: str) -> "Interval":
-        """A function that rises everywhere."""
-        function = getattr(np, name)
-        return _wider(function(self.low), function(self.high), _ULPS)
-
-    def cosh(self) -> "Interval":
-        """The hyperbolic cosine."""
-        a, b = np.cosh(self.low), np.cosh(self.high)
-        across = (self.low <= 0.0) & (self.high >= 0.0)
-        return _wider(np.where(across, 1.0, np.minimum(a, b)), np.maximum(a, b), _ULPS)
+        return Interval(np.where(known, found.low, -np.inf), np.where(known, found.high, np.inf))
 
     def cos(self) -> "Interval":
         """The cosine."""
         with np.errstate(invalid="ignore"):
             a, b = np.cos(self.low), np.cos(self.high)
-        wide = _wider(
-            np.where(self._passes(math.pi, 2.0 * math.pi), -1.0, np.fmin(a, b)),
-            np.where(self._passes(0.0, 2.0 * math.pi), 1.0, np.fmax(a, b)),
-            _ULPS,
-        )
+        low = np.where(self._passes(math.pi, 2.0 * math.pi), -1.0, np.fmin(a, b))
+        wide = _wider(low, np.where(self._passes(0.0, 2.0 * math.pi), 1.0, np.fmax(a, b)), _ULPS)
         return Interval(np.maximum(wide.low, -1.0), np.minimum(wide.high, 1.0))
 
     def sin(self) -> "Interval":
-        """The sine."""
-        return (self + Interval(-0.5 * math.pi, -0.5 * math.pi)).cos().loosened()
+        """The sine, by the cosine; wider by the round-off of an argument near 1."""
+        cos = (self + Interval(-0.5 * math.pi, -0.5 * math.pi)).cos()
+        slack = 1e-15 * (1.0 + np.maximum(np.abs(cos.low), np.abs(cos.high)))
+        return Interval(cos.low - slack, cos.high + slack)
 
     def tan(self) -> "Interval":
         """The tangent; nothing is known of a cell with a pole."""
@@ -101,11 +89,6 @@ class Interval:
         with np.errstate(invalid="ignore"):
             a, b = np.tan(self.low), np.tan(self.high)
         return _wider(np.where(pole, -np.inf, a), np.where(pole, np.inf, b), _ULPS)
-
-    def loosened(self) -> "Interval":
-        """Wider by the round-off of an argument near 1."""
-        slack = 1e-15 * (1.0 + np.maximum(np.abs(self.low), np.abs(self.high)))
-        return Interval(self.low - slack, self.high + slack)
 
     def _passes(self, start: float, period: float) -> Any:
         """Whether start + k period is in the interval; where that is uncertain, yes."""
@@ -122,31 +105,171 @@ def _wider(low: Any, high: Any, ulps: int) -> Interval:
     return Interval(low, high)
 
 
-def bounds_of(expression: Any, cells: dict[Any, Interval], known: dict[Any, Interval]) -> Interval:
-    """Bounds of a SymPy expression in cells of its symbols; `known` keeps those of its parts."""
-    if expression in cells:
-        return cells[expression]
+def bounds_of(expression: Any, known: dict[Any, Interval]) -> Interval:
+    """Bounds of a SymPy expression by those of its symbols; `known` keeps those of its parts too."""
     if expression not in known:
         with np.errstate(over="ignore"):
-            known[expression] = _bounds_of(expression, cells, known)
+            known[expression] = _bounds_of(expression, known)
     return known[expression]
 
 
-def _bounds_of(expression: Any, cells: dict[Any, Interval], known: dict[Any, Interval]) -> Interval:
+def _bounds_of(expression: Any, known: dict[Any, Interval]) -> Interval:
     if expression.is_number:
         return Interval(float(expression), float(expression))
-    parts = [bounds_of(part, cells, known) for part in expression.args]
+    first, *rest = (bounds_of(part, known) for part in expression.args)
     if expression.is_Add or expression.is_Mul:
-        total = parts[0]
-        for part in parts[1:]:
-            total = total + part if expression.is_Add else total * part
-        return total
+        for part in rest:
+            first = first + part if expression.is_Add else first * part
+        return first
     if expression.is_Pow and expression.exp.is_number:
         power = expression.exp
-        return parts[0].power(int(power)) if power.is_Integer else parts[0].root(float(power))
+        return first.power(int(power)) if power.is_Integer else first.above_zero(lambda x: x ** float(power))
     name = expression.func.__name__
-    if name in ("sin", "cos", "tan", "cosh", "log"):
-        return getattr(parts[0], name)()  # type: ignore[no-any-return]
-    # exp, and what else rises: sinh, tanh
-    assert name in ("exp", "sinh", "tanh"), name
-    return parts[0].rising(name)
+    if name in ("sin", "cos", "tan"):
+        return getattr(first, name)()  # type: ignore[no-any-return]
+    if name == "log":
+        return first.above_zero(np.log)
+    assert name in ("exp", "sinh", "cosh", "tanh"), name
+    return first.monotonic(getattr(np, name), bottom=1.0 if name == "cosh" else None)
+
+
+class Cells:
+    """Many boxes, in which expressions of their axes are bounded: corners (3, cells)."""
+
+    def __init__(self, axes: Sequence[Any], lower: Floats, upper: Floats) -> None:
+        self.lower, self.upper = lower, upper
+        self._cells = {axis: Interval(*ends) for axis, *ends in zip(axes, lower, upper, strict=True)}
+        self._known = dict(self._cells)
+
+    @classmethod
+    def grid(cls, axes: Sequence[Any], box: Any, shape: Any) -> "Cells":
+        """A box cut into so many cells along each edge."""
+        low, high = np.array(box)[:, :, None, None, None]
+        index, counts = np.indices(tuple(shape)), np.array(shape)[:, None, None, None]
+        lower, upper = ((low + (high - low) * ((index + end) / counts)).reshape(3, -1) for end in (0, 1))
+        return cls(axes, lower, upper)
+
+    def bounds(self, expression: Any) -> Interval:
+        """Bounds of an expression in each cell."""
+        found = bounds_of(expression, self._known)
+        return Interval(*(np.broadcast_to(end, self.lower[0].shape) for end in (found.low, found.high)))
+
+    def centred(self, expression: Any, gradient: Sequence[Any]) -> Interval:
+        """`bounds` by f(m) + grad f.(r - m), m the middle: closer for small cells where a coordinate occurs twice."""
+        with np.errstate(invalid="ignore"):
+            middle = 0.5 * (self.lower + self.upper)
+            found = Cells(tuple(self._cells), middle, middle).bounds(expression)
+            for cell, m, slope in zip(self._cells.values(), middle, gradient, strict=True):
+                found = found + self.bounds(slope) * (cell + Interval(-m, -m))
+        return found
+
+    def may_be_admissible(self, phi: Any, side: float) -> Any:
+        """In which cells side * phi may be 0 or below."""
+        level = self.bounds(phi)
+        return ~((level.low if side > 0.0 else -level.high) > 0.0)
+
+
+# --- Where a formula may have a corner or a pole ---------------------------------------------------------
+
+# Cells along an edge at first, how often they are halved, and operations of one turn: seconds.
+_CELLS, _HALVINGS, _MOST_WORK = 8, 14, 2**22
+_REASONS = {
+    "above 0": ("its argument may be 0 or below", ", or add a small constant, as in sqrt(x**2 + 1e-6)"),
+    "not 0": ("it may divide by 0", ", or add a small constant, as in 1/(x**2 + 1e-6)"),
+    "no pole": ("it may have a pole", ""),
+}
+
+
+def check_constants(pieces: Sequence[Piece]) -> None:
+    """Raise if a piece of constants only has no value; inner pieces come first."""
+    for piece in pieces:
+        if piece.argument.is_number and not _is_smooth(piece, bounds_of(piece.argument, {})):
+            reason = _REASONS[piece.wanted][0]
+            raise SceneError(f"phi must be smooth, got {piece.place}, where {reason} with these parameters")
+
+
+def check_smooth(
+    pieces: Sequence[Piece], phi: Any, axes: Sequence[Any], side: float, box: Box | None, scale: float
+) -> None:
+    """Raise unless every piece is surely smooth wherever side * phi may be 0 or below in a box.
+
+    Cells that may hold a corner or a pole are halved until there are none or too many. What counts is each root, power,
+    quotient, log and tan as it was read. The argument of a piece has been simplified, which changes no value of it
+    where the pieces within it, checked in the same cells, are smooth.
+
+    Args:
+        pieces: inner ones first.
+        phi: as an expression.
+        axes: the symbols of its coordinates.
+        side: +1 or -1.
+        box: None for all of space.
+        scale: a length to begin with where there is no box.
+    """
+    import sympy
+
+    pieces = [piece for piece in pieces if piece.argument.free_symbols]
+    if not pieces:
+        return
+    slopes = [[sympy.diff(piece.argument, axis) for axis in axes] for piece in pieces]
+    work = 1 + int(sympy.count_ops([phi, *(piece.argument for piece in pieces), *itertools.chain(*slopes)]))
+    unit = Cells.grid(axes, ((-1.0,) * 3, (1.0,) * 3), (_CELLS,) * 3)
+    lower, upper = unit.lower, unit.upper
+    for halving in range(_HALVINGS):
+        if halving:
+            lower, upper = _halved(lower, upper)
+        cells = Cells(axes, *_placed((lower, upper), box, scale))
+        rough = np.array([_may_be_rough(*pair, cells) for pair in zip(pieces, slopes, strict=True)])
+        kept = rough.any(axis=0) & cells.may_be_admissible(phi, side)
+        lower, upper, rough = lower[:, kept], upper[:, kept], rough[:, kept]
+        if not rough.size:
+            return
+        if 8 * rough.shape[1] * work > _MOST_WORK:
+            break
+    i = int(np.argmax(rough.any(axis=1)))
+    lower, upper = lower[:, rough[i]], upper[:, rough[i]]
+    nearest = np.abs(lower + upper).max(axis=0).argmin()
+    _refuse(pieces[i], [end[:, nearest] for end in _placed((lower, upper), box, scale)])
+
+
+def _may_be_rough(piece: Piece, slopes: Sequence[Any], cells: Cells) -> Any:
+    """In which cells a piece may be other than smooth."""
+    whole, centred = cells.bounds(piece.argument), cells.centred(piece.argument, slopes)
+    return ~_is_smooth(piece, Interval(np.maximum(whole.low, centred.low), np.minimum(whole.high, centred.high)))
+
+
+def _is_smooth(piece: Piece, argument: Interval) -> Any:
+    if piece.wanted == "above 0":
+        return argument.low > 0.0
+    if piece.wanted == "not 0":
+        return (argument.low > 0.0) | (argument.high < 0.0)
+    tangent = argument.tan()
+    return np.isfinite(tangent.low) & np.isfinite(tangent.high)
+
+
+def _placed(corners: tuple[Floats, Floats], box: Box | None, scale: float) -> tuple[Floats, ...]:
+    """The corners of cells in a box from those in a cube from -1 to 1."""
+    if box is None:
+        # All of space is in the cube: its faces are infinitely far.
+        with np.errstate(divide="ignore"):
+            return tuple(scale * end / (1.0 - np.abs(end)) for end in corners)
+    low, high = np.array(box)[:, :, None]
+    return tuple(0.5 * ((1.0 - end) * low + (1.0 + end) * high) for end in corners)
+
+
+def _halved(lower: Floats, upper: Floats) -> tuple[Floats, ...]:
+    """Each cell as eight."""
+    edges = np.array([lower, 0.5 * (lower + upper), upper])
+    parts = np.array(list(itertools.product((0, 1), repeat=3))).T[:, :, None]
+    rows, cells = np.arange(3)[:, None, None], np.arange(lower.shape[1])
+    return tuple(edges[parts + end, rows, cells].reshape(3, -1) for end in (0, 1))
+
+
+def _refuse(piece: Piece, ends: Any) -> NoReturn:
+    where = ", ".join(
+        "0" if low <= 0.0 <= high else f"{0.5 * (low + high):.3g}" for low, high in zip(*ends, strict=True)
+    )
+    reason, fix = _REASONS[piece.wanted]
+    raise SceneError(
+        f"phi must be smooth wherever particles go, got {piece.place}, where {reason} near ({where}); "
+        f"give bounds that leave this out{fix}"
+    )

@@ -8,8 +8,10 @@ from typing import Any
 
 from ...checks import Vector, length, one_of, vector
 from ...errors import SceneError
-from .. import base
+from ...kernel.vector import vec
 from .. import rotation as rotations
+from ..surface import Box as Bounds
+from ..surface import HalfSpace, Surface, box_around, farthest, rotated_box, side_sign
 from .plane import PlaneNumbers
 from .slab import slab_numbers
 from .solid import body
@@ -18,7 +20,7 @@ FACES = tuple(sign + axis for axis, sign in itertools.product("xyz", "-+"))
 
 
 @dataclass(frozen=True, repr=False)
-class Box(base.Surface):
+class Box(Surface):
     """A rectangular box; its cavity, of which faces may be open, or the space around the solid.
 
     Args:
@@ -48,7 +50,7 @@ class Box(base.Surface):
             raise SceneError(f'open must be empty for side="outside", got {list(self.open)}')
 
     def walls(self) -> tuple[Any, ...]:
-        sign = base.side_sign(self.side)
+        sign = side_sign(self.side)
         axes = rotations.matrix(self.rotation).T.tolist()
         parts: list[Any] = []
         for name, (x, y, z), half in zip("xyz", axes, self.half_widths, strict=True):
@@ -63,7 +65,7 @@ class Box(base.Surface):
             return tuple(parts)
         return (body(parts, math.hypot(*self.center)),)
 
-    def open_faces(self) -> list[base.HalfSpace]:
+    def open_faces(self) -> list[HalfSpace]:
         axes = rotations.matrix(self.rotation).T
         planes = []
         for face in self.open:
@@ -75,18 +77,18 @@ class Box(base.Surface):
     def size(self) -> float:
         return min(self.half_widths)
 
-    def bounds(self) -> base.Box:
-        low, high = base.box_around(self.center, self.half_widths, self.side)
+    def bounds(self) -> Bounds:
+        low, high = box_around(self.center, self.half_widths, self.side)
         lx, ly, lz = (-math.inf if "-" + name in self.open else low[i] for i, name in enumerate("xyz"))
         hx, hy, hz = (math.inf if "+" + name in self.open else high[i] for i, name in enumerate("xyz"))
-        return base.rotated_box(self.rotation, ((lx, ly, lz), (hx, hy, hz)), self.center)
+        return rotated_box(self.rotation, ((lx, ly, lz), (hx, hy, hz)), self.center)
 
     def extent(self) -> float:
-        return base.farthest(self.center) + math.hypot(*self.half_widths)
+        return farthest(self.center) + math.hypot(*self.half_widths)
 
 
 def _face(normal: Vector, half: float, center: Vector) -> PlaneNumbers:
-    return PlaneNumbers(*normal, sum(n * c for n, c in zip(normal, center, strict=True)) + half)
+    return PlaneNumbers(vec(normal), sum(n * c for n, c in zip(normal, center, strict=True)) + half)
 
 
 def _faces(value: Any) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ from typing import Any
 
 from ...checks import Vector, number
 from ...errors import SceneError
-from .. import base
+from ...kernel.vector import Vec
+from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .plane import PlaneNumbers
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
@@ -65,16 +66,16 @@ class Cone(Revolved):
         nappes = super().walls()[0]
         if self.side == "inside":
             # The plane first: a flight along the axis meets both at the apex, and the plane has a normal there.
-            return PlaneNumbers(-x, -y, -z, -offset), nappes
+            return PlaneNumbers(Vec(-x, -y, -z), -offset), nappes
         # As a solid, the half-space above the apex: what is admissible of it is below.
-        return (body((nappes, PlaneNumbers(x, y, z, offset)), math.hypot(*self.center)),)
+        return (body((nappes, PlaneNumbers(Vec(x, y, z), offset)), math.hypot(*self.center)),)
 
     def size(self) -> float:
         return math.inf
 
-    def bounds(self) -> base.Box:
+    def bounds(self) -> Box:
         if self.side == "outside":
-            return base.UNBOUNDED
+            return UNBOUNDED
         # A direction u meets the cone's end at the apex where the angle between u and the axis is pi/2 + half_angle.
         steep = math.sin(self.half_angle)
         around = list(zip(self.center, self.direction(), strict=True))
@@ -82,10 +83,10 @@ class Cone(Revolved):
         hx, hy, hz = (c if -n >= steep else math.inf for c, n in around)
         return (lx, ly, lz), (hx, hy, hz)
 
-    def half_spaces(self) -> list[base.HalfSpace]:
+    def half_spaces(self) -> list[HalfSpace]:
         # rho cos <= z sin in every direction around the axis
         lean = -math.tan(self.half_angle)
         return [] if self.is_solid() else tangents(self.direction(), self.center, lean, 0.0)
 
     def extent(self) -> float:
-        return base.farthest(self.center)
+        return farthest(self.center)

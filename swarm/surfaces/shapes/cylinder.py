@@ -6,8 +6,8 @@ from typing import Any
 
 from ...checks import Vector
 from ...checks import length as checked_length
-from .. import base
 from .. import rotation as rotations
+from ..surface import Box, HalfSpace, box_around, farthest, side_sign
 from .principal import extents
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
@@ -51,7 +51,7 @@ class Cylinder(Revolved):
         return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0,) * 3, 0.5 * self.radius, self.side)
 
     def _caps(self, length: float) -> SlabNumbers:
-        return slab_numbers(self.direction(), 0.5 * length, self.center, base.side_sign(self.side))
+        return slab_numbers(self.direction(), 0.5 * length, self.center, side_sign(self.side))
 
     def walls(self) -> tuple[Any, ...]:
         around = super().walls()
@@ -63,15 +63,15 @@ class Cylinder(Revolved):
     def size(self) -> float:
         return self.radius if self.length is None else min(self.radius, 0.5 * self.length)
 
-    def bounds(self) -> base.Box:
+    def bounds(self) -> Box:
         half = math.inf if self.length is None else 0.5 * self.length
         around = extents(rotations.matrix(self.turn()), (self.radius, self.radius, 0.0))
         along = extents(rotations.matrix(self.turn()), (0.0, 0.0, half))
         x, y, z = (a + b for a, b in zip(around, along, strict=True))
-        return base.box_around(self.center, (x, y, z), self.side)
+        return box_around(self.center, (x, y, z), self.side)
 
-    def half_spaces(self) -> list[base.HalfSpace]:
+    def half_spaces(self) -> list[HalfSpace]:
         return [] if self.is_solid() else tangents(self.direction(), self.center, 0.0, self.radius)
 
     def extent(self) -> float:
-        return base.farthest(self.center) + math.hypot(self.radius, 0.5 * (self.length or 0.0))
+        return farthest(self.center) + math.hypot(self.radius, 0.5 * (self.length or 0.0))

@@ -4,14 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...kernel.jit import by_type
-
-
-class Oblique(NamedTuple):
-    """Any unit vector."""
-
-    x: float
-    y: float
-    z: float
+from ...kernel.vector import Vec, dot, vec
 
 
 class AlongX(NamedTuple):
@@ -32,7 +25,7 @@ class AlongZ(NamedTuple):
     z: float
 
 
-Normal = Oblique | AlongX | AlongY | AlongZ
+Normal = Vec | AlongX | AlongY | AlongZ
 
 
 def normal_of(vector: Sequence[float]) -> Normal:
@@ -44,56 +37,56 @@ def normal_of(vector: Sequence[float]) -> Normal:
         return AlongY(1.0)
     if x == 0.0 and y == 0.0:
         return AlongZ(1.0)
-    return Oblique(x, y, z)
+    return vec(vector)
 
 
 @by_type
-def along(normal, x, y, z):
-    """n.(x, y, z)"""
+def along(normal, r):
+    """n.r"""
     raise NotImplementedError
 
 
 @by_type
-def times(normal, k):
+def scaled(normal, k):
     """k n"""
     raise NotImplementedError
 
 
-@along.register(Oblique)
-def _(normal, x, y, z):
-    return normal.x * x + normal.y * y + normal.z * z
+@along.register(Vec)
+def _(normal, r):
+    return dot(normal, r)
 
 
-@times.register(Oblique)
+@scaled.register(Vec)
 def _(normal, k):
-    return k * normal.x, k * normal.y, k * normal.z
+    return k * normal
 
 
 @along.register(AlongX)
-def _(normal, x, y, z):
-    return x
+def _(normal, r):
+    return r.x
 
 
-@times.register(AlongX)
+@scaled.register(AlongX)
 def _(normal, k):
-    return k, 0.0, 0.0
+    return Vec(k, 0.0, 0.0)
 
 
 @along.register(AlongY)
-def _(normal, x, y, z):
-    return y
+def _(normal, r):
+    return r.y
 
 
-@times.register(AlongY)
+@scaled.register(AlongY)
 def _(normal, k):
-    return 0.0, k, 0.0
+    return Vec(0.0, k, 0.0)
 
 
 @along.register(AlongZ)
-def _(normal, x, y, z):
-    return z
+def _(normal, r):
+    return r.z
 
 
-@times.register(AlongZ)
+@scaled.register(AlongZ)
 def _(normal, k):
-    return 0.0, 0.0, k
+    return Vec(0.0, 0.0, k)

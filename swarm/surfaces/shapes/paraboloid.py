@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass
 
 from ...checks import Vector, length
-from .. import base
+from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 
@@ -45,14 +45,14 @@ class Paraboloid(Revolved):
     def size(self) -> float:
         return 2.0 * self.focal_length
 
-    def bounds(self) -> base.Box:
-        return base.UNBOUNDED
+    def bounds(self) -> Box:
+        return UNBOUNDED
 
-    def half_spaces(self) -> list[base.HalfSpace]:
+    def half_spaces(self) -> list[HalfSpace]:
         # rho^2/(4 f) <= z is rho - z/s <= f s for every slope s
         f = self.focal_length
         planes = (tangents(self.direction(), self.center, -1.0 / s, f * s) for s in _SLOPES)
         return [] if self.is_solid() else list(itertools.chain.from_iterable(planes))
 
     def extent(self) -> float:
-        return base.farthest(self.center) + self.size()
+        return farthest(self.center) + self.size()

@@ -6,13 +6,16 @@ from typing import NamedTuple
 
 from ...checks import Vector, number
 from ...kernel.jit import select
-from .. import base
+from ...kernel.vector import Vec, dot, vec
+from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
+from ..surface import UNBOUNDED, Box, HalfSpace, Surface
+from .common import exact_chord
 
 
 @dataclass(frozen=True, repr=False)
-class Plane(base.Surface):
+class Plane(Surface):
     """A plane wall; admissible is normal.r <= offset, with the normal scaled to unit length.
 
     Args:
@@ -35,7 +38,7 @@ class Plane(base.Surface):
         object.__setattr__(self, "offset", number("offset", self.offset))
 
     def numbers(self) -> "PlaneNumbers":
-        return PlaneNumbers(*turned(self.rotation, self.normal), self.offset)
+        return PlaneNumbers(vec(turned(self.rotation, self.normal)), self.offset)
 
     def walls(self) -> tuple["PlaneNumbers"]:
         return (self.numbers(),)
@@ -43,146 +46,120 @@ class Plane(base.Surface):
     def size(self) -> float:
         return math.inf
 
-    def bounds(self) -> base.Box:
+    def bounds(self) -> Box:
         # Half-spaces bound only together: scene.py does that.
-        return base.UNBOUNDED
+        return UNBOUNDED
 
-    def half_spaces(self) -> list[base.HalfSpace]:
+    def half_spaces(self) -> list[HalfSpace]:
         return [(turned(self.rotation, self.normal), self.offset)]
 
     def extent(self) -> float:
         return abs(self.offset)
 
 
+@exact_chord
 class PlaneNumbers(NamedTuple):
     """What kernels know of a plane."""
 
-    nx: float
-    ny: float
-    nz: float
+    normal: Vec
     offset: float
 
 
 # --- The level set ---------------------------------------------------------------------------------------
 
 
-@base.phi.register(PlaneNumbers)
-def _(surface, x, y, z):
-    return base.inner(surface, x, y, z) - surface.offset
+@contract.phi.register(PlaneNumbers)
+def _(surface, r):
+    return contract.inner(surface, r) - surface.offset
 
 
-@base.gradient.register(PlaneNumbers)
-def _(surface, x, y, z):
-    return surface.nx, surface.ny, surface.nz
+@contract.gradient.register(PlaneNumbers)
+@contract.slope.register(PlaneNumbers)
+@contract.unit_normal.register(PlaneNumbers)
+def _(surface, r):
+    return surface.normal
+
+
+@contract.inner.register(PlaneNumbers)
+def _(surface, r):
+    return dot(surface.normal, r)
+
+
+@contract.gap_of.register(PlaneNumbers)
+def _(surface, q):
+    return q - surface.offset
+
+
+@contract.gap_slope.register(PlaneNumbers)
+def _(surface, q0, q1):
+    return 1.0, 0.0
+
+
+@contract.settle.register(PlaneNumbers)
+def _(surface, r):
+    return r - (contract.inner(surface, r) - surface.offset) * surface.normal
+
+
+@contract.flat.register(PlaneNumbers)
+def _(surface):
+    return True
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@base.first_hit.register(PlaneNumbers)
-def _(surface, x, y, z, vx, vy, vz):
-    approach = base.inner(surface, vx, vy, vz)
-    distance = surface.offset - base.inner(surface, x, y, z)
-    time = distance / approach
+@contract.first_hit.register(PlaneNumbers)
+def _(surface, r, v):
+    approach = dot(surface.normal, v)
+    time = (surface.offset - contract.inner(surface, r)) / approach
     return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
 
 
-@base.falling_hit.register(PlaneNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    c = base.inner(surface, x, y, z) - surface.offset
-    return rise_time(c, 0.5 * base.inner(surface, vx, vy, vz), 0.5 * base.inner(surface, gx, gy, gz)), True
+@contract.falling_hit.register(PlaneNumbers)
+def _(surface, r, v, pull):
+    c = contract.inner(surface, r) - surface.offset
+    return rise_time(c, 0.5 * dot(surface.normal, v), 0.5 * dot(surface.normal, pull)), True
 
 
-@base.safe_time.register(PlaneNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    time, _found = base.falling_hit(surface, x, y, z, vx, vy, vz, gx, gy, gz)
-    return select(base.inner(surface, x, y, z) > surface.offset, 0.0, time)
+@contract.safe_time.register(PlaneNumbers)
+def _(surface, r, v, pull):
+    time, _found = contract.falling_hit(surface, r, v, pull)
+    return select(contract.inner(surface, r) > surface.offset, 0.0, time)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
-@base.flat.register(PlaneNumbers)
-def _(surface):
-    return True
+@contract.inner_gradient.register(PlaneNumbers)
+def _(surface, r0, r1):
+    return surface.normal
 
 
-@base.unit_normal.register(PlaneNumbers)
-def _(surface, x, y, z):
-    return surface.nx, surface.ny, surface.nz
+@contract.push.register(PlaneNumbers)
+def _(surface, r0, p, kappa):
+    return r0 + (p - kappa * surface.normal)
 
 
-@base.chord_guess.register(PlaneNumbers)
-def _(surface, x, y, z, px, py, pz):
-    return base.inner(surface, px, py, pz)
+@contract.rise.register(PlaneNumbers)
+def _(surface, r0, p, kappa):
+    return dot(surface.normal, p) - kappa, -1.0
 
 
-@base.chord_improve.register(PlaneNumbers)
-def _(surface, x, y, z, px, py, pz, kappa):
-    return 0.0
+@contract.resolve.register(PlaneNumbers)
+def _(surface, r, strength):
+    return r - strength * surface.normal
 
 
-@base.chord_sweeps.register(PlaneNumbers)
-def _(surface):
-    return 0
-
-
-@base.chord_normal.register(PlaneNumbers)
-def _(surface, x, y, z, px, py, pz, kappa):
-    return surface.nx, surface.ny, surface.nz
-
-
-@base.inner.register(PlaneNumbers)
-def _(surface, x, y, z):
-    return surface.nx * x + surface.ny * y + surface.nz * z
-
-
-@base.gap_of.register(PlaneNumbers)
-def _(surface, q):
-    return q - surface.offset
-
-
-@base.level_of.register(PlaneNumbers)
-def _(surface, q):
-    return q - surface.offset
-
-
-@base.distance.register(PlaneNumbers)
-def _(surface, x, y, z):
-    return base.gap_of(surface, base.inner(surface, x, y, z))
-
-
-@base.gap_slope.register(PlaneNumbers)
-def _(surface, q0, q1):
-    return 1.0, 0.0
-
-
-@base.inner_gradient.register(PlaneNumbers)
-def _(surface, x0, y0, z0, x1, y1, z1):
-    return surface.nx, surface.ny, surface.nz
-
-
-@base.push.register(PlaneNumbers)
-def _(surface, x0, y0, z0, px, py, pz, kappa):
-    return x0 + (px - kappa * surface.nx), y0 + (py - kappa * surface.ny), z0 + (pz - kappa * surface.nz)
-
-
-@base.resolve.register(PlaneNumbers)
-def _(surface, x, y, z, strength):
-    return x - strength * surface.nx, y - strength * surface.ny, z - strength * surface.nz
-
-
-@base.rise.register(PlaneNumbers)
-def _(surface, x0, y0, z0, px, py, pz, kappa):
-    return base.inner(surface, px, py, pz) - kappa, -1.0
-
-
-@base.farthest_push.register(PlaneNumbers)
+@contract.farthest_push.register(PlaneNumbers)
 def _(surface):
     return math.inf
 
 
-@base.settle.register(PlaneNumbers)
-def _(surface, x, y, z):
-    g = base.inner(surface, x, y, z) - surface.offset
-    return x - g * surface.nx, y - g * surface.ny, z - g * surface.nz
+@contract.chord_guess.register(PlaneNumbers)
+def _(surface, r, p):
+    return dot(surface.normal, p)
+
+
+@contract.chord_normal.register(PlaneNumbers)
+def _(surface, r, p, kappa):
+    return surface.normal

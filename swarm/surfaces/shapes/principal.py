@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...checks import Vector
-from ..rotation import Rotated
 
 # Parts of the largest: an eigenvalue, and a tilt of an axis this small are round-off.
 _FLAT, _TILT = 1e-14, 1e-15
@@ -76,11 +75,6 @@ def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], co
         float(height) if abs(height) > round_off else 0.0,
         float(np.linalg.norm(linear[~curved])),
     )
-
-
-def framed(axes: NDArray[np.float64], body: Any) -> Any:
-    """What kernels take of a surface whose own axes are these columns."""
-    return body if np.array_equal(axes, np.eye(3)) else Rotated(body, *map(float, axes.ravel()))
 
 
 def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ...checks import Vector, number, vector
 from ...errors import SceneError
-from .. import base
 from .. import rotation as rotations
-from .principal import Frame, extents, framed, principal_frame
+from ..surface import UNBOUNDED, Box, Surface, box_around, farthest, side_sign
+from .principal import Frame, extents, principal_frame
 from .quadratic import QuadricNumbers, quadric_numbers
 
 # An asymmetry of this part of the largest entry is round-off.
@@ -22,7 +22,7 @@ Matrix = tuple[Vector, Vector, Vector]
 
 
 @dataclass(frozen=True, repr=False)
-class Quadric(base.Surface):
+class Quadric(Surface):
     """The surface d.A d + b.d + c = 0 with d = r - center: phi is the left side, and below 0 is inside.
 
     Args:
@@ -67,7 +67,7 @@ class Quadric(base.Surface):
         return rotations.matrix(self.rotation) @ self._frame.axes
 
     def walls(self) -> tuple[Any]:
-        return (framed(self._axes(), self.numbers()),)
+        return (rotations.framed(self._axes(), self.numbers()),)
 
     def own_center(self) -> Vector:
         x, y, z = (self._axes().T @ np.array(self.center) + self._frame.shift).tolist()
@@ -80,15 +80,15 @@ class Quadric(base.Surface):
     def size(self) -> float:
         return self._frame.size()
 
-    def bounds(self) -> base.Box:
-        if not self._frame.encloses(base.side_sign(self.side)):
-            return base.UNBOUNDED
+    def bounds(self) -> Box:
+        if not self._frame.encloses(side_sign(self.side)):
+            return UNBOUNDED
         x, y, z = (np.array(self.center) + self._axes() @ self._frame.middle).tolist()
-        return base.box_around((x, y, z), extents(self._axes(), self._frame.semi_axes()), "inside")
+        return box_around((x, y, z), extents(self._axes(), self._frame.semi_axes()), "inside")
 
     def extent(self) -> float:
         lengths = [length for length in (*self._frame.semi_axes(), self.size()) if math.isfinite(length)]
-        return base.farthest(self.center) + math.hypot(*self._frame.middle) + max(lengths, default=0.0)
+        return farthest(self.center) + math.hypot(*self._frame.middle) + max(lengths, default=0.0)
 
 
 def _symmetric(value: Any) -> Matrix:

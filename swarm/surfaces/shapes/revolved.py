@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from ...checks import Vector
-from .. import base
 from .. import rotation as rotations
+from ..surface import HalfSpace, Surface
 
 # Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
 _TANGENTS = 8
 
 
-class Revolved(base.Surface):
+class Revolved(Surface):
     """A surface of revolution, which works in the frame in which its `axis` is z."""
 
     axis: Vector
@@ -38,7 +38,7 @@ class Revolved(base.Surface):
         return (rotations.rotated(self.turn(), self.numbers()),)
 
 
-def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[base.HalfSpace]:
+def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[HalfSpace]:
     """Half-spaces (u + lean axis).(r - through) <= offset for directions u all around a unit vector."""
     frame = rotations.matrix(rotations.onto(axis))
     found = []

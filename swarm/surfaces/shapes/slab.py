@@ -8,17 +8,20 @@ import numpy as np
 
 from ...checks import Vector, length
 from ...kernel.jit import inlined, select
-from .. import base
+from ...kernel.vector import vec
+from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
-from .normal import Normal, along, normal_of, times
+from ..surface import Box, HalfSpace, Surface, box_around, farthest, side_sign
+from .common import exact_chord, root_gap
+from .normal import Normal, along, normal_of, scaled
 
 # A normal as near as this to an axis is that axis, but for the round-off of a rotation.
 _TILT = 1e-15
 
 
 @dataclass(frozen=True, repr=False)
-class Slab(base.Surface):
+class Slab(Surface):
     """Two parallel walls; the space between them or, `side="outside"`, the space around the plate they are.
 
     Args:
@@ -45,7 +48,7 @@ class Slab(base.Surface):
         object.__setattr__(self, "half_width", length("half_width", self.half_width))
 
     def numbers(self) -> "SlabNumbers":
-        return slab_numbers(turned(self.rotation, self.normal), self.half_width, self.center, base.side_sign(self.side))
+        return slab_numbers(turned(self.rotation, self.normal), self.half_width, self.center, side_sign(self.side))
 
     def walls(self) -> tuple["SlabNumbers"]:
         return (self.numbers(),)
@@ -53,14 +56,14 @@ class Slab(base.Surface):
     def size(self) -> float:
         return self.half_width
 
-    def bounds(self) -> base.Box:
+    def bounds(self) -> Box:
         # Along its normal it reaches h, along any other direction to infinity.
         nx, ny, nz = turned(self.rotation, self.normal)
         tilts = math.hypot(ny, nz), math.hypot(nz, nx), math.hypot(nx, ny)
         hx, hy, hz = (self.half_width if tilt <= _TILT else math.inf for tilt in tilts)
-        return base.box_around(self.center, (hx, hy, hz), self.side)
+        return box_around(self.center, (hx, hy, hz), self.side)
 
-    def half_spaces(self) -> list[base.HalfSpace]:
+    def half_spaces(self) -> list[HalfSpace]:
         if self.is_solid():
             return []
         x, y, z = turned(self.rotation, self.normal)
@@ -68,180 +71,136 @@ class Slab(base.Surface):
         return [((x, y, z), self.half_width + middle), ((-x, -y, -z), self.half_width - middle)]
 
     def extent(self) -> float:
-        return base.farthest(self.center) + self.half_width
+        return farthest(self.center) + self.half_width
 
 
+@root_gap
+@exact_chord
 class SlabNumbers(NamedTuple):
     """What kernels know of a slab."""
 
     normal: Normal
     offset: float  # n.c
-    half: float
-    half2: float
+    radius: float  # the half width
+    radius2: float
     side: float
 
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
     """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
     across = normal_of(normal)
-    return SlabNumbers(across, float(along(across, *center)), half, half * half, side)
+    return SlabNumbers(across, float(along(across, vec(center))), half, half * half, side)
 
 
 @inlined
-def _off(surface, x, y, z):
+def _off(surface, r):
     """The signed distance from the middle."""
-    return along(surface.normal, x, y, z) - surface.offset
+    return along(surface.normal, r) - surface.offset
 
 
 # --- The level set ---------------------------------------------------------------------------------------
 
 
-@base.phi.register(SlabNumbers)
-def _(surface, x, y, z):
-    return np.abs(_off(surface, x, y, z)) - surface.half
+@contract.gradient.register(SlabNumbers)
+def _(surface, r):
+    return scaled(surface.normal, np.copysign(1.0, _off(surface, r)))
 
 
-@base.gradient.register(SlabNumbers)
-def _(surface, x, y, z):
-    sign = np.copysign(1.0, _off(surface, x, y, z))
-    return times(surface.normal, sign)
+@contract.inner.register(SlabNumbers)
+def _(surface, r):
+    d = _off(surface, r)
+    return d * d
+
+
+@contract.slope.register(SlabNumbers)
+def _(surface, r):
+    return scaled(surface.normal, 2.0 * _off(surface, r))
+
+
+@contract.unit_normal.register(SlabNumbers)
+def _(surface, r):
+    return scaled(surface.normal, math.copysign(1.0, surface.side * _off(surface, r)))
+
+
+@contract.settle.register(SlabNumbers)
+def _(surface, r):
+    d = _off(surface, r)
+    return r - scaled(surface.normal, d - math.copysign(surface.radius, d))
+
+
+@contract.flat.register(SlabNumbers)
+def _(surface):
+    return True
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@base.first_hit.register(SlabNumbers)
-def _(surface, x, y, z, vx, vy, vz):
-    d, v = _off(surface, x, y, z), along(surface.normal, vx, vy, vz)
+@contract.first_hit.register(SlabNumbers)
+def _(surface, r, v):
+    d, u = _off(surface, r), along(surface.normal, v)
     # Between the walls the one ahead, outside of them the one on the side where the flight comes from
-    time = (surface.side * math.copysign(surface.half, v) - d) / v
-    meets = select(surface.side > 0.0, abs(v), -d * v) > 0.0
+    time = (surface.side * math.copysign(surface.radius, u) - d) / u
+    meets = select(surface.side > 0.0, abs(u), -d * u) > 0.0
     return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
 
-@base.falling_hit.register(SlabNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    d, sign = _off(surface, x, y, z), math.copysign(0.5, _off(surface, x, y, z))
-    b, a = sign * along(surface.normal, vx, vy, vz), sign * along(surface.normal, gx, gy, gz)
+@contract.falling_hit.register(SlabNumbers)
+def _(surface, r, v, pull):
+    d = _off(surface, r)
+    sign = math.copysign(0.5, d)
+    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
     # The near wall and, between them, the far one: each is a plane.
-    near = rise_time(surface.side * (abs(d) - surface.half), surface.side * b, surface.side * a)
-    far = rise_time(-abs(d) - surface.half, -b, -a)
+    near = rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
+    far = rise_time(-abs(d) - surface.radius, -b, -a)
     return select((surface.side > 0.0) & (far < near), far, near), True
 
 
-@base.safe_time.register(SlabNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    time, _found = base.falling_hit(surface, x, y, z, vx, vy, vz, gx, gy, gz)
-    outside = surface.side * (abs(_off(surface, x, y, z)) - surface.half) > 0.0
-    return select(outside, 0.0, time)
-
-
-@base.flat.register(SlabNumbers)
-def _(surface):
-    return True
+@contract.safe_time.register(SlabNumbers)
+def _(surface, r, v, pull):
+    time, _found = contract.falling_hit(surface, r, v, pull)
+    return select(contract.distance(surface, r) > 0.0, 0.0, time)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
-@base.unit_normal.register(SlabNumbers)
-def _(surface, x, y, z):
-    k = math.copysign(1.0, surface.side * _off(surface, x, y, z))
-    return times(surface.normal, k)
-
-
-@base.chord_guess.register(SlabNumbers)
-def _(surface, x, y, z, px, py, pz):
-    # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-    return 0.5 * along(surface.normal, px, py, pz) / _off(surface, x, y, z)
-
-
-@base.chord_improve.register(SlabNumbers)
-def _(surface, x, y, z, px, py, pz, kappa):
-    return 0.0
-
-
-@base.chord_sweeps.register(SlabNumbers)
-def _(surface):
-    return 0
-
-
-@base.chord_normal.register(SlabNumbers)
-def _(surface, x, y, z, px, py, pz, kappa):
-    d = 2.0 * _off(surface, x, y, z) + along(surface.normal, px, py, pz)
-    k = math.copysign(1.0, surface.side * d)
-    return times(surface.normal, k)
-
-
-@base.inner.register(SlabNumbers)
-def _(surface, x, y, z):
-    d = _off(surface, x, y, z)
-    return d * d
-
-
-@base.gap_of.register(SlabNumbers)
-def _(surface, q):
-    return surface.side * (math.sqrt(q) - surface.half)
-
-
-@base.level_of.register(SlabNumbers)
-def _(surface, q):
-    return surface.side * (q - surface.half2)
-
-
-@base.distance.register(SlabNumbers)
-def _(surface, x, y, z):
-    return surface.side * (abs(_off(surface, x, y, z)) - surface.half)
-
-
-@base.gap_slope.register(SlabNumbers)
-def _(surface, q0, q1):
-    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1))
-    root1 = math.sqrt(q1)
-    slope = 1.0 / (math.sqrt(q0) + root1)
-    return surface.side * slope, -0.5 * surface.side * slope * slope / root1
-
-
-@base.inner_gradient.register(SlabNumbers)
-def _(surface, x0, y0, z0, x1, y1, z1):
+@contract.inner_gradient.register(SlabNumbers)
+def _(surface, r0, r1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    k = _off(surface, x0, y0, z0) + _off(surface, x1, y1, z1)
-    return times(surface.normal, k)
+    return scaled(surface.normal, _off(surface, r0) + _off(surface, r1))
 
 
-@base.push.register(SlabNumbers)
-def _(surface, x0, y0, z0, px, py, pz, kappa):
+@contract.push.register(SlabNumbers)
+def _(surface, r0, p, kappa):
     # r1 = r0 + p - kappa (s0 + s1) n
-    k = kappa * (2.0 * _off(surface, x0, y0, z0) + along(surface.normal, px, py, pz)) / (1.0 + kappa)
-    kx, ky, kz = times(surface.normal, k)
-    return x0 + (px - kx), y0 + (py - ky), z0 + (pz - kz)
+    k = kappa * (2.0 * _off(surface, r0) + along(surface.normal, p)) / (1.0 + kappa)
+    return r0 + (p - scaled(surface.normal, k))
 
 
-@base.resolve.register(SlabNumbers)
-def _(surface, x, y, z, strength):
-    k = 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, x, y, z)
-    kx, ky, kz = times(surface.normal, k)
-    return x - kx, y - ky, z - kz
-
-
-@base.rise.register(SlabNumbers)
-def _(surface, x0, y0, z0, px, py, pz, kappa):
+@contract.rise.register(SlabNumbers)
+def _(surface, r0, p, kappa):
     # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
-    d, p = _off(surface, x0, y0, z0), along(surface.normal, px, py, pz)
+    d, u = _off(surface, r0), along(surface.normal, p)
     w = 1.0 / (1.0 + kappa)
-    both, change = (2.0 * d + p) * w, (p - 2.0 * kappa * d) * w
+    both, change = (2.0 * d + u) * w, (u - 2.0 * kappa * d) * w
     risen = both * change
     # q1 >= 0, even by round-off.
     return select(risen > -d * d, risen, -d * d), -2.0 * (d + change) * both * w
 
 
-@base.farthest_push.register(SlabNumbers)
-def _(surface):
-    return select(surface.side > 0.0, math.inf, -1.0)
+@contract.resolve.register(SlabNumbers)
+def _(surface, r, strength):
+    return r - scaled(surface.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, r))
 
 
-@base.settle.register(SlabNumbers)
-def _(surface, x, y, z):
-    d = _off(surface, x, y, z)
-    fx, fy, fz = times(surface.normal, d - math.copysign(surface.half, d))
-    return x - fx, y - fy, z - fz
+@contract.chord_guess.register(SlabNumbers)
+def _(surface, r, p):
+    # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
+    return 0.5 * along(surface.normal, p) / _off(surface, r)
+
+
+@contract.chord_normal.register(SlabNumbers)
+def _(surface, r, p, kappa):
+    d = 2.0 * _off(surface, r) + along(surface.normal, p)
+    return scaled(surface.normal, math.copysign(1.0, surface.side * d))

@@ -11,9 +11,10 @@ import numpy as np
 
 from ...kernel.gravity import Gravity, Nothing, accelerated, displacement
 from ...kernel.jit import by_type, inlined, outlined
-from .. import base, smooth
-from ..chain import Chain
+from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
+from .. import contract
 from ..flights import hit
+from ..fold import Chain
 from ..rotation import Rotated
 from .plane import PlaneNumbers
 
@@ -66,203 +67,185 @@ def _(part):
 # --- The level set ---------------------------------------------------------------------------------------
 
 
-@base.phi.register(SolidNumbers)
-def _(surface, x, y, z):
-    return _largest(surface.parts, x, y, z)[0]
+@contract.phi.register(SolidNumbers)
+def _(surface, r):
+    return _largest(surface.parts, r)[0]
 
 
-@base.gradient.register(SolidNumbers)
-def _(surface, x, y, z):
-    _phi, gx, gy, gz = _largest(surface.parts, x, y, z)
-    return gx, gy, gz
+@contract.gradient.register(SolidNumbers)
+def _(surface, r):
+    return _largest(surface.parts, r)[1]
 
 
 @by_type
-def _largest(parts, x, y, z):
+def _largest(parts, r):
     """The largest phi of the parts, and its gradient."""
     raise NotImplementedError
 
 
 @_largest.register(Chain)
-def _(parts, x, y, z):
+def _(parts, r):
     sign = _sign(parts.first)
-    here, other = sign * base.phi(parts.first, x, y, z), _largest(parts.rest, x, y, z)
-    gx, gy, gz = base.gradient(parts.first, x, y, z)
+    here, (other, gradient) = sign * contract.phi(parts.first, r), _largest(parts.rest, r)
     # No select: these may be arrays.
-    use = 1.0 * (here >= other[0])
-    return (
-        np.maximum(here, other[0]),
-        use * sign * gx + (1.0 - use) * other[1],
-        use * sign * gy + (1.0 - use) * other[2],
-        use * sign * gz + (1.0 - use) * other[3],
-    )
+    use = 1.0 * (here >= other)
+    return np.maximum(here, other), (use * sign) * contract.gradient(parts.first, r) + (1.0 - use) * gradient
 
 
 @_largest.register(Nothing)
-def _(parts, x, y, z):
-    return -math.inf, 0.0, 0.0, 0.0
+def _(parts, r):
+    return -math.inf, ZERO
 
 
-@smooth.hessian.register(SolidNumbers)
-def _(surface, x, y, z):
-    h = _SPACING * (abs(x) + abs(y) + abs(z) + surface.extent) + np.finfo(np.float64).tiny
-    return _bend_of_largest(surface.parts, x, y, z, h)[1:]
+@contract.hessian.register(SolidNumbers)
+def _(surface, r):
+    h = _SPACING * (total(absolute(r)) + surface.extent) + np.finfo(np.float64).tiny
+    return _bend_of_largest(surface.parts, r, h)[1]
 
 
 @by_type
-def _bend_of_largest(parts, x, y, z, h):
-    """The largest phi of the parts, and half its second derivatives (xx, yy, zz, xy, yz, zx), by differences."""
+def _bend_of_largest(parts, r, h):
+    """The largest phi of the parts, and half its second derivatives, by differences."""
     raise NotImplementedError
 
 
 @_bend_of_largest.register(Chain)
-def _(parts, x, y, z, h):
-    other = _bend_of_largest(parts.rest, x, y, z, h)
+def _(parts, r, h):
+    other = _bend_of_largest(parts.rest, r, h)
     sign = _sign(parts.first)
-    here = sign * base.phi(parts.first, x, y, z)
+    here = sign * contract.phi(parts.first, r)
     if here < other[0]:
         return other
     f = 0.25 * sign / h
-    ax, ay, az = base.gradient(parts.first, x + h, y, z)
-    bx, by, bz = base.gradient(parts.first, x - h, y, z)
-    xx, xy, zx = f * (ax - bx), f * (ay - by), f * (az - bz)
-    ax, ay, az = base.gradient(parts.first, x, y + h, z)
-    bx, by, bz = base.gradient(parts.first, x, y - h, z)
-    yy, yz = f * (ay - by), f * (az - bz)
-    ax, ay, az = base.gradient(parts.first, x, y, z + h)
-    bx, by, bz = base.gradient(parts.first, x, y, z - h)
-    return here, xx, yy, f * (az - bz), xy, yz, zx
+    x, y = _turn(parts.first, r, Vec(h, 0.0, 0.0), f), _turn(parts.first, r, Vec(0.0, h, 0.0), f)
+    z = _turn(parts.first, r, Vec(0.0, 0.0, h), f)
+    return here, Symmetric(x.x, y.y, z.z, x.y, y.z, x.z)
+
+
+@inlined
+def _turn(part, r, step, f):
+    return f * (contract.gradient(part, r + step) - contract.gradient(part, r - step))
 
 
 @_bend_of_largest.register(Nothing)
-def _(parts, x, y, z, h):
-    return -math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def _(parts, r, h):
+    return -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@base.first_hit.register(SolidNumbers)
-def _(surface, x, y, z, vx, vy, vz):
-    return _entry(surface, None, x, y, z, vx, vy, vz)
+@contract.first_hit.register(SolidNumbers)
+def _(surface, r, v):
+    return _entry(surface, None, r, v)
 
 
-@base.falling_hit.register(SolidNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    return _entry(surface, Gravity(gx, gy, gz), x, y, z, vx, vy, vz)
+@contract.falling_hit.register(SolidNumbers)
+def _(surface, r, v, pull):
+    return _entry(surface, Gravity(pull.x, pull.y, pull.z), r, v)
 
 
 @outlined
-def _entry(surface, gravity, x, y, z, vx, vy, vz):
+def _entry(surface, gravity, r, v):
     """When the flight is inside of all parts for the first time: (time, whether it is then)."""
     t = 0.0
     for _i in range(_ENTRIES):
-        dx, dy, dz = displacement(gravity, vx, vy, vz, t)
-        px, py, pz = x + dx, y + dy, z + dz
-        wx, wy, wz = accelerated(gravity, vx, vy, vz, t)
+        p, w = r + displacement(gravity, v, t), accelerated(gravity, v, t)
         # Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
-        wait, found = _last_entry(surface.parts, gravity, surface.extent, px, py, pz, wx, wy, wz)
+        wait, found = _last_entry(surface.parts, gravity, surface.extent, p, w)
         if not found or not wait < math.inf:
             return t + wait, found
-        sx, sy, sz = displacement(gravity, wx, wy, wz, wait)
+        moved = total(absolute(displacement(gravity, w, wait)))
         # The place is known to round-off of its own coordinates and of those the flight comes from.
-        coordinates = abs(px) + abs(py) + abs(pz) + abs(x) + abs(y) + abs(z)
-        if abs(sx) + abs(sy) + abs(sz) <= 4.0 * _EPSILON * (coordinates + surface.extent):
+        coordinates = total(absolute(p)) + abs(r.x) + abs(r.y) + abs(r.z)
+        if moved <= 4.0 * _EPSILON * (coordinates + surface.extent):
             return t + wait, True
         t += wait
     return t, False
 
 
 @by_type
-def _last_entry(parts, gravity, extent, x, y, z, vx, vy, vz):
+def _last_entry(parts, gravity, extent, r, v):
     """When the last of the parts is entered that the particle is not inside of: (time, whether it is then)."""
     raise NotImplementedError
 
 
 @_last_entry.register(Chain)
-def _(parts, gravity, extent, x, y, z, vx, vy, vz):
-    time, found = _last_entry(parts.rest, gravity, extent, x, y, z, vx, vy, vz)
+def _(parts, gravity, extent, r, v):
+    time, found = _last_entry(parts.rest, gravity, extent, r, v)
     # On the face of a part, which is left or entered now, the sign of the approach decides.
-    if _depth(parts.first, x, y, z) > _noise(parts.first, extent, x, y, z):
+    depth = contract.gap_of(parts.first, contract.inner(parts.first, r))
+    if depth > _noise(parts.first, extent, r):
         return time, found
-    here, found_here = hit(gravity, parts.first, x, y, z, vx, vy, vz)
+    here, found_here = hit(gravity, parts.first, r, v)
     if here > time:
         return here, found_here
     return time, found
 
 
 @_last_entry.register(Nothing)
-def _(parts, gravity, extent, x, y, z, vx, vy, vz):
+def _(parts, gravity, extent, r, v):
     return 0.0, True
 
 
 @inlined
-def _depth(part, x, y, z):
-    """The gap of a part: above 0 inside of it."""
-    return base.gap_of(part, base.inner(part, x, y, z))
-
-
-@inlined
-def _noise(part, extent, x, y, z):
-    """The round-off of that gap."""
-    gx, gy, gz = base.gradient(part, x, y, z)
-    terms = base.gap_scale(part, x, y, z) + extent * (abs(gx) + abs(gy) + abs(gz)) + abs(base.gap_of(part, 0.0))
+def _noise(part, extent, r):
+    """The round-off of the gap of a part."""
+    gradient = total(absolute(contract.gradient(part, r)))
+    terms = contract.gap_scale(part, r) + extent * gradient + abs(contract.gap_of(part, 0.0))
     return _ULPS * _EPSILON * terms
 
 
-@base.safe_time.register(SolidNumbers)
-def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-    return _longest_safe_time(surface.parts, x, y, z, vx, vy, vz, gx, gy, gz)
+@contract.safe_time.register(SolidNumbers)
+def _(surface, r, v, pull):
+    return _longest_safe_time(surface.parts, r, v, pull)
 
 
 @by_type
-def _longest_safe_time(parts, x, y, z, vx, vy, vz, gx, gy, gz):
+def _longest_safe_time(parts, r, v, pull):
     """Outside of one part is outside of the body."""
     raise NotImplementedError
 
 
 @_longest_safe_time.register(Chain)
-def _(parts, x, y, z, vx, vy, vz, gx, gy, gz):
-    here = base.safe_time(parts.first, x, y, z, vx, vy, vz, gx, gy, gz)
-    return max(here, _longest_safe_time(parts.rest, x, y, z, vx, vy, vz, gx, gy, gz))
+def _(parts, r, v, pull):
+    return max(contract.safe_time(parts.first, r, v, pull), _longest_safe_time(parts.rest, r, v, pull))
 
 
 @_longest_safe_time.register(Nothing)
-def _(parts, x, y, z, vx, vy, vz, gx, gy, gz):
+def _(parts, r, v, pull):
     return 0.0
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
-@base.unit_normal.register(SolidNumbers)
-def _(surface, x, y, z):
-    _depth, nx, ny, nz = _outermost(surface.parts, x, y, z)
-    return nx, ny, nz
+@contract.unit_normal.register(SolidNumbers)
+def _(surface, r):
+    return _outermost(surface.parts, r)[1]
 
 
 @by_type
-def _outermost(parts, x, y, z):
+def _outermost(parts, r):
     """The distance into the part that the point is least deep in, and that part's normal."""
     raise NotImplementedError
 
 
 @_outermost.register(Chain)
-def _(parts, x, y, z):
-    other = _outermost(parts.rest, x, y, z)
-    depth = base.distance(parts.first, x, y, z)
+def _(parts, r):
+    other = _outermost(parts.rest, r)
+    depth = contract.distance(parts.first, r)
     if depth > other[0]:
         return other
-    nx, ny, nz = base.unit_normal(parts.first, x, y, z)
-    return depth, nx, ny, nz
+    return depth, contract.unit_normal(parts.first, r)
 
 
 @_outermost.register(Nothing)
-def _(parts, x, y, z):
-    return math.inf, 0.0, 0.0, 0.0
+def _(parts, r):
+    return math.inf, ZERO
 
 
-@base.farthest_push.register(SolidNumbers)
+@contract.farthest_push.register(SolidNumbers)
 def _(surface):
     # phi is about the distance, whose faces are flat or wide: no pole within a push.
     return -math.inf

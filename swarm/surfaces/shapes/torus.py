@@ -8,11 +8,14 @@ import numpy as np
 from ...checks import Vector, length
 from ...errors import SceneError
 from ...kernel.jit import inlined, select
-from .. import base, smooth
+from ...kernel.vector import Symmetric, Vec, dot, square, vec
+from .. import contract
+from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
+from .common import root_gap
 
 
 @dataclass(frozen=True, repr=False)
-class Torus(base.Surface):
+class Torus(Surface):
     """A ring torus about its own z axis; the cavity in the tube or the space around the solid.
 
     Args:
@@ -43,127 +46,91 @@ class Torus(base.Surface):
             )
 
     def numbers(self) -> "TorusNumbers":
-        return TorusNumbers(*self.own_center(), self.major_radius, self.minor_radius, base.side_sign(self.side))
+        minor, side = self.minor_radius, side_sign(self.side)
+        return TorusNumbers(vec(self.own_center()), self.major_radius, minor, minor * minor, side)
 
     def size(self) -> float:
         return self.minor_radius
 
-    def bounds(self) -> base.Box:
+    def bounds(self) -> Box:
         wide = self.major_radius + self.minor_radius
-        box = base.box_around(self.center, (wide, wide, self.minor_radius), self.side)
-        return base.rotated_box(self.rotation, box, self.center)
+        box = box_around(self.center, (wide, wide, self.minor_radius), self.side)
+        return rotated_box(self.rotation, box, self.center)
 
     def extent(self) -> float:
-        return base.farthest(self.center) + self.major_radius + self.minor_radius
+        return farthest(self.center) + self.major_radius + self.minor_radius
 
 
+@root_gap
 class TorusNumbers(NamedTuple):
     """What kernels know of a torus."""
 
-    cx: float
-    cy: float
-    cz: float
+    center: Vec
     major: float
-    minor: float
+    radius: float  # of the tube
+    radius2: float
     side: float
 
 
 @inlined
-def _from_axis(surface, x, y):
+def _from_axis(surface, r):
     """rho, never 0: on the axis the direction to the tube is not defined."""
-    dx, dy = x - surface.cx, y - surface.cy
-    return np.maximum(np.sqrt(dx * dx + dy * dy), np.finfo(np.float64).tiny)
+    d = r - surface.center
+    return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), np.finfo(np.float64).tiny)
 
 
 # --- The level set ---------------------------------------------------------------------------------------
 
 
-@base.phi.register(TorusNumbers)
-def _(surface, x, y, z):
-    return np.sqrt(base.inner(surface, x, y, z)) - surface.minor
-
-
-@base.gradient.register(TorusNumbers)
-def _(surface, x, y, z):
-    # In the middle of the tube, where the distance has no gradient, the answer is 0.
-    gx, gy, gz = smooth.slope(surface, x, y, z)
-    half = 0.5 / np.maximum(np.sqrt(base.inner(surface, x, y, z)), np.finfo(np.float64).tiny)
-    return half * gx, half * gy, half * gz
-
-
-@base.inner.register(TorusNumbers)
-def _(surface, x, y, z):
-    across, dz = _from_axis(surface, x, y) - surface.major, z - surface.cz
+@contract.inner.register(TorusNumbers)
+def _(surface, r):
+    across, dz = _from_axis(surface, r) - surface.major, r.z - surface.center.z
     return across * across + dz * dz
 
 
-@smooth.slope.register(TorusNumbers)
-def _(surface, x, y, z):
-    f = 2.0 - 2.0 * surface.major / _from_axis(surface, x, y)
-    return f * (x - surface.cx), f * (y - surface.cy), 2.0 * (z - surface.cz)
+@contract.slope.register(TorusNumbers)
+def _(surface, r):
+    d, f = r - surface.center, 2.0 - 2.0 * surface.major / _from_axis(surface, r)
+    return Vec(f * d.x, f * d.y, 2.0 * d.z)
 
 
-@smooth.hessian.register(TorusNumbers)
-def _(surface, x, y, z):
+@contract.hessian.register(TorusNumbers)
+def _(surface, r):
     # 1 across the tube, 1 - R/rho along it: I - (R/rho) e e^T
-    rho = _from_axis(surface, x, y)
-    ex, ey, f = -(y - surface.cy) / rho, (x - surface.cx) / rho, surface.major / rho
-    return 1.0 - f * ex * ex, 1.0 - f * ey * ey, 1.0, -f * ex * ey, 0.0, 0.0
+    d, rho = r - surface.center, _from_axis(surface, r)
+    ex, ey, f = -d.y / rho, d.x / rho, surface.major / rho
+    return Symmetric(1.0 - f * ex * ex, 1.0 - f * ey * ey, 1.0, -f * ex * ey, 0.0, 0.0)
 
 
-@smooth.difference.register(TorusNumbers)
-def _(surface, x0, y0, z0, x1, y1, z1):
-    rho0, rho1 = _from_axis(surface, x0, y0), _from_axis(surface, x1, y1)
-    across = (x1 - x0) * (x0 + x1 - 2.0 * surface.cx) + (y1 - y0) * (y0 + y1 - 2.0 * surface.cy)
-    along = (z1 - z0) * (z0 + z1 - 2.0 * surface.cz)
-    return across * (1.0 - 2.0 * surface.major / (rho0 + rho1)) + along
-
-
-@base.gap_of.register(TorusNumbers)
-def _(surface, q):
-    return surface.side * (np.sqrt(q) - surface.minor)
-
-
-@base.level_of.register(TorusNumbers)
-def _(surface, q):
-    return surface.side * (q - surface.minor * surface.minor)
-
-
-@base.gap_slope.register(TorusNumbers)
-def _(surface, q0, q1):
-    root1 = np.sqrt(q1)
-    slope = 1.0 / (np.sqrt(q0) + root1)
-    return surface.side * slope, -0.5 * surface.side * slope * slope / root1
+@contract.difference.register(TorusNumbers)
+def _(surface, r0, r1):
+    rho0, rho1 = _from_axis(surface, r0), _from_axis(surface, r1)
+    d, both = r1 - r0, r0 + r1 - 2.0 * surface.center
+    across = d.x * both.x + d.y * both.y
+    return across * (1.0 - 2.0 * surface.major / (rho0 + rho1)) + d.z * both.z
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@smooth.bend.register(TorusNumbers)
-def _(surface, x, y, z):
+@contract.bend.register(TorusNumbers)
+def _(surface, r):
     # Half way to the axis at most, where 1 - R/rho is largest.
-    rho = _from_axis(surface, x, y)
+    rho = _from_axis(surface, r)
     along = 2.0 * surface.major / rho
     return select(surface.side > 0.0, 1.0, along - 1.0), 1.0 + along, 0.5 * rho
 
 
-@smooth.clearance.register(TorusNumbers)
-def _(surface, x, y, z):
-    return -base.gap_of(surface, base.inner(surface, x, y, z))
-
-
-@smooth.passed.register(TorusNumbers)
-def _(surface, x, y, z, vx, vy, vz):
-    dx, dy, dz = x - surface.cx, y - surface.cy, z - surface.cz
-    wide = surface.major + surface.minor
-    away = dx * vx + dy * vy + dz * vz >= 0.0
-    return (surface.side < 0.0) & away & (dx * dx + dy * dy + dz * dz > wide * wide)
+@contract.passed.register(TorusNumbers)
+def _(surface, r, v):
+    d, wide = r - surface.center, surface.major + surface.radius
+    return (surface.side < 0.0) & (dot(d, v) >= 0.0) & (square(d) > wide * wide)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
-@base.farthest_push.register(TorusNumbers)
+@contract.farthest_push.register(TorusNumbers)
 def _(surface):
     # Where I + kappa H has its first pole: along the inner equator of a cavity, across the tube of a solid.
-    return select(surface.side > 0.0, surface.major / surface.minor - 1.0, -1.0)
+    return select(surface.side > 0.0, surface.major / surface.radius - 1.0, -1.0)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import base, chain, flights
+from swarm.surfaces import contract, flights, fold
 
 every_chain = pytest.mark.parametrize(
     "names",
@@ -28,12 +28,12 @@ every_chain = pytest.mark.parametrize(
 def both(names):
     """The chain, and the surfaces' numbers one by one."""
     surfaces = tuple(SURFACES[name]() for name in names)
-    return chain.chain_of(surfaces), [wall for surface in surfaces for wall in surface.walls()]
+    return fold.chain_of(surfaces), [wall for surface in surfaces for wall in surface.walls()]
 
 
 def is_out(numbers, point):
     """Outside one surface, by its level."""
-    return call(base.level_of, numbers, call(base.inner, numbers, point)) > 0.0
+    return call(contract.level_of, numbers, call(contract.inner, numbers, point)) > 0.0
 
 
 def first_least(hits):
@@ -51,9 +51,9 @@ def first_least(hits):
 def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
     whole, single = both(names)
     gravity = Gravity(*pull) if falling else None
-    one, more = (base.falling_hit, (pull,)) if falling else (base.first_hit, ())
+    one, more = (contract.falling_hit, (pull,)) if falling else (contract.first_hit, ())
     hits = [call(one, numbers, point, velocity, *more) for numbers in single]
-    assert chain.length(whole) == len(names)
+    assert fold.length(whole) == len(names)
     assert call(flights.first_hit, whole, gravity, point, velocity) == first_least(hits)
     for index, hit in enumerate(hits):
         assert call(flights.hit_of, whole, gravity, index, point, velocity) == hit
@@ -63,7 +63,7 @@ def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
 @given(point=vectors, velocity=directions)
 def test_other_hit_is_the_least_of_the_others(names, point, velocity):
     whole, single = both(names)
-    hits = [call(base.first_hit, numbers, point, velocity) for numbers in single]
+    hits = [call(contract.first_hit, numbers, point, velocity) for numbers in single]
     for index in range(len(hits)):
         others = [(math.inf, True) if i == index else hit for i, hit in enumerate(hits)]
         least, other = call(flights.other_hit, whole, index, point, velocity)
@@ -76,7 +76,7 @@ def test_other_hit_is_the_least_of_the_others(names, point, velocity):
 @given(point=vectors, velocity=directions, pull=directions)
 def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
     whole, single = both(names)
-    safe = [call(base.safe_time, numbers, point, velocity, pull) for numbers in single]
+    safe = [call(contract.safe_time, numbers, point, velocity, pull) for numbers in single]
     assert call(flights.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
     assert call(flights.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
     free = call(flights.free_time, None, whole, point, velocity)
@@ -92,15 +92,15 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
     whole, single = both(names)
     for index, numbers in enumerate(single):
         for pick, one, arguments in [
-            (chain.unit_normal, base.unit_normal, (point,)),
-            (chain.chord_guess, base.chord_guess, (point, 0.1 * free)),
-            (chain.chord_improve, base.chord_improve, (point, 0.1 * free, kappa)),
-            (chain.chord_normal, base.chord_normal, (point, 0.1 * free, kappa)),
-            (chain.settle, base.settle, (point,)),
-            (chain.push, base.push, (point, free, kappa)),
-            (chain.inner_gradient, base.inner_gradient, (point, free)),
+            (fold.unit_normal, contract.unit_normal, (point,)),
+            (fold.chord_guess, contract.chord_guess, (point, 0.1 * free)),
+            (fold.chord_improve, contract.chord_improve, (point, 0.1 * free, kappa)),
+            (fold.chord_normal, contract.chord_normal, (point, 0.1 * free, kappa)),
+            (fold.settle, contract.settle, (point,)),
+            (fold.push, contract.push, (point, free, kappa)),
+            (fold.inner_gradient, contract.inner_gradient, (point, free)),
         ]:
-            assert call(pick, whole, index, *arguments) == call(one, numbers, *arguments), pick.__name__
+            assert call(pick, whole, index, *arguments) == call(one, numbers, *arguments), one.__name__
 
 
 @every_chain
@@ -108,9 +108,9 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
 def test_who_is_outside_and_who_is_touched(names, point, free):
     whole, single = both(names)
     out = [is_out(numbers, point) for numbers in single]
-    assert call(chain.outside, whole, -1.0, point) == any(out)
+    assert call(fold.outside, whole, -1.0, point) == any(out)
     for index in range(len(single)):
-        assert call(chain.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
+        assert call(fold.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
     touched = [now or is_out(numbers, point + free) for now, numbers in zip(out, single, strict=True)]
     first = touched.index(True) if any(touched) else -1
-    assert call(chain.touched, whole, point, free) == (first, sum(touched))
+    assert call(fold.touched, whole, point, free) == (first, sum(touched))

@@ -1,12 +1,14 @@
-"""A user's function, frozen: a copy of it and of everything it refers to, and a digest of the two.
+"""A function that is not of this package, frozen: a copy of it and of all it refers to, and a digest of the two.
 
 What is compiled is the copy, so code that is found again by its digest is the code that was digested: after an edit
 anywhere, or when a global changes, the digest is another one.
 """
 
 import builtins
+import contextlib
 import dis
 import hashlib
+import operator
 import os
 import types
 from collections.abc import Callable, Iterator
@@ -15,59 +17,66 @@ from typing import Any
 import numba
 import numpy as np
 
-from ...kernel.jit import inlined
-
+Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
-# Modules that are known by their version; any other is known by what the function takes from it.
-_VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__}
-# The cache folder is named by a hash of this package.
-_VERSIONS["swarm"] = ""
+# Modules that are known by their version; any other is known by what the function takes from it. The cache folder is
+# named by the code of this package's kernels.
+_VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__, "swarm": ""}
+_CODE = operator.attrgetter(
+    "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
+    "co_kwonlyargcount", "co_posonlyargcount",
+)  # fmt: skip
 
 
 class Frozen:
-    """Copies of functions and the digest of all of them together."""
+    """Copies of functions and of everything they refer to, and the digest of all of them together.
 
-    def __init__(self) -> None:
+    Args:
+        prepared: what makes a copy one that kernels can call, where that is wanted.
+    """
+
+    def __init__(self, prepared: Callable[[Function], Function] = lambda copy: copy) -> None:
+        self._prepared = prepared
         self._hash = hashlib.sha256()
-        self._copies: dict[int, types.FunctionType] = {}
-        # Keeps what `_copies` names by its id.
-        self._seen: list[Any] = []
+        self._copies: dict[Function, Function] = {}
 
     def digest(self) -> str:
         """16 hexadecimal digits of what was frozen so far."""
         return self._hash.hexdigest()[:16]
 
-    def function(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """A copy of a function, which kernels can call."""
+    def function(self, function: Function) -> Function:
+        """A copy of a function."""
         function = getattr(function, "py_func", function)
         assert isinstance(function, types.FunctionType)
-        if id(function) in self._copies:
-            self._add("again", list(self._copies).index(id(function)))
-            return self._copies[id(function)]
+        if function in self._copies:
+            self._add("again", list(self._copies).index(function))
+            return self._copies[function]
         code = function.__code__
         # Numba finds the module of a function again by this name when it loads a kernel.
         scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
         cells = tuple(types.CellType() for _ in code.co_freevars)
-        copy = types.FunctionType(code, scope, function.__name__, None, cells or None)
-        self._copies[id(function)] = copy
-        self._seen.append(function)
-        self._code(code)
+        copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
+        for part in _parts(code):
+            constants = [one for one in part.co_consts if not isinstance(one, types.CodeType)]
+            self._add(*_CODE(part))
+            self._add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
         copy.__defaults__ = self.value(function.__defaults__)
         self._add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
         for cell, original in zip(cells, function.__closure__ or (), strict=True):
-            # An empty cell is a name that has no value yet: left empty, its use fails as it would have.
-            for value in _contents(original):
-                cell.cell_contents = self.value(value, code)
-        for name in sorted(set(_globals(code))):
+            # A cell is empty where the name has no value yet: its use fails as it would have.
+            with contextlib.suppress(ValueError):
+                cell.cell_contents = self.value(original.cell_contents, code)
+        # The names in the code alone are those of attributes too.
+        instructions = (one for part in _parts(code) for one in dis.get_instructions(part))
+        for name in sorted({one.argval for one in instructions if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}):
             self._add("global", name)
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name], code)
-        inlined(copy)
-        return copy
+        return self._prepared(copy)
 
     def value(self, value: Any, code: types.CodeType | None = None) -> Any:
-        """What a function refers to; `code` says which of a module's names."""
+        """A copy of what a function refers to; `code` says which of a module's names it takes."""
         if type(value) in _PLAIN or isinstance(value, np.generic):
             self._add(type(value).__name__, value)
         elif isinstance(value, tuple) and (type(value) is tuple or hasattr(value, "_fields")):
@@ -75,8 +84,7 @@ class Frozen:
             parts = [self.value(part, code) for part in value]
             return tuple(parts) if type(value) is tuple else type(value)(*parts)
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
-            self._add("array", value.dtype.str, value.shape, value.strides)
-            self._hash.update(value.tobytes())
+            self._add("array", value.dtype.str, value.shape, value.strides, value.tobytes())
             return value.copy(order="K")
         elif _root(value) in _VERSIONS:
             self._add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS[_root(value)])
@@ -98,15 +106,6 @@ class Frozen:
                 setattr(copy, name, self.value(getattr(module, name), code))
         return copy
 
-    def _code(self, code: types.CodeType) -> None:
-        for part in _parts(code):
-            constants = [one for one in part.co_consts if not isinstance(one, types.CodeType)]
-            self._add(
-                part.co_code, part.co_exceptiontable, part.co_flags, part.co_names, part.co_varnames,
-                part.co_freevars, part.co_cellvars, part.co_argcount, part.co_kwonlyargcount, part.co_posonlyargcount,
-            )  # fmt: skip
-            self._add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
-
     def _add(self, *parts: Any) -> None:
         # The length of each, so that two parts are never taken for one.
         for part in parts:
@@ -120,20 +119,6 @@ def _parts(code: types.CodeType) -> Iterator[types.CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield from _parts(constant)
-
-
-def _globals(code: types.CodeType) -> Iterator[str]:
-    for part in _parts(code):
-        for instruction in dis.get_instructions(part):
-            if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-                yield instruction.argval
-
-
-def _contents(cell: types.CellType) -> list[Any]:
-    try:
-        return [cell.cell_contents]
-    except ValueError:
-        return []
 
 
 def _root(value: Any) -> str:

@@ -1,0 +1,161 @@
+"""Compiled kernels on disk: the folder that holds them, whether one is there, and the report of compilations."""
+
+import ast
+import contextlib
+import functools
+import hashlib
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import types
+from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from .frozen import Frozen
+
+_CONFIG: Any = numba.config
+_LOG = logging.getLogger("swarm")
+_COMPILING = "compiling kernels for this scene, once: {}"
+_kernels: list[Any] = []
+# The definitions that code outside of this package has registered, by their class.
+_outside: dict[Any, list[Callable[..., Any]]] = {}
+
+_ROOT = Path(__file__).parents[1]
+# What kernels are made of: the functions and constants that they compile, and the types of their arguments.
+SOURCES = ("kernel", "surfaces", "contact", "methods", "lanes", "observables.py", "particles.py", "status.py")
+
+
+def sources() -> list[Path]:
+    """The files of `SOURCES`."""
+    places = [_ROOT / name for name in SOURCES]
+    return sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place]))
+
+
+def _base() -> Path:
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm")
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then a digest of their code.
+
+    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would answer with
+    the old code.
+    """
+    texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
+    # Parsing all files takes 0.3 s, so the result is kept under a digest of their bytes.
+    known = _base() / "sources" / _digest(texts)
+    with contextlib.suppress(OSError):
+        return _base() / known.read_text()
+    code = _digest([(name, _code(text)) for name, text in texts])
+    with contextlib.suppress(OSError):
+        known.parent.mkdir(parents=True, exist_ok=True)
+        part = known.with_suffix(f".{os.getpid()}")
+        part.write_text(code)
+        part.replace(known)
+    return _base() / code
+
+
+def _digest(texts: list[tuple[bytes, bytes]]) -> str:
+    whole = repr((numba.__version__, sys.version_info[:2], texts))
+    return hashlib.sha256(whole.encode()).hexdigest()[:16]
+
+
+def _code(text: bytes) -> bytes:
+    """The code of a module, without comments and docstrings."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, False) is not None:
+            del node.body[0]
+    return ast.dump(tree).encode()
+
+
+_folder = functools.cache(cache_folder)
+
+
+def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
+    """The kernel of a function: Numba compiles it with these flags where no earlier process has."""
+    if _CONFIG.DISABLE_JIT:
+        return function
+    previous = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(_folder())
+    try:
+        made: Any = numba.njit(cache=True, **flags)(function)
+        made._cache = _Cache(function)
+    finally:
+        _CONFIG.CACHE_DIR = previous
+    if function.__module__.partition(".")[0] == __name__.partition(".")[0]:
+        # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
+        # every comment.
+        disk = made._cache
+        name = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}"
+        disk._cache_file = IndexDataCacheFile(cache_path=disk.cache_path, filename_base=name, source_stamp="")
+    _kernels.append(made)
+    return made
+
+
+def registered(kind: Any, definition: Callable[..., Any]) -> None:
+    """Note a definition for a class: the folder's name covers no code outside of this package."""
+    if str(definition.__module__).partition(".")[0] != "swarm":
+        _outside.setdefault(kind, []).append(definition)
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """A kernel of a class with such definitions is found only where they are the same."""
+
+    def _index_key(self, kinds: Any, codegen: Any) -> Any:
+        return (*super()._index_key(kinds, codegen), *_digests(kinds))
+
+
+def _digests(kinds: Any) -> Iterator[str]:
+    for kind in kinds:
+        if isinstance(kind, types.BaseTuple):
+            frozen = Frozen()
+            for parent in getattr(kind, "instance_class", tuple).__mro__:
+                for definition in _outside.get(parent, ()):
+                    frozen.value(definition)
+                    yield frozen.digest()
+            yield from _digests(kind.types)  # type: ignore[attr-defined]
+
+
+def in_python(kernel: Any) -> Any:
+    """The function that a kernel is compiled from."""
+    return getattr(kernel, "py_func", kernel)
+
+
+def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether a kernel is compiled for such arguments, in this process or on disk.
+
+    Numba has no function for it. Its own search initialises the compiler, 0.2 s in each process; a look into its index
+    takes a millisecond.
+    """
+    if in_python(kernel) is kernel:
+        return True  # without the compiler there is nothing to wait for
+    kinds = tuple(map(numba.typeof, arguments))
+    disk = kernel._cache
+    return kinds in kernel.overloads or (
+        disk._index_key(kinds, kernel.targetctx.codegen()) in disk._cache_file._load_index()
+    )
+
+
+@contextlib.contextmanager
+def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
+    """Tell the logger and `tell`, by a sentence, of every kernel that is compiled in this context."""
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, compiled: Any) -> None:
+            if compiled.data["dispatcher"] in _kernels:
+                sentence = _COMPILING.format(compiled.data["dispatcher"].__name__)
+                _LOG.info(sentence)
+                tell(sentence)
+
+        def on_end(self, compiled: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield

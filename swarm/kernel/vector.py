@@ -1,0 +1,166 @@
+"""Vectors of three numbers, with the operators of Python: the same definitions in kernels and in plain Python."""
+
+import math
+import operator
+from typing import Any, NamedTuple
+
+from numba import types
+from numba.extending import lower_builtin, type_callable
+
+from .jit import Array, inlined, kept
+
+
+class Vec(NamedTuple):
+    """A vector. In plain Python its components may be arrays of the same shape."""
+
+    x: Any
+    y: Any
+    z: Any
+
+    def __add__(a, b: Any) -> "Vec":  # type: ignore[override]  # noqa: N805
+        return Vec(a.x + b.x, a.y + b.y, a.z + b.z)
+
+    def __sub__(a, b: "Vec") -> "Vec":  # noqa: N805
+        return Vec(a.x - b.x, a.y - b.y, a.z - b.z)
+
+    def __mul__(a, b: Any) -> "Vec":  # type: ignore[override]  # noqa: N805
+        return Vec(a.x * b, a.y * b, a.z * b)
+
+    def __rmul__(b, a: Any) -> "Vec":  # type: ignore[override]  # noqa: N805
+        return Vec(a * b.x, a * b.y, a * b.z)
+
+    def __truediv__(a, b: Any) -> "Vec":  # noqa: N805
+        return Vec(a.x / b, a.y / b, a.z / b)
+
+
+# Without it NumPy takes a vector for an array of three: np.float64(2.0) * v would be an array.
+Vec.__array_ufunc__ = None  # type: ignore[attr-defined]
+
+ZERO = Vec(0.0, 0.0, 0.0)
+
+
+class Symmetric(NamedTuple):
+    """A symmetric matrix."""
+
+    xx: Any
+    yy: Any
+    zz: Any
+    xy: Any
+    yz: Any
+    zx: Any
+
+
+def vec(values: Any) -> Vec:
+    """Three numbers, or the three rows of an array, as a vector."""
+    x, y, z = values
+    return Vec(x, y, z)
+
+
+def _is_vector(kind: Any) -> bool:
+    return isinstance(kind, types.BaseNamedTuple) and issubclass(kind.instance_class, Vec)  # type: ignore[attr-defined]
+
+
+_KIND = types.NamedUniTuple(types.float64, 3, Vec)
+
+
+def _emitted(symbol: Any, instruction: str, first: Any, second: Any) -> None:
+    """Let kernels do this operator component by component: no function of its own for the compiler.
+
+    As overloads of the operators they cost up to a tenth of the time to compile.
+    """
+    vectors = [kind is types.BaseNamedTuple for kind in (first, second)]
+
+    @type_callable(symbol)
+    def _type(_context):
+        def typed(a, b):
+            good = (_is_vector(k) if v else isinstance(k, types.Float) for k, v in zip((a, b), vectors, strict=True))
+            return _KIND if all(good) else None
+
+        return typed
+
+    @lower_builtin(symbol, first, second)
+    def _emit(context, builder, signature, args):
+        one, two = (
+            [builder.extract_value(arg, k) for k in range(3)] if v else 3 * [arg]
+            for arg, v in zip(args, vectors, strict=True)
+        )
+        parts = [getattr(builder, instruction)(*pair) for pair in zip(one, two, strict=True)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+
+_emitted(operator.add, "fadd", types.BaseNamedTuple, types.BaseNamedTuple)
+_emitted(operator.sub, "fsub", types.BaseNamedTuple, types.BaseNamedTuple)
+_emitted(operator.mul, "fmul", types.BaseNamedTuple, types.Float)
+_emitted(operator.mul, "fmul", types.Float, types.BaseNamedTuple)
+_emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)
+
+
+@inlined
+def dot(a, b):
+    """a.b"""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@inlined
+def square(a):
+    """|a|^2"""
+    return a.x * a.x + a.y * a.y + a.z * a.z
+
+
+@inlined
+def norm(a):
+    """|a|"""
+    return math.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+
+
+@inlined
+def times(a, b):
+    """The products of the components: the diagonal matrix a times b."""
+    return Vec(a.x * b.x, a.y * b.y, a.z * b.z)
+
+
+@inlined
+def cross(a, b):
+    """a x b"""
+    return Vec(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@inlined
+def absolute(a):
+    """The magnitudes of the components."""
+    return Vec(abs(a.x), abs(a.y), abs(a.z))
+
+
+@inlined
+def total(a):
+    """The sum of the components."""
+    return a.x + a.y + a.z
+
+
+@inlined
+def largest(a):
+    """The largest magnitude of a component."""
+    return max(abs(a.x), abs(a.y), abs(a.z))
+
+
+@inlined
+def moves(a):
+    """Whether a vector is not 0."""
+    return a.x != 0.0 or a.y != 0.0 or a.z != 0.0
+
+
+@kept.register(Vec)
+def _(value):
+    return Vec(kept(value.x), kept(value.y), kept(value.z))
+
+
+@inlined
+def column(rows: Array, row, i):
+    """The vector in three rows of a column."""
+    return Vec(rows[row, i], rows[row + 1, i], rows[row + 2, i])
+
+
+@inlined
+def put(rows: Array, row, i, a):
+    """Store a vector into three rows of a column."""
+    rows[row, i], rows[row + 1, i], rows[row + 2, i] = a.x, a.y, a.z

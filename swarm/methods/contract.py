@@ -1,0 +1,217 @@
+"""The contract of a method: every function that the loops over lanes ask of one, required or derived.
+
+A method's numbers are a NamedTuple, by whose type these functions are chosen. A pass is a free flight followed by at
+most one contact. Its parts are scalar, branch-free functions of one lane, and the lanes loop over each part separately:
+short loops keep more lanes in the processor's window than one long loop (measured on Zen 3: 7.8 instead of 10.3 ns an
+impact in an ellipsoid). What is rare and needs loops and branches is left to `hard_pass`.
+
+Required are
+    constants and own       what a lane keeps of its particle for the whole frame,
+    land or flight          the way to the next contact: from the first hit, which is found before, or by itself,
+    contact                 the contact in lanes,
+    hard_pass               what `flight` or `contact` leave to it.
+A contact with an unknown registers `guess`, `improve` and `most_sweeps` too, one that is too long for a loop `turn`,
+and one with a multiplier the three functions of Uzawa's loop. examples/own_method.py is a complete method.
+"""
+
+from typing import Any, NamedTuple
+
+from ..contact.impulse import LoopRecord
+from ..contact.reflection import Turned
+from ..kernel.jit import by_type, by_type_outlined
+from ..kernel.vector import ZERO, Vec
+
+# A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
+HARD = -2.0
+NOT_TURNED = Turned(ZERO, 0.0)
+
+
+class Lane(NamedTuple):
+    """One particle under way: what is left of its frame in the method's unit, its impacts in it, what it keeps."""
+
+    r: Vec
+    v: Vec
+    left: float
+    hits: float
+    own: Any
+
+
+class Flight(NamedTuple):
+    """The end of a flight. The wall is -1 where no contact follows; `HARD - wall` leaves the contact to `hard_pass`."""
+
+    r: Vec
+    v: Vec
+    left: float
+    wall: float
+
+
+class Solution(NamedTuple):
+    """What is known of a contact: its unknown, whether it is unsolved, and the velocity where the method has `turn`."""
+
+    kappa: float
+    unsolved: bool
+    turned: Turned
+
+
+NO_RECORD = LoopRecord(0.0, 0.0, 0.0)
+
+
+class Sweep(NamedTuple):
+    """Lambda, what its sweep missed by, of this sweep of the loop or of the one before."""
+
+    multiplier: float
+    miss: float
+
+
+class Contact(NamedTuple):
+    """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
+
+    Where contacts may lose energy, twice_energy is twice the energy per mass that is left.
+    """
+
+    r: Vec
+    v: Vec
+    left: float
+    wall: float
+    impulse: float
+    hits: float
+    twice_energy: float
+
+
+# --- What a lane keeps -----------------------------------------------------------------------------------
+
+
+@by_type
+def constants(method, mass, energy, v):
+    """Three numbers of one particle that hold for the whole frame; `own` gives them names."""
+    raise NotImplementedError
+
+
+@by_type
+def own(method, first, second, third):
+    """These numbers as the method's own record."""
+    raise NotImplementedError
+
+
+@by_type
+def dissipates(method):
+    """Whether contacts may lose energy: then the first constant is twice the energy per mass, and changes."""
+    return False
+
+
+# --- Flight ----------------------------------------------------------------------------------------------
+
+
+@by_type
+def flight(method, chain, gravity, lane):
+    """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
+    return Flight(lane.r, lane.v, lane.left, -1.0)
+
+
+@by_type
+def land(method, chain, gravity, lane, hit):
+    """The `Flight` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
+    return Flight(lane.r, lane.v, lane.left, -1.0)
+
+
+@by_type
+def lands(method):
+    """Whether the method registers `land`: a constant for the compiler."""
+    return False
+
+
+@land.implies(lands)
+def _(method):
+    return True
+
+
+# --- The unknown of a contact ----------------------------------------------------------------------------
+
+
+@by_type
+def guess(method, chain, gravity, lane, wall):
+    """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
+    return 0.0, False
+
+
+@by_type
+def improve(method, chain, gravity, lane, wall, solution, multiplier):
+    """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved stays as it is, bit by bit."""
+    return solution.kappa, False, NO_RECORD
+
+
+@by_type
+def most_sweeps(method, chain):
+    """The most sweeps of `improve` a contact may take: a constant for the compiler."""
+    return 0
+
+
+@by_type
+def solves(method):
+    """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
+    return
+
+
+@guess.implies(solves)
+def _(method):
+    return method
+
+
+@by_type
+def turn(method, chain, gravity, lane, wall, kappa):
+    """How the contact has `Turned` the velocity, for `contact`, where one loop of both would be too long."""
+    return NOT_TURNED
+
+
+@by_type
+def turns(method):
+    """Whether the method registers `turn`: a constant for the compiler."""
+    return False
+
+
+@turn.implies(turns)
+def _(method):
+    return True
+
+
+# --- Uzawa's loop (8) around it --------------------------------------------------------------------------
+
+
+@by_type
+def first_multiplier(method, chain, gravity, lane, wall, kappa):
+    """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
+    return 0.0, kappa, 0.0
+
+
+@by_type
+def next_multiplier(method, left, acceleration, multiplier, record, before):
+    """The multiplier after a sweep, what the sweep missed by, and whether to go on; `before` is the last `Sweep`."""
+    return 0.0, 0.0, False
+
+
+@by_type
+def multiplier_sweeps(method):
+    """The most sweeps of the loop."""
+    return 0
+
+
+# --- Contact ---------------------------------------------------------------------------------------------
+
+
+@by_type
+def contact(method, chain, gravity, lane, wall, solution):
+    """The `Contact` with this wall.
+
+    A wall that is HARD already passes through and nothing else changes; to become hard, return `HARD - wall`. A
+    solution that is unsolved was not found, or its multiplier did not converge.
+    """
+    raise NotImplementedError
+
+
+@by_type_outlined
+def hard_pass(method, chain, gravity, lane, wall, lanes, i):
+    """What `flight` or `contact` left, as the `Contact` that it is, and its status.
+
+    Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
+    """
+    raise NotImplementedError

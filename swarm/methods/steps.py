@@ -1,0 +1,214 @@
+"""The steps of `AugmentedLagrangian`: of fixed length, or cut at the instant of impact.
+
+Each function here has one definition for either: how a flight ends, how long its contact step is, whether another wall
+has a part in it, and the exact impacts that replace it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from ..contact import regularisation as law_of
+from ..contact import uzawa
+from ..contact.discrete_gradient import nested
+from ..contact.reflection import Energy, chord, exact
+from ..contact.sliding import Contacts, Moving, impact
+from ..kernel.gravity import displacement
+from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
+from ..kernel.vector import square
+from ..status import Status
+from ..surfaces import flights
+from ..surfaces import fold as walls
+from . import contract, fixed_step
+
+# A second wall nearer than this part of the shortest flight is met in the same instant.
+_SAME_INSTANT = 1e-6
+# Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
+_MOST_BOUNCES = 1000
+# A |v|^2 that is off its first value by more than this has lost energy to a tolerance, which is not to be hidden.
+_ROUND_OFF = 1e-13
+
+
+class Numbers(NamedTuple):
+    """What kernels know of the method."""
+
+    dt: float
+    law: Any
+    form: Any  # of the discrete gradient
+    shortest_length: float  # of the flights of particles that graze where a step is not possible [m]
+    tolerance: float
+    max_sweeps: int
+    acceleration: float
+    policy: int
+    longest: Any  # step that jumps over no solid [m], None where there is none
+
+
+class FixedSteps(Numbers):
+    """The method with steps of fixed length."""
+
+
+class CutSteps(Numbers):
+    """The method with steps that begin at the impact, without gravity."""
+
+
+class Own(NamedTuple):
+    """What a lane keeps."""
+
+    over_2m: float  # 1/(2m)
+    energy: float  # per mass, at the start
+    unused: float
+
+
+class Cut(NamedTuple):
+    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
+
+    h: float
+    used: float
+    law: Any
+
+
+@by_type
+def step_of(method, left):
+    """The `Cut` of the next contact step."""
+    raise NotImplementedError
+
+
+@by_type
+def is_new(method, chain, r):
+    """Whether a contact step starts with an impact."""
+    raise NotImplementedError
+
+
+@by_type
+def is_alone(method, chain, wall, r0, r1, kappa):
+    """Whether no other wall has a part in the step, which then one lane can do alone."""
+    raise NotImplementedError
+
+
+@by_type
+def is_blocked(method, chain, wall, r, p):
+    """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
+    return False
+
+
+@by_type_outlined
+def as_impacts(method, chain, lane, cut, wall, lanes, i):
+    """The contact as exact impacts: the result of `hard_pass`."""
+    raise NotImplementedError
+
+
+@outlined
+def _first_energy(lane):
+    """The energy at the start of the run, if it is that up to round-off, else that of now."""
+    now, first = square(lane.v), 2.0 * lane.own.energy
+    speed2 = first if abs(first - now) <= _ROUND_OFF * now else now
+    return Energy(speed2, 0.5 / speed2)
+
+
+# --- Steps of fixed length -------------------------------------------------------------------------------
+
+
+@contract.flight.register(FixedSteps)
+def _(method, chain, gravity, lane):
+    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
+    p = displacement(gravity, start.v, method.dt)
+    touched = walls.touched(chain, start.r, p)
+    alone = (touched.number <= 1.0) & (not nested(method.form))
+    end = fixed_step.before_step(method, start, touched, alone, p)
+    # A step that touches nothing is no contact.
+    jumps = fixed_step.too_fast(method.longest, p)
+    return contract.Flight(end.r, end.v, end.left, select((touched.number > 0.0) | jumps, end.wall, -1.0))
+
+
+@step_of.register(FixedSteps)
+def _(method, left):
+    return Cut(method.dt, 1.0, method.law)
+
+
+@is_new.register(FixedSteps)
+def _(method, chain, r):
+    return not walls.outside(chain, -1.0, r)
+
+
+@is_alone.register(FixedSteps)
+def _(method, chain, wall, r0, r1, kappa):
+    return not walls.outside(chain, wall, r1)
+
+
+@as_impacts.register(FixedSteps)
+def _(method, chain, lane, cut, wall, lanes, i):
+    energy, r, v = _first_energy(lane), lane.r, lane.v
+    remaining, hits = cut.h, 0.0
+    for _i in range(_MOST_BOUNCES):
+        hit = flights.first_hit(chain, None, r, v)
+        t = min(hit.time, remaining)
+        r, remaining = r + t * v, remaining - t
+        if not hit.time < math.inf or remaining <= 0.0:
+            return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
+        if hit.wall < 0.0:
+            continue
+        bounce = exact(None, chain, None, hit.wall, r, v, energy)
+        v = bounce.v
+        lanes.impulse[int(hit.wall), i] += bounce.impulse
+        hits += 1.0
+    return _after(r, v, lane.left, hits), Status.STALLED.value
+
+
+@inlined
+def _after(r, v, left, hits):
+    """The contact, whose impulses were added one by one."""
+    return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0)
+
+
+# --- Steps that are cut at the impact --------------------------------------------------------------------
+
+
+@contract.land.register(CutSteps)
+def _(method, chain, gravity, lane, hit):
+    met = hit.time <= lane.left
+    t = select(met, hit.time, lane.left)
+    r = lane.r + t * lane.v
+    left = lane.left - t
+    # A hit in the last instant of a frame is met again in the next one.
+    met = met & (hit.wall >= 0.0) & (left > 0.0)
+    wall = select(nested(method.form), contract.HARD - hit.wall, hit.wall)
+    return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+
+
+@step_of.register(CutSteps)
+def _(method, left):
+    # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger alpha.
+    h = select(method.dt < left, method.dt, left)
+    part = method.dt / h
+    return Cut(h, h, law_of.stiffened(method.law, part * part))
+
+
+@is_new.register(CutSteps)
+def _(method, chain, r):
+    return True
+
+
+@is_alone.register(CutSteps)
+def _(method, chain, wall, r0, r1, kappa):
+    # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free flight
+    # ends outside it again) was hit all the same.
+    return (flights.other_hit(chain, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
+
+
+@is_blocked.register(CutSteps)
+def _(method, chain, wall, r, p):
+    kappa = chord(chain, wall, r, p)
+    r1 = walls.push(chain, wall, r, p, kappa)
+    other = flights.other_hit(chain, wall, r, r1 - r)
+    # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
+    later = other.time <= 1.0 and not uzawa.has_limit(chain, other.wall, method.law, r)
+    later = later or uzawa.meets_later(chain, wall, method.law, r, p)
+    return not walls.pushes(chain, wall, kappa) or kappa == 0.0 or later
+
+
+@as_impacts.register(CutSteps)
+def _(method, chain, lane, cut, wall, lanes, i):
+    energy = _first_energy(lane)
+    shortest = method.shortest_length / math.sqrt(energy.twice)
+    contacts = Contacts(None, None, shortest, _SAME_INSTANT * method.shortest_length)
+    end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
+    return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value

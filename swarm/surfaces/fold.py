@@ -1,0 +1,220 @@
+"""All walls of a scene at once: the functions of one surface, folded over the chain of its walls.
+
+A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes.
+"""
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, select
+from ..kernel.vector import ZERO
+from . import contract
+from .surface import Surface
+
+
+class Chain(NamedTuple):
+    """The walls of a scene as nested pairs, ended by None: what is not there compiles to nothing."""
+
+    first: Any
+    rest: Any
+
+
+def chain_of(surfaces: Sequence[Surface]) -> Chain | None:
+    """The walls of `surfaces` as a chain, in their order."""
+    chain = None
+    for wall in reversed([wall for surface in surfaces for wall in surface.walls()]):
+        chain = Chain(wall, chain)
+    return chain
+
+
+@by_type
+def length(chain):
+    """How many walls there are: a constant for the compiler."""
+    raise NotImplementedError
+
+
+@length.register(Chain)
+def _(chain):
+    return 1 + length(chain.rest)
+
+
+@length.register(Nothing)
+def _(chain):
+    return 0
+
+
+# --- A function of one wall ------------------------------------------------------------------------------
+
+
+def of_wall(function: Callable[..., Any], neutral: Any) -> Any:
+    """The fold (chain, wall, ...) that is function(surface, ...) of the wall with this number.
+
+    Of another number it is the function of the last wall: whoever has no wall does not use the answer. `neutral` is any
+    value of the type of the result.
+    """
+    count = len(inspect.signature(function).parameters) - 1
+    return {1: _of_wall_1, 2: _of_wall_2, 3: _of_wall_3, 4: _of_wall_4}[count](function, neutral)
+
+
+# One factory for each number of arguments: Numba compiles functions with named arguments only.
+def _of_wall_1(function: Any, neutral: Any) -> Any:
+    @by_type
+    def fold(chain, wall, a):
+        raise NotImplementedError
+
+    @fold.register(Chain)
+    def _(chain, wall, a):
+        here = (wall == 0.0) | (length(chain) == 1)
+        return select(here, function(chain.first, a), fold(chain.rest, wall - 1.0, a))
+
+    @fold.register(Nothing)
+    def _(chain, wall, a):
+        return neutral
+
+    return fold
+
+
+def _of_wall_2(function: Any, neutral: Any) -> Any:
+    @by_type
+    def fold(chain, wall, a, b):
+        raise NotImplementedError
+
+    @fold.register(Chain)
+    def _(chain, wall, a, b):
+        here = (wall == 0.0) | (length(chain) == 1)
+        return select(here, function(chain.first, a, b), fold(chain.rest, wall - 1.0, a, b))
+
+    @fold.register(Nothing)
+    def _(chain, wall, a, b):
+        return neutral
+
+    return fold
+
+
+def _of_wall_3(function: Any, neutral: Any) -> Any:
+    @by_type
+    def fold(chain, wall, a, b, c):
+        raise NotImplementedError
+
+    @fold.register(Chain)
+    def _(chain, wall, a, b, c):
+        here = (wall == 0.0) | (length(chain) == 1)
+        return select(here, function(chain.first, a, b, c), fold(chain.rest, wall - 1.0, a, b, c))
+
+    @fold.register(Nothing)
+    def _(chain, wall, a, b, c):
+        return neutral
+
+    return fold
+
+
+def _of_wall_4(function: Any, neutral: Any) -> Any:
+    @by_type
+    def fold(chain, wall, a, b, c, d):
+        raise NotImplementedError
+
+    @fold.register(Chain)
+    def _(chain, wall, a, b, c, d):
+        here = (wall == 0.0) | (length(chain) == 1)
+        return select(here, function(chain.first, a, b, c, d), fold(chain.rest, wall - 1.0, a, b, c, d))
+
+    @fold.register(Nothing)
+    def _(chain, wall, a, b, c, d):
+        return neutral
+
+    return fold
+
+
+unit_normal = of_wall(contract.unit_normal, ZERO)
+settle = of_wall(contract.settle, ZERO)
+push = of_wall(contract.push, ZERO)
+inner_gradient = of_wall(contract.inner_gradient, ZERO)
+chord_guess = of_wall(contract.chord_guess, 0.0)
+chord_improve = of_wall(contract.chord_improve, 0.0)
+chord_normal = of_wall(contract.chord_normal, ZERO)
+
+
+# --- Of all walls ----------------------------------------------------------------------------------------
+
+
+@by_type
+def chord_sweeps(chain):
+    """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
+    raise NotImplementedError
+
+
+@chord_sweeps.register(Chain)
+def _(chain):
+    return max(contract.chord_sweeps(chain.first), chord_sweeps(chain.rest))
+
+
+@chord_sweeps.register(Nothing)
+def _(chain):
+    return 0
+
+
+@by_type
+def outside(chain, wall, r):
+    """Whether a point is outside any wall but this one (-1: any at all)."""
+    raise NotImplementedError
+
+
+@outside.register(Chain)
+def _(chain, wall, r):
+    here = contract.level_of(chain.first, contract.inner(chain.first, r)) > 0.0
+    return (here & (wall != 0.0)) | outside(chain.rest, wall - 1.0, r)
+
+
+@outside.register(Nothing)
+def _(chain, wall, r):
+    return False
+
+
+@by_type
+def pushes(chain, wall, kappa):
+    """Whether this wall can push with kappa: in its direction and short of the pole."""
+    raise NotImplementedError
+
+
+@pushes.register(Chain)
+def _(chain, wall, kappa):
+    farthest = contract.farthest_push(chain.first)
+    here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
+    other = pushes(chain.rest, wall - 1.0, kappa)
+    return ((wall == 0.0) & here) | ((wall != 0.0) & other)
+
+
+@pushes.register(Nothing)
+def _(chain, wall, kappa):
+    return False
+
+
+class Touched(NamedTuple):
+    """The first wall that a step is in contact with, or -1, and how many there are."""
+
+    wall: float
+    number: float
+
+
+@by_type
+def touched(chain, r, p):
+    """The walls that a step with free displacement p is in contact with."""
+    raise NotImplementedError
+
+
+@touched.register(Chain)
+def _(chain, r, p):
+    surface = chain.first
+    before = contract.level_of(surface, contract.inner(surface, r))
+    after = contract.level_of(surface, contract.inner(surface, r + p))
+    contact = (before > 0.0) | (after > 0.0)
+    rest = touched(chain.rest, r, p)
+    later = select(rest.number > 0.0, rest.wall + 1.0, -1.0)
+    return Touched(select(contact, 0.0, later), rest.number + select(contact, 1.0, 0.0))
+
+
+@touched.register(Nothing)
+def _(chain, r, p):
+    return Touched(-1.0, 0.0)

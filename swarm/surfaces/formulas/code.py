@@ -1,0 +1,155 @@
+"""The code of a surface by functions: frozen copies of them, and a class of numbers that is named by their digest.
+
+Kernels are compiled for a class and found in the cache by its name. What is compiled is the frozen copy, and the digest
+covers all it refers to: after an edit anywhere, or when a global changes, the class is another one.
+"""
+
+import collections
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from ... import checks
+from ...errors import SceneError
+from ...kernel.frozen import Frozen
+from ...kernel.jit import _INLINE, inlined
+from ...kernel.vector import Symmetric, Vec
+from .. import contract
+from .march import OwnNumbers
+
+Function = Callable[..., Any]
+
+_NAME = re.compile(r"Own_[0-9a-f]{16}\Z")
+_registered: set[str] = set()
+
+
+def __getattr__(name: str) -> Any:
+    """The class of a code by its name.
+
+    The index of the kernel cache names the classes of all processes that share it, and loading it asks for them here.
+    """
+    if not _NAME.match(name):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    made = type(name, (OwnNumbers,), {"__module__": __name__, "__qualname__": name, "__slots__": ()})
+    # Two threads that ask at the same time get the same class.
+    return globals().setdefault(name, made)
+
+
+def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Function | None = None) -> Any:
+    """The class of numbers whose kernels call these functions.
+
+    Raises:
+        SceneError: they are not functions of (parameters, x, y, z), or the parameters are no NamedTuple of numbers.
+    """
+    names = getattr(parameters, "_fields", None if parameters != () else ())
+    if not isinstance(parameters, tuple) or names is None:
+        raise SceneError(f"parameters must be a NamedTuple of numbers, got {parameters!r}")
+    for name, value in zip(names, parameters, strict=True):
+        checks.number(f"parameters.{name}", value)
+    frozen = Frozen(inlined)
+    frozen.value(names)
+    copies = []
+    for name, function in (("phi", phi), ("gradient", gradient), ("hessian", hessian)):
+        if function is not None:
+            _check_function(name, function)
+            copies.append(frozen.function(function))
+    name = f"Own_{frozen.digest()}"
+    kind = getattr(sys.modules[__name__], name)
+    if name not in _registered:
+        _register(kind, names, *copies)
+        _registered.add(name)
+    return kind
+
+
+def _check_function(name: str, function: Any) -> None:
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    if code is None:
+        raise SceneError(f"{name} must be a Python function of (parameters, x, y, z), got {function!r}")
+    if code.co_argcount != 4 or code.co_kwonlyargcount or code.co_flags & 0x0C:
+        names = ", ".join(code.co_varnames[: code.co_argcount])
+        raise SceneError(f"{name} must be a function of (parameters, x, y, z), got one of ({names})")
+
+
+def _register(
+    kind: Any, names: tuple[str, ...], phi: Function, gradient: Function, hessian: Function | None = None
+) -> None:
+    value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
+    # A class of the user's is not found by another process: the functions get their parameters in one that is.
+    make = collections.namedtuple("Parameters", names)  # type: ignore[misc]
+    of = inlined(lambda surface: make(*surface.parameters)) if names else inlined(lambda surface: surface.parameters)
+
+    @contract.phi.register(kind)
+    def _(surface, r):
+        d = r - surface.center
+        return value(of(surface), d.x, d.y, d.z)
+
+    @contract.gradient.register(kind)
+    def _(surface, r):
+        d = r - surface.center
+        gx, gy, gz = slope(of(surface), d.x, d.y, d.z)
+        # A user may return whole numbers.
+        return Vec(1.0 * gx, 1.0 * gy, 1.0 * gz)
+
+    if hessian is not None:
+
+        @contract.hessian.register(kind)
+        def _(surface, r):
+            d = r - surface.center
+            return Symmetric(*hessian(of(surface), d.x, d.y, d.z))
+
+
+# --- Arrays of points in plain Python --------------------------------------------------------------------
+
+
+def _taking_arrays(function: Function, count: int) -> Function:
+    """The function, of `count` results, which in plain Python takes arrays of points too, whatever it is made of."""
+    takes_arrays: list[bool] = []
+
+    def in_python(parameters, x, y, z):
+        if np.ndim(x) == np.ndim(y) == np.ndim(z) == 0:
+            return function(parameters, x, y, z)
+        if not takes_arrays:
+            takes_arrays.append(_takes_arrays(function, count, parameters, x, y, z))
+        return function(parameters, x, y, z) if takes_arrays[0] else _one_by_one(function, count, parameters, x, y, z)
+
+    def in_kernels(parameters, x, y, z):
+        return function(parameters, x, y, z)
+
+    # What a user writes may make arrays.
+    options: Any = {**_INLINE, "_nrt": True}
+    overload(in_python, jit_options=options)(lambda parameters, x, y, z: in_kernels)
+    return in_python
+
+
+def _one_by_one(function: Function, count: int, parameters: Any, *rows: Any) -> Any:
+    """The function at one point at a time; NaN where it has no value."""
+    nothing = np.nan if count == 1 else (np.nan,) * count
+
+    def at(*point: Any) -> Any:
+        try:
+            return function(parameters, *point)
+        except (ArithmeticError, ValueError):
+            return nothing
+
+    rows = np.broadcast_arrays(*rows)
+    values = np.array([at(*point) for point in zip(*(row.flat for row in rows), strict=True)], dtype=np.float64)
+    values = values.reshape(-1, count).T.reshape(count, *rows[0].shape)
+    return values[0] if count == 1 else tuple(values)
+
+
+def _takes_arrays(function: Function, count: int, parameters: Any, *rows: Any) -> bool:
+    """Whether the function computes with arrays what it computes with numbers, and leaves its arguments alone."""
+    few = [np.resize(row, 3) for row in np.broadcast_arrays(*rows)]
+    for row in few:
+        row.flags.writeable = False
+    try:
+        with np.errstate(all="ignore"):
+            whole = function(parameters, *few)
+            together = np.broadcast_arrays(*(whole if count > 1 else (whole,)), few[0])[:count]
+            return np.allclose(together, _one_by_one(function, count, parameters, *few), rtol=1e-9, equal_nan=True)
+    except Exception:  # Whatever it was: one point at a time will say it.
+        return False

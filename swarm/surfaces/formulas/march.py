@@ -1,0 +1,192 @@
+"""What kernels know of a surface by functions, and its flights by safe steps; its subclasses know phi and gradient."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...kernel.jit import inlined, outlined, select
+from ...kernel.vector import Symmetric, Vec, absolute, dot, largest, square, total
+from .. import contract
+from ..course import rise_time
+
+_EPSILON = 2.220446049250313e-16
+# Safe steps of one march; what is not found by then goes on in the next pass.
+_MARCH = 200
+# Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
+_SHORT = 1e-2
+_NODE = 0.5 * math.sqrt(0.6)
+
+
+class Bend(NamedTuple):
+    """Bounds of side H, H = grad grad phi/2: of its eigenvalues, and of its entries."""
+
+    least: float
+    most: float
+    low: Symmetric
+    high: Symmetric
+
+    @classmethod
+    def of_magnitude(cls, curvature: float) -> "Bend":
+        """|w.H w| <= curvature/2 for every unit vector w."""
+        k = 0.5 * curvature
+        return cls(-k, k, Symmetric(-k, -k, -k, 0.0, 0.0, 0.0), Symmetric(k, k, k, 0.0, 0.0, 0.0))
+
+    @classmethod
+    def of_entries(cls, low: Any, high: Any) -> "Bend":
+        """From bounds of the entries in each of many cells, (6, cells)."""
+        matrix = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+        middle, radius = (part[matrix].T.reshape(-1, 3, 3) for part in (0.5 * (low + high), 0.5 * (high - low)))
+        # |lambda(A + E) - lambda(A)| <= |E|, the largest sum of a row; and the round-off of lambda(A)
+        values = np.linalg.eigvalsh(middle)
+        room = radius.sum(axis=2).max(axis=1) + 64.0 * _EPSILON * np.abs(values).max(axis=1)
+        least, most = float((values[:, 0] - room).min()), float((values[:, 2] + room).max())
+        return cls(least, most, Symmetric(*low.min(axis=1).tolist()), Symmetric(*high.max(axis=1).tolist()))
+
+
+class OwnNumbers(NamedTuple):
+    """The numbers of a surface by functions. The box is relative to the center."""
+
+    center: Vec
+    side: float
+    step: float  # of the differences that replace second derivatives
+    size: float
+    bend: Bend
+    low: Vec
+    high: Vec
+    # 1 if there is surely no wall outside the box, and how far outside of it the bend is known
+    closed: float
+    margin: float
+    parameters: Any
+
+
+@contract.hessian.register(OwnNumbers)
+def _(surface, r):
+    h = surface.step
+    a = contract.gradient(surface, Vec(r.x + h, r.y, r.z))
+    b = contract.gradient(surface, Vec(r.x - h, r.y, r.z))
+    c = contract.gradient(surface, Vec(r.x, r.y + h, r.z))
+    d = contract.gradient(surface, Vec(r.x, r.y - h, r.z))
+    e = contract.gradient(surface, Vec(r.x, r.y, r.z + h))
+    f = contract.gradient(surface, Vec(r.x, r.y, r.z - h))
+    # Made symmetric
+    k = 0.25 / h
+    xy, yz, zx = a.y - b.y + c.x - d.x, c.z - d.z + e.y - f.y, e.x - f.x + a.z - b.z
+    return Symmetric(k * (a.x - b.x), k * (c.y - d.y), k * (e.z - f.z), 0.5 * k * xy, 0.5 * k * yz, 0.5 * k * zx)
+
+
+@contract.difference.register(OwnNumbers)
+def _(surface, r0, r1):
+    d = r1 - r0
+    if largest(d) > _SHORT * surface.size:
+        return contract.phi(surface, r1) - contract.phi(surface, r0)
+    # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three points
+    m, e = 0.5 * (r0 + r1), _NODE * d
+    outer = contract.gradient(surface, m - e) + contract.gradient(surface, m + e)
+    return dot(5.0 * outer + 8.0 * contract.gradient(surface, m), d) / 18.0
+
+
+@contract.farthest_push.register(OwnNumbers)
+def _(surface):
+    # 1 + kappa H has its first pole at the least eigenvalue of side H.
+    least = surface.bend.least
+    return surface.side * (-1.0 / least if least < 0.0 else math.inf)
+
+
+# --- Flight ----------------------------------------------------------------------------------------------
+
+
+@inlined
+def _outside(surface, r):
+    """The distance outside the box, by its largest component; below 0 inside."""
+    d = r - surface.center
+    across = max(surface.low.x - d.x, d.x - surface.high.x)
+    across = max(across, surface.low.y - d.y, d.y - surface.high.y)
+    return max(across, surface.low.z - d.z, d.z - surface.high.z)
+
+
+@contract.bend.register(OwnNumbers)
+def _(surface, r):
+    # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
+    most, magnitude = surface.bend.most, max(abs(surface.bend.least), abs(surface.bend.most))
+    if surface.closed == 0.0:
+        return most, magnitude, surface.size
+    out = _outside(surface, r)
+    return most, magnitude, select(out > 0.5 * surface.margin, out, min(surface.margin - out, surface.size))
+
+
+@contract.clearance.register(OwnNumbers)
+def _(surface, r):
+    return select(surface.closed > 0.0, max(_outside(surface, r), 0.0), 0.0)
+
+
+@contract.first_hit.register(OwnNumbers)
+def _(surface, r, v):
+    return _straight(surface, r, v)
+
+
+@outlined
+def _straight(surface, r, v):
+    """Safe steps to the first root along a straight flight, whose second derivative has the same bounds everywhere."""
+    t, end = 0.0, math.inf
+    speed2 = square(v)
+    if speed2 == 0.0:
+        return math.inf, True
+    if surface.closed > 0.0:
+        t, end = _in_box(surface, r, v)
+        if not t <= end:
+            return math.inf, True
+    bend = surface.bend
+    # least <= v.side H v <= most
+    most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
+    least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
+    resolved = 2.0 * _EPSILON / math.sqrt(speed2)
+    before = t
+    for i in range(_MARCH):
+        p = r + t * v
+        level = surface.side * contract.phi(surface, p)
+        half = 0.5 * surface.side * dot(contract.gradient(surface, p), v)
+        if level > 0.0 and half > 0.0 and i > 0:
+            # Past the wall by round-off, or because the surface bends more than was said.
+            return contract.bisected(surface, r, v, Vec(0.0, 0.0, 0.0), before, t), True
+        step = rise_time(level, half, most)
+        if not t + step <= end or not step < math.inf:
+            return math.inf, True
+        before, t = t, t + step
+        # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
+        rising = half + least * step
+        shortest = resolved * (total(absolute(p)) + math.sqrt(speed2) * step)
+        if (i > 0 or rising > 0.0 or step == 0.0) and (
+            step <= shortest or (most - least) * step * step <= 2.0 * shortest * rising
+        ):
+            return t, True
+    return t, False
+
+
+@inlined
+def _quadratic(v, high, low):
+    """The upper bound of v.H v for entries of H from `low` to `high`; the lower bound with the two exchanged."""
+    xy, yz, zx = 2.0 * v.x * v.y, 2.0 * v.y * v.z, 2.0 * v.z * v.x
+    sum = high.xx * v.x * v.x + high.yy * v.y * v.y + high.zz * v.z * v.z
+    sum += select(xy > 0.0, high.xy, low.xy) * xy
+    return sum + select(yz > 0.0, high.yz, low.yz) * yz + select(zx > 0.0, high.zx, low.zx) * zx
+
+
+@inlined
+def _in_box(surface, r, v):
+    """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
+    d, low, high = r - surface.center, surface.low, surface.high
+    from_x, until_x = _between(low.x, high.x, d.x, v.x)
+    from_y, until_y = _between(low.y, high.y, d.y, v.y)
+    from_z, until_z = _between(low.z, high.z, d.z, v.z)
+    return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)
+
+
+@inlined
+def _between(low, high, x, v):
+    """When a flight is between two planes: (from, until)."""
+    if v == 0.0:
+        within = low <= x <= high
+        return select(within, -math.inf, math.inf), select(within, math.inf, -math.inf)
+    a, b = (low - x) / v, (high - x) / v
+    return min(a, b), max(a, b)

@@ -1,0 +1,135 @@
+"""What a surface is for a user: a description, checked. The functions of its numbers are in contract.py."""
+
+import math
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import Vector, array, number, one_of, vector
+from ..errors import SceneError
+from ..kernel.vector import Vec, vec
+from . import contract
+from . import rotation as rotations
+
+SIDES = {"inside": 1.0, "outside": -1.0}
+
+Box = tuple[Vector, Vector]
+HalfSpace = tuple[Vector, float]
+UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
+
+
+@dataclass(frozen=True, repr=False)
+class Surface:
+    """A rigid surface. See the subclasses for their arguments; these are common to all.
+
+    Args:
+        rotation: about the centre: None, a quaternion (w, x, y, z) of any length, or {"axis": (x, y, z), "angle": rad}.
+        restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
+    """
+
+    rotation: Any = field(default=None, kw_only=True)
+    restitution: float = field(default=1.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
+        restitution = number("restitution", self.restitution, "a number from 0 to 1")
+        if not 0.0 <= restitution <= 1.0:
+            raise SceneError(f"restitution must be from 0 to 1, got {restitution:g}")
+        object.__setattr__(self, "restitution", restitution)
+        if hasattr(self, "center"):
+            object.__setattr__(self, "center", vector("center", self.center))
+        side_sign(getattr(self, "side", "inside"))
+
+    def __repr__(self) -> str:
+        """The call that makes it, omitting defaults."""
+        own = sorted(fields(self), key=lambda field: bool(field.kw_only))
+        said = [f for f in own if f.default is MISSING or getattr(self, f.name) != f.default]
+        return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in said)})"
+
+    def numbers(self) -> Any:
+        """The NamedTuple of numbers that kernels take in place of this description, before it is rotated."""
+        raise NotImplementedError
+
+    def walls(self) -> tuple[Any, ...]:
+        """What kernels take: one tuple for a smooth surface, one for each smooth part of a cavity with edges."""
+        return (rotations.rotated(self.rotation, self.numbers()),)
+
+    def own_center(self) -> Vector:
+        """The centre in the surface's own frame, which is turned about the origin."""
+        return rotations.turned_back(self.rotation, self.center)  # type: ignore[attr-defined]
+
+    def size(self) -> float:
+        """The characteristic length of the surface [m], infinite where it has none."""
+        raise NotImplementedError
+
+    def bounds(self) -> Box:
+        """A box (lower, upper) that holds the admissible side; infinite where that side is open."""
+        raise NotImplementedError
+
+    def half_spaces(self) -> list[HalfSpace]:
+        """Half-spaces n.r <= offset that hold the admissible side, where they say more than `bounds`."""
+        return []
+
+    def open_faces(self) -> list[HalfSpace]:
+        """Where the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
+        return []
+
+    def is_solid(self) -> bool:
+        """Whether particles are kept out of it rather than in it."""
+        return getattr(self, "side", "inside") == "outside"
+
+    def extent(self) -> float:
+        """Distance from the origin within which the surface, or what is particular about it, lies [m]."""
+        raise NotImplementedError
+
+    def phi(self, points: ArrayLike) -> NDArray[np.float64]:
+        """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,)."""
+        rows = _rows(points)
+        # Where a formula has no value it is NaN, which is outside.
+        with np.errstate(all="ignore"):
+            return np.asarray(np.maximum.reduce([contract.phi(wall, rows) for wall in self.walls()]))
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
+        rows = _rows(points)
+        with np.errstate(all="ignore"):
+            parts = [np.array(np.broadcast_arrays(*contract.gradient(wall, rows), rows.x)[:3]) for wall in self.walls()]
+            largest = np.argmax([contract.phi(wall, rows) for wall in self.walls()], axis=0)
+        return np.asarray(np.choose(largest, parts))
+
+
+def _rows(points: ArrayLike) -> Vec:
+    rows = array("points", points)
+    if rows.ndim not in (1, 2) or rows.shape[0] != 3:
+        raise SceneError(f"points must have shape (3, N), got {rows.shape}")
+    return vec(rows)
+
+
+def side_sign(side: str) -> float:
+    """+1 for "inside", -1 for "outside"."""
+    return SIDES[one_of("side", side, SIDES)]
+
+
+def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
+    """Bounds of a box that is rotated about `center`."""
+    if rotation is None or not all(map(math.isfinite, (*box[0], *box[1]))):
+        return box if rotation is None else UNBOUNDED
+    matrix = rotations.matrix(rotation)
+    middle, half = (np.array(box[0]) + box[1]) / 2.0, (np.array(box[1]) - box[0]) / 2.0
+    middle, half = center + matrix @ (middle - center), np.abs(matrix) @ half
+    return tuple((middle - half).tolist()), tuple((middle + half).tolist())
+
+
+def farthest(point: Vector) -> float:
+    """The largest coordinate of a point."""
+    return max(map(abs, point))
+
+
+def box_around(center: Vector, half: Vector, side: str) -> Box:
+    """Bounds of the cavity of a body with these half extents; a solid bounds nothing."""
+    if side == "outside":
+        return UNBOUNDED
+    (cx, cy, cz), (hx, hy, hz) = center, half
+    return (cx - hx, cy - hy, cz - hz), (cx + hx, cy + hy, cz + hz)
