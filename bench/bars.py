@@ -50,7 +50,7 @@ def advance_of(
     span = method.span("until", until)
 
     def measure() -> tuple[float, int]:
-        with Run(scene, particles, method, threads, None) as run:
+        with Run(scene, particles.copy(), method, threads, None) as run:
             run.advance(0.0, 0.0)  # compiles, and touches the arrays
             start = time.perf_counter()
             run.advance(span, until)
@@ -113,7 +113,7 @@ def multipliers(n: int, repeats: int) -> list[Row]:
         )
         times, sweeps = [], 0.0
         for _ in range(repeats):
-            with Run(SPHERE, particles, method, 1, None) as run:
+            with Run(SPHERE, particles.copy(), method, 1, None) as run:
                 run.advance(0.0, 0.0)
                 start = time.perf_counter()
                 run.advance(until, until)
@@ -188,7 +188,7 @@ def overhead(n: int, frames: int, repeats: int) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def seconds() -> tuple[float, float]:
-        with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+        with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None) as run:
             run.advance(every, every)
             start = time.perf_counter()
             for _ in range(frames):
@@ -348,7 +348,7 @@ def memory(n: int) -> list[Row]:
 _FIRST_FRAME = """
 import time; start = time.perf_counter()
 from swarm import scene_file
-from swarm.simulation import simulate
+from swarm import simulate
 job = scene_file.read(r"{scene}")
 class Seen(Exception): pass
 def stop(frame):

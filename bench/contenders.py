@@ -36,7 +36,7 @@ class Ours:
     method: Method
 
     def seconds(self, particles: swarm.Particles, until: float) -> float:
-        with Run(self.scene, particles, self.method, 1, None) as run:
+        with Run(self.scene, particles.copy(), self.method, 1, None) as run:
             run.advance(0.0, 0.0)
             start = time.perf_counter()
             run.advance(self.method.span("until", until), until)

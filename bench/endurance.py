@@ -19,7 +19,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
     job = checkpoint.Job("", "", "", "", n, "")
     path = folder / "run.h5.checkpoint"
-    with Run(SPHERE, particles, swarm.Impact(), 1, None) as run:
+    with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None) as run:
         run.observe()
 
         def milliseconds() -> float:
@@ -28,7 +28,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
             return 1e3 * (time.perf_counter() - start)
 
         best, median = repeated(milliseconds, repeats)
-        restored = Run(SPHERE, particles, swarm.Impact(), 1, None)
+        restored = Run(SPHERE, particles.copy(), swarm.Impact(), 1, None)
 
         def back() -> float:
             start = time.perf_counter()

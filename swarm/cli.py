@@ -1,5 +1,6 @@
 """The commands. No physics, and no heavy import before it is needed: --help must be fast."""
 
+import dataclasses
 import itertools
 import json
 import shlex
@@ -42,7 +43,7 @@ def _options(
 
 
 @app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")
-def run(
+def run(  # noqa: PLR0913  one argument an option
     scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene, the method and the run.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
@@ -62,6 +63,9 @@ def run(
     walltime: Annotated[
         str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
     ] = None,
+    compile: Annotated[
+        str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print how the run ended as JSON, also if it fails.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
@@ -70,8 +74,7 @@ def run(
         from . import scene_file as files
         from .checks import duration
         from .output import paths
-        from .output.storage import Storage
-        from .run.simulation import simulate
+        from .run.simulation import carry_out
         from .summary import numbers, of_result
 
     def report(status: str, written: Path | None = None, **more: Any) -> None:
@@ -83,41 +86,28 @@ def run(
             job = files.read(scene_file)
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
             target = paths.target_of("trajectory", output or stored)
-            limit = None if walltime is None else duration("--walltime", walltime)
-            named = recording or (None if resume else job.run.recording)
-            shown = None if named is None else paths.target_of("recording", named)
+            options = dataclasses.replace(
+                job.run,
+                trajectory=target,
+                recording=recording or (None if resume else job.run.recording),
+                live=live,
+                threads=job.run.threads if threads is None else threads,
+                progress=not quiet,
+                overwrite=overwrite,
+                scene_text=job.text,
+                resume=resume,
+                walltime=None if walltime is None else duration("--walltime", walltime),
+                compile=compile or job.run.compile,
+            )
             # Before particles are made and kernels compiled.
-            Storage(job.run.frames, job.run.precision, job.run.compression)
-            outputs = {"trajectory": target, "checkpoint": paths.checkpoint_of(target), "recording": shown}
-            paths.check_distinct(outputs, {"scene file": scene_file, "file of the particles": job.start_file()})
+            inputs = {"scene file": scene_file, "file of the particles": job.start_file()}
+            paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
             paths.check_target(target, overwrite or resume)
-            if shown is not None:
-                paths.check_target(shown, overwrite, "recording")
+            if options.recording is not None:
+                paths.check_target(options.recording, overwrite, "recording")
             before, particles = paths.identity(target), job.particles()
             resumes = resume and paths.checkpoint_of(target).exists()
-        result = simulate(
-            job.scene,
-            particles,
-            job.method,
-            until=job.run.until,
-            every=job.run.every,
-            trajectory=target,
-            recording=shown,
-            record_particles=job.run.record_particles,
-            record_color=job.run.record_color,
-            record_megabytes=job.run.record_megabytes,
-            live=live,
-            threads=threads if threads is not None else job.run.threads,
-            progress=not quiet,
-            overwrite=overwrite,
-            scene_text=job.text,
-            frames=job.run.frames,
-            precision=job.run.precision,
-            compression=job.run.compression,
-            checkpoint=job.run.checkpoint,
-            resume=resume,
-            walltime=limit,
-        )
+        result = carry_out(job.scene, particles, job.method, options)
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
         # A second signal may end the process here: the files are closed.

@@ -42,19 +42,9 @@ class Particles:
         checked = _checked(position, velocity, mass)
         self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
 
-    def checked(self) -> "Particles":
-        """The same particles, checked again; arrays that need no conversion are shared, not copied."""
-        particles = Particles.__new__(Particles)
-        checked = _checked(self.position, self.velocity, self.mass)
-        particles.position, particles.velocity, particles.mass = map(np.ascontiguousarray, checked)
-        return particles
-
-    @classmethod
-    def of(cls, state: "State") -> "Particles":
-        """The particles of a run that has ended: its own arrays, which are valid, not copied."""
-        particles = cls.__new__(cls)
-        particles.position, particles.velocity, particles.mass = state.position, state.velocity, state.mass
-        return particles
+    def copy(self) -> "Particles":
+        """The same particles, checked again, with arrays of their own."""
+        return Particles(self.position, self.velocity, self.mass)
 
     def __len__(self) -> int:
         return int(self.position.shape[1])

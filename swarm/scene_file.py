@@ -12,9 +12,11 @@ from .errors import SceneError
 from .filling import fill
 from .methods import Method
 from .particles import Particles
+from .run.options import RunOptions
 from .scene import Scene
 
 _TABLES = ("gravity", "particles", "surface", "method", "run")
+_SAVED = {"checkpoint": 60.0}
 
 
 @dataclass(frozen=True)
@@ -31,30 +33,12 @@ class ParticlesTable:
 
 
 @dataclass(frozen=True)
-class RunTable:
-    """[run]: the end, the frames, and the output."""
-
-    until: float
-    every: float | None = None
-    threads: int | None = None
-    trajectory: str | None = None
-    frames: str | int = "all"
-    precision: str = "float64"
-    compression: str = "none"
-    checkpoint: float = 60.0
-    recording: str | None = None
-    record_particles: int = 5000
-    record_color: str = "speed"
-    record_megabytes: float = 100.0
-
-
-@dataclass(frozen=True)
 class Job:
     """What a scene file describes, checked; `text` is the file itself."""
 
     scene: Scene
     method: Method
-    run: RunTable
+    run: RunOptions
     text: str
     source: ParticlesTable
     path: Path
@@ -130,11 +114,16 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
     return Job(
         scene=tables.scene_of(document.get("surface"), document.get("gravity")),
         method=tables.method_of(document["method"]),
-        run=tables.convert(document["run"], RunTable, "run"),
+        run=_run(document["run"]),
         text=text,
         source=source,
         path=path,
     )
+
+
+def _run(table: Any) -> RunOptions:
+    """[run]; a run from a file saves checkpoints even where it does not say so."""
+    return tables.convert({**_SAVED, **table} if isinstance(table, dict) else table, RunOptions, "run")
 
 
 def _check_source(table: ParticlesTable) -> None:

@@ -52,7 +52,8 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     """A dataclass from a table: no unknown key, no missing one, every value of its type."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
-    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    # What has no place in a file is an unknown key there.
+    fields = [one for one in dataclasses.fields(cls) if one.metadata.get("in_file", True)]  # type: ignore[arg-type]
     names = {field.metadata.get("key", field.name): field for field in fields}
     for key in table:
         if key not in names:

@@ -9,11 +9,13 @@ import subprocess
 import sys
 import time
 
+import numba
 import pytest
 from test_scene_file import GOOD
 
 import swarm
 
+compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
 pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 
@@ -300,16 +302,24 @@ from swarm.__main__""",
     assert (done.returncode, lines) == (130, ["interrupted"])
 
 
+@compiled_only
 def test_what_compiles_is_said(folder):
-    """The first run of a kind of scene says so; the second finds its kernels."""
+    """A short run compiles nothing; of those that compile the first says so, and the second finds its kernels."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
-    for expected in (True, False):
+    for words, expected in (([], False), (["--compile", "always"], True), (["--compile", "always"], False)):
         done = subprocess.run(
-            [sys.executable, "-m", "swarm", "run", "scene.toml", "--overwrite"],
+            [sys.executable, "-m", "swarm", "run", "scene.toml", "--overwrite", *words],
             cwd=folder, capture_output=True, text=True, timeout=600, env=environment,
         )  # fmt: skip
         assert done.returncode == 0
         assert ("compiling kernels for this scene, once: advance_block" in done.stderr) == expected
+
+
+def test_another_word_for_when_to_compile_is_refused(folder):
+    done = command("run", "scene.toml", "--compile", "alwyas", cwd=folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "compile must be one of 'auto', 'always' and 'never', got 'alwyas'" in done.stderr
+    assert [path.name for path in folder.iterdir()] == ["scene.toml"]
 
 
 def test_existing_output_asks_for_overwrite(folder):

@@ -1,17 +1,24 @@
-"""The example that adds a surface: every method runs with it, and it is short."""
+"""The examples that add a surface and a method: every method and every surface runs with them, and they are short."""
 
 import ast
+import importlib.util
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import pytest
-from conftest import METHODS
+from conftest import METHODS, SURFACES, every_surface
+
+import swarm
+from swarm.kernel.vector import Vec
+from swarm.surfaces import contract
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "examples" / "own_surface.py"
+METHOD = ROOT / "examples" / "own_method.py"
 GRAVITY = {"no gravity": None, "gravity": (0.0, 0.5, -1.0)}
 CONSERVING = ("impact", "impact, chord", "penalty", "augmented Lagrangian")
 # For n = 2 the surface is the ellipsoid, which has other definitions.
@@ -19,7 +26,11 @@ SCRIPT = """
 import dataclasses, sys
 sys.path[:0] = {paths!r}
 import numpy as np, swarm
-from conftest import METHODS
+from conftest import METHODS, SURFACES, every_surface
+
+import swarm
+from swarm.kernel.vector import Vec
+from swarm.surfaces import contract
 from own_surface import Superellipsoid
 
 np.seterr(all="ignore")
@@ -118,12 +129,58 @@ def test_a_kernel_of_an_edited_surface_is_never_an_old_one(tmp_path):
     assert run() == (0.3, 1)
 
 
-def test_it_is_short():
-    """At most 40 lines without docstrings and blank ones."""
-    text = FILE.read_text()
+def lines_of(file):
+    """Lines of a file without docstrings and blank ones."""
+    text = file.read_text()
     docstrings = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
             docstrings |= set(range(node.body[0].lineno, node.body[0].end_lineno + 1))
-    lines = [line for i, line in enumerate(text.splitlines(), 1) if line.strip() and i not in docstrings]
-    assert len(lines) <= 40
+    return [line for i, line in enumerate(text.splitlines(), 1) if line.strip() and i not in docstrings]
+
+
+def test_they_are_short():
+    assert len(lines_of(FILE)) <= 40
+    assert len(lines_of(METHOD)) <= 60
+
+
+@pytest.fixture(scope="module")
+def mirror():
+    """The method of examples/own_method.py."""
+    spec = importlib.util.spec_from_file_location("own_method", METHOD)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["own_method"] = module
+    spec.loader.exec_module(module)
+    return module.Mirror()
+
+
+@pytest.mark.parametrize("case", GRAVITY)
+@every_surface
+def test_the_method_runs_in_every_scene(mirror, name, case):
+    """It is `Impact` to round-off, as long as a run does not multiply it."""
+    surface = SURFACES[name]()
+    walls = [surface] if getattr(surface, "side", "outside") == "inside" else [surface, swarm.Sphere(2.0)]
+    scene = swarm.Scene(walls, GRAVITY[case])
+    start = swarm.fill(scene, 5, speed=1.0, seed=1)
+    ends = [swarm.simulate(scene, start, method, until=2.0, compile="never") for method in (mirror, swarm.Impact())]
+    assert ends[0].observables["impacts"][-1] == ends[1].observables["impacts"][-1] > 0
+    assert ends[0].particles.position == pytest.approx(ends[1].particles.position, abs=1e-9)
+    assert ends[0].observables["energy_error"].max() < 1e-13
+    assert ends[0].observables["impulse"][-1] == pytest.approx(ends[1].observables["impulse"][-1], abs=1e-9)
+
+
+def test_what_a_surface_lacks_for_the_method_is_one_sentence(mirror):
+    class Numbers(NamedTuple):
+        side: float
+
+    class Half(swarm.Sphere):
+        def walls(self):
+            return (Numbers(1.0),)
+
+    contract.phi.register(Numbers, lambda surface, r: r.x)
+    contract.gradient.register(Numbers, lambda surface, r: Vec(1.0, 0.0, 0.0))
+    scene = swarm.Scene([Half(1.0)])
+    with pytest.raises(
+        swarm.SceneError, match=r"what Mirror without gravity needs, .*Numbers without contract\.first_hit"
+    ):
+        swarm.simulate(scene, swarm.Particles((-0.5, 0, 0), (0, 0, 0)), mirror, until=1.0)

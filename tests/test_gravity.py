@@ -18,7 +18,7 @@ def test_two_flights_are_one(pull, velocity, first, second):
     way = np.array(call(displacement, pull, velocity, first))
     later = np.array(call(accelerated, pull, velocity, first))
     whole = np.array(call(displacement, pull, velocity, first + second))
-    assert way + call(displacement, pull, later, second) == pytest.approx(whole, abs=8 * EPSILON * 200)
+    assert way + np.array(call(displacement, pull, later, second)) == pytest.approx(whole, abs=8 * EPSILON * 200)
     assert call(accelerated, pull, later, second) == pytest.approx(
         call(accelerated, pull, velocity, first + second), abs=8 * EPSILON * 20
     )

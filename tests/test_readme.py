@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from swarm import scene_file
-from swarm.scene_file import RunTable
+from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
 PATHS = [ROOT / "README.md", ROOT / "examples" / "README.md", ROOT / "bench" / "README.md"]
@@ -98,7 +98,7 @@ def commands():
 
 def settings():
     """Every `key = value` of [run] in the READMEs."""
-    return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", ALL) if line.split()[0] in RunTable.__annotations__]
+    return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", ALL) if line.split()[0] in RunOptions.__annotations__]
 
 
 @pytest.mark.physics
@@ -123,7 +123,8 @@ def test_the_commands_run_in_their_order(tmp_path):
 def test_the_settings_of_a_run_are_taken(tmp_path, line):
     (tmp_path / "scene.toml").write_text(SCENE.replace("[run]\n", f"[run]\n{line}\n"))
     key, value = tomllib.loads(line).popitem()
-    assert getattr(scene_file.read(tmp_path / "scene.toml").run, key) == value
+    taken = getattr(scene_file.read(tmp_path / "scene.toml").run, key)
+    assert taken == (Path(value) if key in ("trajectory", "recording") else value)
 
 
 def test_the_settings_are_found():

@@ -44,9 +44,10 @@ def test_no_two_threads_draw_the_same():
 def test_every_particle_that_is_not_done_follows_once(n, size):
     done = np.random.default_rng(n).random(n) < 0.4
     draws = lanes.Draws(np.zeros(1, np.int64), size, np.empty(-(-n // size), np.int64))
+    share = lanes.Share(None, done, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0)
     i, stop, drawn, found = 0, 0, 0, []
     while True:
-        i, stop, drawn = lanes.following_particle(draws, done, i, stop, drawn)
+        i, stop, drawn = lanes.following_particle(share, i, stop, drawn)
         if i == stop:
             break
         found.append(i)
@@ -137,9 +138,9 @@ def test_a_halt_and_a_hard_contact_in_one_frame(threads):
     start = swarm.fill(SPHERE, 600, speed=1.0, seed=6)
     start.position[:, 300], start.velocity[:, 300] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
     method = swarm.Impact(shortest_flight=1e-2)
-    with Run(SPHERE, start, method, threads, None) as whole:
+    with Run(SPHERE, start.copy(), method, threads, None) as whole:
         assert whole.advance(3.0, 3.0)
-    with Run(SPHERE, start, method, threads, None) as run:
+    with Run(SPHERE, start.copy(), method, threads, None) as run:
         assert run._hard is None
         run.halt()
         assert not run.advance(3.0, 3.0)

@@ -9,7 +9,8 @@ from conftest import SURFACES, scene_of
 
 from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill, scene
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import base
+from swarm.kernel.vector import vec
+from swarm.surfaces import contract
 
 
 def cube(half=1.0):
@@ -102,7 +103,7 @@ def test_gaps_have_the_sign_of_each_side():
     assert gaps.shape == (2, 50)
     for row, name in zip(gaps, ("ball", "plane"), strict=True):
         (numbers,) = SURFACES[name]().walls()
-        levels = base.level_of(numbers, np.array([base.inner(numbers, *point) for point in points.T]))
+        levels = contract.level_of(numbers, np.array([contract.inner(numbers, vec(point)) for point in points.T]))
         assert (np.sign(row) == np.sign(levels)).all()
 
 

@@ -40,11 +40,11 @@ def test_both_tiers_and_a_run_that_changes_have_the_same_bits(monkeypatch, name,
     """Wherever it changes: after one pass, or after seven."""
     scene, method = scene_with(name), METHODS[method]
     start, span = swarm.fill(scene, 6, speed=1.0, seed=1), method.span("until", 4.0)
-    plain = end_of(Run(scene, start, method, 1, None, "never"), span)
-    assert end_of(Run(scene, start, method, 1, None, "always"), span) == plain
+    plain = end_of(Run(scene, start.copy(), method, 1, None, "never"), span)
+    assert end_of(Run(scene, start.copy(), method, 1, None, "always"), span) == plain
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
     for passes in (1, 7):
-        run = Run(scene, start, method, 1, None, "auto")
+        run = Run(scene, start.copy(), method, 1, None, "auto")
         run.halt(passes)
         if not run.advance(span, 1.0):
             run._tier.left = 0.0

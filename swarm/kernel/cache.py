@@ -1,9 +1,12 @@
-"""Compiled kernels on disk: the folder that holds them, whether one is there, and who hears of one that is not."""
+"""Compiled kernels on disk: the folder that holds them, whether one is there, and the report of compilations."""
 
+import ast
 import contextlib
+import functools
 import hashlib
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +14,9 @@ from typing import Any
 import numba
 from numba import types
 from numba.core import event
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from .frozen import Frozen
 
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
@@ -20,41 +25,76 @@ _kernels: list[Any] = []
 # The definitions that code outside of this package has registered, by their class.
 _outside: dict[Any, list[Callable[..., Any]]] = {}
 
+_ROOT = Path(__file__).parents[1]
+# What kernels are made of: the functions and constants that they compile, and the types of their arguments.
+SOURCES = ("kernel", "surfaces", "contact", "methods", "lanes", "observables.py", "particles.py", "status.py")
 
-def _source_hash() -> str:
-    """Digest of every source file of the package: it names the cache folder.
 
-    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would
-    answer with the old code.
-    """
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def sources() -> list[Path]:
+    """The files of `SOURCES`."""
+    places = [_ROOT / name for name in SOURCES]
+    return sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place]))
+
+
+def _base() -> Path:
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm")
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels, $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then the source hash."""
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm"
-    return Path(base) / _source_hash()
+    """Folder of the compiled kernels: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then a digest of their code.
+
+    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would answer with
+    the old code.
+    """
+    texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
+    # Parsing all files takes 0.3 s, so the result is kept under a digest of their bytes.
+    known = _base() / "sources" / _digest(texts)
+    with contextlib.suppress(OSError):
+        return _base() / known.read_text()
+    code = _digest([(name, _code(text)) for name, text in texts])
+    with contextlib.suppress(OSError):
+        known.parent.mkdir(parents=True, exist_ok=True)
+        part = known.with_suffix(f".{os.getpid()}")
+        part.write_text(code)
+        part.replace(known)
+    return _base() / code
 
 
-_CACHE = cache_folder()
+def _digest(texts: list[tuple[bytes, bytes]]) -> str:
+    whole = repr((numba.__version__, sys.version_info[:2], texts))
+    return hashlib.sha256(whole.encode()).hexdigest()[:16]
+
+
+def _code(text: bytes) -> bytes:
+    """The code of a module, without comments and docstrings."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, False) is not None:
+            del node.body[0]
+    return ast.dump(tree).encode()
+
+
+_folder = functools.cache(cache_folder)
 
 
 def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     """The kernel of a function: Numba compiles it with these flags where no earlier process has."""
+    if _CONFIG.DISABLE_JIT:
+        return function
     previous = _CONFIG.CACHE_DIR
-    _CONFIG.CACHE_DIR = str(_CACHE)
+    _CONFIG.CACHE_DIR = str(_folder())
     try:
-        made = numba.njit(cache=True, **flags)(function)
-        if made is not function:
-            made._cache = _Cache(function)
+        made: Any = numba.njit(cache=True, **flags)(function)
+        made._cache = _Cache(function)
     finally:
         _CONFIG.CACHE_DIR = previous
+    if function.__module__.partition(".")[0] == __name__.partition(".")[0]:
+        # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
+        # every comment.
+        disk = made._cache
+        name = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}"
+        disk._cache_file = IndexDataCacheFile(cache_path=disk.cache_path, filename_base=name, source_stamp="")
     _kernels.append(made)
     return made
 
@@ -73,8 +113,6 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 def _digests(kinds: Any) -> Iterator[str]:
-    from .frozen import Frozen  # which uses the compiler, which uses this module
-
     for kind in kinds:
         if isinstance(kind, types.BaseTuple):
             frozen = Frozen()
@@ -93,8 +131,8 @@ def in_python(kernel: Any) -> Any:
 def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether a kernel is compiled for such arguments, in this process or on disk.
 
-    Numba has no function for it. To let it look and stop it before it compiles takes 0.2 s at the first kernel of a
-    process; its index on disk takes a millisecond.
+    Numba has no function for it. Its own search initialises the compiler, 0.2 s in each process; a look into its index
+    takes a millisecond.
     """
     if in_python(kernel) is kernel:
         return True  # without the compiler there is nothing to wait for

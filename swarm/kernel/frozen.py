@@ -17,12 +17,10 @@ from typing import Any
 import numba
 import numpy as np
 
-from .jit import inlined
-
 Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
 # Modules that are known by their version; any other is known by what the function takes from it. The cache folder is
-# named by a hash of this package.
+# named by the code of this package's kernels.
 _VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__, "swarm": ""}
 _CODE = operator.attrgetter(
     "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
@@ -31,9 +29,14 @@ _CODE = operator.attrgetter(
 
 
 class Frozen:
-    """Copies of functions and of everything they refer to, and the digest of all of them together."""
+    """Copies of functions and of everything they refer to, and the digest of all of them together.
 
-    def __init__(self) -> None:
+    Args:
+        prepared: what makes a copy one that kernels can call, where that is wanted.
+    """
+
+    def __init__(self, prepared: Callable[[Function], Function] = lambda copy: copy) -> None:
+        self._prepared = prepared
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
 
@@ -42,7 +45,7 @@ class Frozen:
         return self._hash.hexdigest()[:16]
 
     def function(self, function: Function) -> Function:
-        """A copy of a function, which kernels can call."""
+        """A copy of a function."""
         function = getattr(function, "py_func", function)
         assert isinstance(function, types.FunctionType)
         if function in self._copies:
@@ -70,7 +73,7 @@ class Frozen:
             self._add("global", name)
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name], code)
-        return inlined(copy)
+        return self._prepared(copy)
 
     def value(self, value: Any, code: types.CodeType | None = None) -> Any:
         """A copy of what a function refers to; `code` says which of a module's names it takes."""

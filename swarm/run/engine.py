@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..errors import RunError
-from ..kernel.jit import Array
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..methods.base import Method
@@ -25,17 +24,17 @@ from .tiers import Tier
 _FAR = 100.0
 # A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
 _OUTSIDE = 1e-9
-# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it is free
-# to take an interrupt.
+# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it stays
+# free to handle an interrupt.
 _SHORT_FRAME = 0.05
-# Frames of less work than this [s] are for the caller's thread alone: to wake another takes some 0.1 ms.
+# The caller's thread alone does frames of less work than this [s]: waking another takes some 0.1 ms.
 _LITTLE_WORK = 2e-4
-# A frame that takes longer to write than this part of the work in it.
+# A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
 
 
 class Run:
-    """The state of a run and the threads that advance it."""
+    """The state of a run and the threads that advance it; the arrays of the particles become a part of the state."""
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
@@ -43,9 +42,9 @@ class Run:
     ) -> None:  # fmt: skip
         n = len(particles)
         self.state = State(
-            particles.position.copy(),
-            particles.velocity.copy(),
-            particles.mass.copy(),
+            particles.position,
+            particles.velocity,
+            particles.mass,
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
@@ -113,14 +112,14 @@ class Run:
         self._cut_short = status == Status.INTERRUPTED
         self._halt[0] = blocks.NEVER
         if status not in (Status.DONE, Status.INTERRUPTED):
-            told = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
+            sentence = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
             if status == Status.TOO_FAST:
-                told += f", {self._too_fast()}"
+                sentence += f", {self._too_fast()}"
             multipliers = self.state.multipliers
             if status == Status.UNCONVERGED and multipliers is not None:
                 left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-                told += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
-            raise RunError(told)
+                sentence += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
+            raise RunError(sentence)
         return not self._cut_short
 
     def share_done(self, span: float) -> float:
@@ -170,7 +169,7 @@ class Run:
         share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
         return self._method, self._chain, self._gravity, self._hard, share, mine
 
-    def _observing(self, drawn: Array) -> tuple[Any, ...]:
+    def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
         return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
 

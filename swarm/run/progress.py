@@ -16,19 +16,19 @@ _A_MINUTE, _A_MOMENT = 60.0, 1.0
 
 
 def _nothing(*_args: Any) -> None:
-    """For those who do not want to be told."""
+    """Shows nothing."""
 
 
 @dataclass(frozen=True)
 class Display:
-    """What is told of a run.
+    """The observers of a run.
 
     Args:
         frame: is called with every frame.
         within: is called with the time that the particles have reached on average on the way to the next frame, and
             the time of the end.
         every: seconds of wall time from one such call to the next.
-        compiling: is called with a sentence whenever a kernel is compiled.
+        compiling: is called with a sentence before a kernel is compiled.
     """
 
     frame: Callable[[Any], None]
@@ -41,7 +41,7 @@ class Display:
 def display(progress: bool | Callable[[Any], None]) -> Iterator[Display]:
     """Nothing, the caller's own function, or a bar or lines on standard error."""
     if callable(progress):
-        # What it does with the observables is no matter of the run's.
+        # It gets a copy of the observables, which it may change.
         yield Display(lambda frame: progress(frame.apart()))
     elif not progress:
         yield Display(_nothing)

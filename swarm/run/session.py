@@ -9,47 +9,31 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from .. import checks
 from ..errors import CompleteError, SceneError, WallTimeError
-from ..methods.base import Method
 from ..output import paths
-from ..particles import Particles
-from ..scene import Scene
 from ..version import VERSION
 from .engine import Run
+from .options import RunOptions, Task
 
 if TYPE_CHECKING:
     from ..output.beside import Beside
     from ..output.checkpoint import Arrays, Job
-    from ..output.storage import Storage
-
-
-# More often than this [s] a run would do little else.
-_OFTEN = 0.01
 
 
 class Session:
     """From a start or a checkpoint to the end, a signal or the limit of wall time; no other holds the trajectory then.
 
-    Args:
-        trajectory: the file that is written, or None: then nothing can be saved.
-        every: seconds of wall time from one checkpoint to the next; None: no checkpoint.
-        resume: go on from the last checkpoint, if there is one.
-        limit: seconds of wall time after which it ends; None: never.
+    Without a trajectory nothing can be saved.
     """
 
-    def __init__(self, trajectory: Path | None, every: float | None, resume: bool, limit: float | None) -> None:
+    def __init__(self, options: RunOptions) -> None:
         self._began = time.monotonic()
-        self._every = math.inf if every is None else checks.at_least("checkpoint", every, _OFTEN)
-        self._saves, self._resumes = every is not None, resume
-        self._end = math.inf if limit is None else self._began + checks.positive("walltime", limit)
+        self._saves, self._resumes = options.checkpoint is not None, options.resume
+        self._every = math.inf if options.checkpoint is None else options.checkpoint
+        self._end = math.inf if options.walltime is None else self._began + options.walltime
         self._due = self._began + self._every
-        self._told_to_stop = False
-        self._trajectory, self._path = trajectory, None
-        if trajectory is not None:
-            self._path = paths.checkpoint_of(trajectory)
-        elif self._saves or resume:
-            raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
+        self._stops = False
+        self._trajectory, self._path = options.trajectory, options.checkpoint_file()
         # A digest of the particles at the start, for the trajectory.
         self.start = ""
         self._job: Job | None = None
@@ -69,9 +53,7 @@ class Session:
         """The first frame that this session writes."""
         return 0 if self._arrays is None or self._job is None else self._job.frame + 1
 
-    def prepare(
-        self, scene: Scene, method: Method, storage: "Storage", particles: Particles, until: float, overwrite: bool
-    ) -> None:
+    def prepare(self, task: Task) -> None:
         """Where this session begins: with a new file, or, to resume, where the checkpoint is, if there is one.
 
         Raises:
@@ -86,6 +68,7 @@ class Session:
         from ..output.lock import only_writer
         from ..output.writer import descriptions
 
+        overwrite, until = task.options.overwrite, task.options.until
         paths.check_target(self._trajectory, overwrite or self._resumes)
         self._held.enter_context(only_writer(self._trajectory))
         if not self._resumes and os.path.lexists(self._path) and not checkpoint.is_one(self._path):
@@ -93,9 +76,9 @@ class Session:
                 f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
                 "replace; move it away, or choose another name for the trajectory"
             )
-        self.start = checkpoint.digest_of(particles)
-        texts: dict[str, Any] = {**descriptions(scene, method, storage)}
-        self._job = checkpoint.Job(VERSION, **texts, particles=len(particles), start=self.start)
+        self.start = checkpoint.digest_of(task.particles)
+        texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
+        self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), start=self.start)
         if not self._resumes:
             return
         if self._path.exists():
@@ -176,7 +159,7 @@ class Session:
 
     def stop(self) -> None:
         """Let the next look end the session."""
-        self._told_to_stop = True
+        self._stops = True
 
     def wall_time(self) -> float:
         """Seconds of all sessions of the run."""
@@ -186,16 +169,16 @@ class Session:
         """Save if it is time to, and end if it is: the last frame that is written, and the one under way.
 
         Raises:
-            KeyboardInterrupt: somebody called `stop`.
+            KeyboardInterrupt: `stop` was called.
             WallTimeError: the limit is over.
             FileError: the checkpoint cannot be written.
         """
         now = time.monotonic()
-        stops = self._told_to_stop or now >= self._end
+        stops = self._stops or now >= self._end
         if self._saves and (stops or now >= self._due):
             self._save(run, writer, frame, moment, following)
             self._due = time.monotonic() + self._every
-        if self._told_to_stop:
+        if self._stops:
             raise KeyboardInterrupt
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")

@@ -1,4 +1,4 @@
-"""From a scene to frames: checks, the loop over frames, and who is told of them."""
+"""From a scene to frames: the loop over frames, and their observers."""
 
 import contextlib
 import logging
@@ -12,27 +12,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks, interrupt
-from ..errors import SceneError
-from ..frames import Frame, FrameTimes
+from .. import interrupt
+from ..frames import Frame
 from ..kernel.cache import kernels_compiled
-from ..methods.base import Method, check_surfaces
-from ..output import paths
-from ..output.storage import Storage
+from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
-from ..surfaces.formulas.own import require_compiled
-from . import tiers, workload
+from .admission import task_of
 from .engine import Run
+from .options import RunOptions, Task
+from .outputs import recorder_of, writer_of
 from .session import Session
 
 if TYPE_CHECKING:
-    from ..output.beside import Beside, Writer
+    from ..output.beside import Beside
     from .progress import Display
 
 _LOG = logging.getLogger("swarm")
-# A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
-_ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class Result:
     multipliers: Multipliers | None
 
 
-def simulate(
+def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
     particles: Particles,
     method: Method,
@@ -86,7 +82,7 @@ def simulate(
         check everything
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
-            observe; stop if a number is not finite, or a particle outside rigid walls
+            observe; fail if a number is not finite, or a particle outside rigid walls
             copy the frame; a thread beside writes and flushes it
             tell the progress display
             save a checkpoint if one is due (within a long frame too)
@@ -136,89 +132,89 @@ def simulate(
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    target = None if trajectory is None else paths.target_of("trajectory", trajectory)
-    recorded = None if recording is None else paths.target_of("recording", recording)
-    paths.check_distinct(
-        {"trajectory": target, "checkpoint": target and paths.checkpoint_of(target), "recording": recorded}, {}
-    )
-    session = Session(target, checkpoint, resume, walltime)
-    times = FrameTimes(until, every)
-    threads = _threads(threads)
-    if block_size is not None:
-        checks.count("block_size", block_size)
-    checks.one_of("compile", compile, tiers.CHOICES)
-    particles = _checked(scene, particles, method, times, compile)
+    # Here are the names of the keywords alone.
+    keywords = {name: value for name, value in locals().items() if name not in ("scene", "particles", "method")}
+    return carry_out(scene, particles, method, RunOptions(**keywords))
 
+
+def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> Result:
+    """`simulate` with its keywords as `RunOptions`."""
+    session = Session(options)
+    task = task_of(scene, particles, method, options)
     if scene.is_open():
         _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
 
     from .progress import display  # rich is imported only when it is shown
 
-    storage = Storage(frames, precision, compression)
-    shown = {"particles": record_particles, "color": record_color, "megabytes": record_megabytes, "live": live}
-    recorder = _recording(recorded, overwrite, resume, scene, method, particles, times, shown)
+    recorder = recorder_of(task)
     runs: list[Run] = []
 
     def stop() -> None:
         session.stop()
-        for run in runs:
-            run.halt()
+        for one in runs:
+            one.halt()
 
-    with session, interrupt.taken_by(stop), display(progress) as show, kernels_compiled(show.compiling):
-        session.prepare(scene, method, storage, particles, times.until, overwrite)
-        numbers = storage.bytes_of(len(particles))
-        times.require_room(session.first, target, numbers, len(scene.surfaces), storage.compression != "none")
-
-        run = Run(scene, particles, method, threads, block_size, compile)
+    with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
+        session.prepare(task)
+        _require_room(task, session)
+        run = Run(scene, task.particles, method, options.thread_count(), options.block_size, options.compile)
         runs.append(run)
         session.restore(run)
-        history: list[dict[str, Any]] = []
-        writer = _output(
-            _trajectory(target, storage, scene, method, particles, scene_text, session),
-            storage.kept(),
-            recorder,
-            len(particles),
-        )
-        writing = writer or contextlib.nullcontext(lambda *frame: None)
-
-        with run, writing as write:
-            for number, before, moment in times:
-                session.require_same_time(number, moment)
-                if number < session.first:
-                    continue
-                _reach(run, session, writer, method, show, number, before, moment, times.until)
-                seen = {"time": moment, **run.seen()}
-                run.require_admissible(seen, moment)
-                if target is None:
-                    history.append(seen)
-                write(number, moment, run.state, seen)
-                show.frame(Frame(number, moment, times.until, seen, writer.written if writer else 0))
-                if moment < times.until:
-                    session.look(run, writer, number, moment, None)
+        writer = writer_of(task, session, recorder)
+        history = _frames(task, session, run, writer, show)
         session.finish()
         return Result(
-            Particles.of(run.state),
-            _columns(history) if target is None else _read_back(target),
+            task.particles,
+            _columns(history) if options.trajectory is None else _read_back(options.trajectory),
             session.wall_time(),
-            target,
+            options.trajectory,
             run.state.multipliers,
         )
 
 
+def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", show: "Display") -> list[dict[str, Any]]:
+    """All frames of this session; what was seen of each, where no trajectory holds it."""
+    history: list[dict[str, Any]] = []
+    until, writing = task.options.until, writer or contextlib.nullcontext(lambda *frame: None)
+    with run, writing as write:
+        for step in task.options.times:
+            number, _before, moment = step
+            session.require_same_time(number, moment)
+            if number < session.first:
+                continue
+            _reach(step, task, run, session, writer, show)
+            seen = {"time": moment, **run.seen()}
+            run.require_admissible(seen, moment)
+            if task.options.trajectory is None:
+                history.append(seen)
+            write(number, moment, run.state, seen)
+            show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
+            if moment < until:
+                session.look(run, writer, number, moment, None)
+    return history
+
+
 def _reach(
-    run: Run, session: Session, writer: "Beside | None", method: Method, show: "Display",
-    number: int, before: float, moment: float, until: float,
-) -> None:  # fmt: skip
+    step: tuple[int, float, float], task: Task, run: Run, session: Session, writer: "Beside | None", show: "Display"
+) -> None:
     """Advance from one frame to the next, and observe it; the first is the start."""
+    number, before, moment = step
     if number == 0:
         run.observe()
         return
-    span = method.span("time", moment) - method.span("time", before)
+    span = task.method.span("time", moment) - task.method.span("time", before)
     while not run.advance(
         span, moment, writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
     ):
-        show.within(before + run.share_done(span) * (moment - before), until)
+        show.within(before + run.share_done(span) * (moment - before), task.options.until)
         session.look(run, writer, number - 1, before, moment)
+
+
+def _require_room(task: Task, session: Session) -> None:
+    """Raise a SceneError where the frames do not fit."""
+    options, storage = task.options, task.options.storage
+    numbers, packed = storage.bytes_of(len(task.particles)), storage.compression != "none"
+    options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed)
 
 
 def _columns(history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
@@ -231,95 +227,3 @@ def _read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
 
     with load(trajectory) as written:
         return written.observables
-
-
-def _threads(threads: int | None) -> int:
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cores if threads is None else checks.count("threads", threads)
-
-
-def _checked(scene: Scene, particles: Particles, method: Method, times: FrameTimes, compile: str) -> Particles:
-    """The particles as they will run, all arguments being right."""
-    for name, value, kind in (("scene", scene, Scene), ("particles", particles, Particles), ("method", method, Method)):
-        if not isinstance(value, kind):
-            raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
-    # The arrays of Particles may have been changed since it checked them.
-    particles = particles.checked()
-    check_surfaces(method, scene)
-    if compile != "never":
-        require_compiled(scene.surfaces)
-    method.check(scene, particles)
-    assert times.every is not None
-    method.span("until", times.until)
-    method.span("every", times.every)
-    outside = scene.outside(particles.position, _ON_THE_WALL * _magnitude(scene, particles))
-    if outside.size:
-        first = int(outside[0])
-        point = particles.position[:, first : first + 1]
-        distances = scene.distances_outside(point)[:, 0]
-        wall = int(np.argmax(np.where(np.isnan(distances), np.inf, distances)))
-        phi = float(scene.surfaces[wall].phi(point)[0])
-        raise SceneError(
-            f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first "
-            f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
-            f"({type(scene.surfaces[wall]).__name__})"
-        )
-    workload.check(scene, particles, method, times.until, times.every)
-    return particles
-
-
-def _magnitude(scene: Scene, particles: Particles) -> float:
-    """The size whose round-off a position on a wall has."""
-    return max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
-
-
-def _trajectory(
-    path: Path | None,
-    storage: Storage,
-    scene: Scene,
-    method: Method,
-    particles: Particles,
-    scene_text: str | None,
-    session: Session,
-) -> "Writer | None":
-    if path is None:
-        return None
-    from ..output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
-
-    return TrajectoryWriter(path, storage, scene, method, particles, scene_text, session.start, session.first > 0)
-
-
-def _recording(
-    path: Path | None,
-    overwrite: bool,
-    resume: bool,
-    scene: Scene,
-    method: Method,
-    particles: Particles,
-    times: FrameTimes,
-    shown: dict[str, Any],
-) -> "Writer | None":
-    """What records for Rerun, if anything is to be."""
-    if path is None and not shown["live"]:
-        return None
-    if resume:
-        raise SceneError(
-            "recording and live cannot go on with a run that was stopped; leave them out, and make the recording from "
-            "the trajectory: swarm record RUN.h5 -o OUT.rrd"
-        )
-    from ..output.extras import needed_by
-
-    with needed_by("a recording", "record"):
-        from ..output.recording import RecordingWriter, Settings  # rerun takes half a second
-
-    return RecordingWriter(path, overwrite, scene, method, particles, times.count, Settings(**shown))
-
-
-def _output(trajectory: "Writer | None", kept: slice, recording: "Writer | None", n: int) -> "Beside | None":
-    """A context that gives the function which writes a frame, in a thread of its own."""
-    outputs = [(one, some) for one, some in ((trajectory, kept), (recording, slice(None))) if one is not None]
-    if not outputs:
-        return None
-    from ..output.beside import Beside, Several
-
-    return Beside(Several(outputs), n) if len(outputs) > 1 else Beside(outputs[0][0], n, outputs[0][1])

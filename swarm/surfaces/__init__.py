@@ -1,4 +1,11 @@
-"""The surfaces by their kind in a scene file."""
+"""The surfaces by their kind in a scene file.
+
+To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a NamedTuple of its numbers,
+for kernels. For the type of the numbers register, with contract.py, which describes all functions: `phi`, `gradient`
+and one of `first_hit`, `course` and `bend`; for methods with steps in contact also `hessian` and `farthest_push`. All
+others have a default. Then name the class in ALL_SURFACES below. examples/own_surface.py is a complete surface; if a
+method needs a function that is missing, an error says so before the run.
+"""
 
 # These only register their definitions.
 from .formulas.formula import Formula

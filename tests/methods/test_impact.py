@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from passes import one_pass, run
 
 import swarm
-from swarm.surfaces import base as surfaces
+from swarm.surfaces import contract as surfaces
 
 lengths = st.floats(1e-4, 0.3)
 

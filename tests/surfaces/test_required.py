@@ -10,10 +10,13 @@ from conftest import METHODS, SURFACES, call
 
 import swarm
 from swarm import observables
+from swarm.kernel.vector import ZERO, Symmetric, dot, square
 from swarm.lanes import block as blocks
 from swarm.methods import base as methods
-from swarm.surfaces import base, rotation, smooth
+from swarm.surfaces import contract, rotation
+from swarm.surfaces.course import Quartic
 from swarm.surfaces.shapes.solid import body
+from swarm.surfaces.surface import Surface, box_around, side_sign
 
 SHIPPED = {
     **SURFACES,
@@ -44,17 +47,17 @@ def ball_like(*functions, sided=True):
         DEFINITIONS[function.__name__](function, numbers)
 
     @dataclass(frozen=True, repr=False)
-    class Mine(base.Surface):
+    class Mine(Surface):
         side: str = "inside"
 
         def numbers(self):
-            return numbers(1.0, base.side_sign(self.side))
+            return numbers(1.0, side_sign(self.side))
 
         def size(self):
             return 1.0
 
         def bounds(self):
-            return base.box_around((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), self.side)
+            return box_around((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), self.side)
 
         def extent(self):
             return 1.0
@@ -67,32 +70,32 @@ def ball_like(*functions, sided=True):
 
 def _phi(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z):
-        return x * x + y * y + z * z - surface.r * surface.r
+    def _(surface, r):
+        return square(r) - surface.r * surface.r
 
 
 def _gradient(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z):
-        return 2.0 * x, 2.0 * y, 2.0 * z
+    def _(surface, r):
+        return 2.0 * r
 
 
 def _first_hit(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z, vx, vy, vz):
-        b, a = x * vx + y * vy + z * vz, vx * vx + vy * vy + vz * vz
-        return (np.sqrt(b * b - a * (x * x + y * y + z * z - 1.0)) - b) / a, True
+    def _(surface, r, v):
+        b, a = dot(r, v), square(v)
+        return (np.sqrt(b * b - a * (square(r) - 1.0)) - b) / a, True
 
 
 def _hessian(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z):
-        return 1.0, 1.0, 1.0, 0.0, 0.0, 0.0
+    def _(surface, r):
+        return Symmetric(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def _bend(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z):
+    def _(surface, r):
         return 1.0, 1.0, 1.0
 
 
@@ -110,19 +113,19 @@ def _is_quartic(generic, numbers):
 
 def _inner(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z):
-        return x * x + y * y + z * z
+    def _(surface, r):
+        return square(r)
 
 
 def _course(generic, numbers):
     @generic.register(numbers)
-    def _(surface, x, y, z, vx, vy, vz, gx, gy, gz):
-        return (
-            surface.side * (x * x + y * y + z * z - 1.0),
-            surface.side * (x * vx + y * vy + z * vz),
-            surface.side * (vx * vx + vy * vy + vz * vz + x * gx + y * gy + z * gz),
-            surface.side * (vx * gx + vy * gy + vz * gz),
-            surface.side * 0.25 * (gx * gx + gy * gy + gz * gz),
+    def _(surface, r, v, pull):
+        return Quartic(
+            surface.side * (square(r) - 1.0),
+            surface.side * dot(r, v),
+            surface.side * (square(v) + dot(r, pull)),
+            surface.side * dot(v, pull),
+            surface.side * 0.25 * square(pull),
             1.0,
         )
 
@@ -138,7 +141,7 @@ DEFINITIONS = {
     "inner": _inner,
     "course": _course,
 }
-LEVEL = (base.phi, base.gradient)
+LEVEL = (contract.phi, contract.gradient)
 PARTICLES = swarm.Particles([[0.1], [0.2], [0.3]], [[0.5], [0.0], [0.1]])
 
 
@@ -176,14 +179,14 @@ def test_every_shipped_surface_gives_what_every_method_needs(shipped, name, grav
 
 
 def test_no_falling_hit_is_refused_under_gravity():
-    told = refused(ball_like(*LEVEL, base.first_hit)(), swarm.Impact(), PULL)
-    assert "base.falling_hit" in told
-    assert "smooth.bend" in told
+    told = refused(ball_like(*LEVEL, contract.first_hit)(), swarm.Impact(), PULL)
+    assert "contract.falling_hit" in told
+    assert "contract.bend" in told
     assert "under gravity" in told
 
 
 def test_without_gravity_it_is_not_asked():
-    scene = swarm.Scene([ball_like(*LEVEL, base.first_hit)()])
+    scene = swarm.Scene([ball_like(*LEVEL, contract.first_hit)()])
     methods.check_surfaces(swarm.Impact(), scene)
     methods.check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
 
@@ -191,10 +194,10 @@ def test_without_gravity_it_is_not_asked():
 def test_steps_that_know_no_safe_time_are_all_taken():
     """A lower bound that says nothing is 0, never infinity."""
     wall = ball_like(*LEVEL)().numbers()
-    assert call(base.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
+    assert call(contract.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
 
 
-@pytest.mark.parametrize("given", [smooth.bend, base.course], ids=["bend", "course"])
+@pytest.mark.parametrize("given", [contract.bend, contract.course], ids=["bend", "course"])
 def test_flights_follow_from_what_is_given(given):
     """The fall of a unit sphere from its bend or its course is that of the shipped one."""
     mine, shipped = ball_like(*LEVEL, given)().numbers(), swarm.Sphere(1.0).numbers()
@@ -205,14 +208,18 @@ def test_flights_follow_from_what_is_given(given):
         assert sum_of_hits(mine, position, velocity, pull) == pytest.approx(
             sum_of_hits(shipped, position, velocity, pull), rel=1e-9
         )
-        assert 0.0 < call(base.safe_time, mine, position, velocity, pull) <= sum_of_hits(mine, position, velocity, pull)
+        assert (
+            0.0
+            < call(contract.safe_time, mine, position, velocity, pull)
+            <= sum_of_hits(mine, position, velocity, pull)
+        )
 
 
 def sum_of_hits(surface, position, velocity, pull):
     """The time of the first hit, in as many parts as it takes."""
     total = 0.0
     for _part in range(100):
-        time, found = call(base.falling_hit, surface, position, velocity, pull)
+        time, found = call(contract.falling_hit, surface, position, velocity, pull)
         total += time
         if found:
             return total
@@ -221,60 +228,63 @@ def sum_of_hits(surface, position, velocity, pull):
 
 
 def test_what_is_given_is_not_replaced():
-    shipped = base.first_hit.dispatch(type(swarm.Capsule(0.5, 1.0).numbers()))
+    shipped = contract.first_hit.dispatch(type(swarm.Capsule(0.5, 1.0).numbers()))
     assert shipped.__module__ == "swarm.surfaces.shapes.capsule"
-    numbers = type(ball_like(*LEVEL, base.first_hit, smooth.bend)().numbers())
-    assert base.first_hit.dispatch(numbers).__module__ == __name__
-    assert base.falling_hit.dispatch(numbers) is smooth._march
+    numbers = type(ball_like(*LEVEL, contract.first_hit, contract.bend)().numbers())
+    assert contract.first_hit.dispatch(numbers).__module__ == __name__
+    assert contract.falling_hit.dispatch(numbers).__module__ == "swarm.surfaces.contract"
+    assert contract.falling_hit.dispatch(numbers) is not contract.falling_hit.dispatch(object)
 
 
 def test_a_quartic_without_its_polynomial_is_refused():
-    surface = ball_like(*LEVEL, base.first_hit, smooth.bend, base.is_quartic)()
-    assert "base.course" in refused(surface, swarm.Impact(), PULL)
+    surface = ball_like(*LEVEL, contract.first_hit, contract.bend, contract.is_quartic)()
+    assert "contract.course" in refused(surface, swarm.Impact(), PULL)
 
 
 @pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.1, penalty=1.0)], ids=["impact", "penalty"])
 def test_another_inner_function_comes_with_its_gap(method):
     """q without g(q) would count q itself as the gap."""
-    told = refused(ball_like(*LEVEL, base.first_hit, smooth.hessian, base.farthest_push, base.inner)(), method)
-    assert "base.gap_of for its `inner`" in told
+    told = refused(
+        ball_like(*LEVEL, contract.first_hit, contract.hessian, contract.farthest_push, contract.inner)(), method
+    )
+    assert "contract.gap_of for its `inner`" in told
 
 
 def test_the_sign_of_the_gap_is_asked_for():
-    told = refused(ball_like(*LEVEL, base.first_hit, sided=False)(), swarm.Impact())
+    told = refused(ball_like(*LEVEL, contract.first_hit, sided=False)(), swarm.Impact())
     assert "the field `side`" in told
 
 
 # --- One sentence ----------------------------------------------------------------------------------------
 
-COMPLETE = (*LEVEL, base.first_hit, smooth.bend, smooth.hessian, base.farthest_push)
+COMPLETE = (*LEVEL, contract.first_hit, contract.bend, contract.hessian, contract.farthest_push)
 NEED_HESSIAN = [name for name in METHODS if name not in ("impact", "verlet")]
 
 
 @pytest.mark.parametrize("gravity", [None, PULL], ids=["no gravity", "gravity"])
 @pytest.mark.parametrize("name", METHODS)
 def test_what_each_method_needs(name, gravity):
-    given = [f for f in COMPLETE if f is not smooth.hessian]
+    given = [f for f in COMPLETE if f is not contract.hessian]
     without, whole = (swarm.Scene([ball_like(*some)()], gravity) for some in (given, COMPLETE))
     methods.check_surfaces(METHODS[name], whole)
     if name in NEED_HESSIAN:
-        with pytest.raises(swarm.SceneError, match=r"smooth\.hessian"):
+        with pytest.raises(swarm.SceneError, match=r"contract\.hessian"):
             methods.check_surfaces(METHODS[name], without)
     else:
         methods.check_surfaces(METHODS[name], without)
 
 
 def test_no_hessian_and_no_farthest_push_are_named_together():
-    told = refused(ball_like(*LEVEL, base.first_hit)(), swarm.Penalty(dt=0.1, penalty=1.0))
-    assert "base.farthest_push and smooth.hessian" in told
+    told = refused(ball_like(*LEVEL, contract.first_hit)(), swarm.Penalty(dt=0.1, penalty=1.0))
+    assert "contract.farthest_push and contract.hessian" in told
 
 
 def test_no_first_hit():
-    assert "base.first_hit" in refused(ball_like(*LEVEL)(), swarm.Impact())
+    assert "contract.first_hit" in refused(ball_like(*LEVEL)(), swarm.Impact())
 
 
 def test_a_scene_asks_for_phi_and_gradient():
-    for given, missing in (((base.phi,), "base.gradient"), ((base.gradient,), "base.phi")):
+    for given, missing in (((contract.phi,), "contract.gradient"), ((contract.gradient,), "contract.phi")):
         with pytest.raises(swarm.SceneError, match=f"surfaces\\[0\\] \\(Mine\\).*MineNumbers without {missing}"):
             swarm.Scene([ball_like(*given)()])
 
@@ -288,7 +298,7 @@ def test_a_class_without_a_method(name):
 
 
 def test_the_parts_of_wrapped_walls_are_asked():
-    kind = ball_like(*LEVEL, base.first_hit)
+    kind = ball_like(*LEVEL, contract.first_hit)
     part = kind("outside").numbers()
     turned = rotation.rotated((0.5, 0.5, 0.5, 0.5), part)
     for wall in (turned, body((part, swarm.Plane((0.0, 0.0, 1.0), 0.0).numbers())), body((turned,))):
@@ -298,53 +308,53 @@ def test_the_parts_of_wrapped_walls_are_asked():
                 return (wall,)
 
         scene = swarm.Scene([Wrapped("outside")], PULL)
-        with pytest.raises(swarm.SceneError, match=r"MineNumbers without base\.falling_hit"):
+        with pytest.raises(swarm.SceneError, match=r"MineNumbers without contract\.falling_hit"):
             methods.check_surfaces(swarm.Impact(), scene)
 
 
 def test_a_history_asks_too():
-    scene = swarm.Scene([ball_like(*LEVEL, base.first_hit)()])
-    with pytest.raises(swarm.SceneError, match=r"smooth\.hessian"):
+    scene = swarm.Scene([ball_like(*LEVEL, contract.first_hit)()])
+    with pytest.raises(swarm.SceneError, match=r"contract\.hessian"):
         swarm.contact_history(scene, (0.9, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, swarm.Penalty(dt=0.2, penalty=1.0))
 
 
 # --- Registration ----------------------------------------------------------------------------------------
 
 
-def wall_first(wall, x, y, z):
+def wall_first(wall, r):
     return 0.0
 
 
-def points(surface, a, b, c):
+def point(surface, a):
     return 0.0
 
 
-def too_few(surface, x, y):
+def too_few(surface):
     return 0.0
 
 
 @pytest.mark.parametrize("as_call", [True, False])
-@pytest.mark.parametrize("wrong", [wall_first, points, too_few])
+@pytest.mark.parametrize("wrong", [wall_first, point, too_few])
 def test_argument_names_are_asked_at_registration(wrong, as_call):
     class Numbers(NamedTuple):
         r: float
 
     with pytest.raises(swarm.SceneError) as caught:
-        base.phi.register(Numbers, wrong) if as_call else base.phi.register(Numbers)(wrong)
+        contract.phi.register(Numbers, wrong) if as_call else contract.phi.register(Numbers)(wrong)
     told = str(caught.value)
     assert "\n" not in told
-    for part in ("swarm.surfaces.base.phi", "(surface, x, y, z)", wrong.__name__, "Numbers"):
+    for part in ("swarm.surfaces.contract.phi", "(surface, r)", wrong.__name__, "Numbers"):
         assert part in told
-    assert base.phi.dispatch(Numbers) is base.phi.dispatch(object)
+    assert contract.phi.dispatch(Numbers) is contract.phi.dispatch(object)
 
 
 def test_registration_is_that_of_singledispatch():
     class Numbers(NamedTuple):
         r: float
 
-    def right(surface, x, y, z):
+    def right(surface, r):
         return 3.0
 
-    assert base.phi.register(Numbers, right) is right
-    assert base.phi.registry[Numbers] is right
-    assert base.phi(Numbers(1.0), 0.0, 0.0, 0.0) == 3.0
+    assert contract.phi.register(Numbers, right) is right
+    assert contract.phi.registry[Numbers] is right
+    assert contract.phi(Numbers(1.0), ZERO) == 3.0

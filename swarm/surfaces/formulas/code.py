@@ -50,7 +50,7 @@ def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Functi
         raise SceneError(f"parameters must be a NamedTuple of numbers, got {parameters!r}")
     for name, value in zip(names, parameters, strict=True):
         checks.number(f"parameters.{name}", value)
-    frozen = Frozen()
+    frozen = Frozen(inlined)
     frozen.value(names)
     copies = []
     for name, function in (("phi", phi), ("gradient", gradient), ("hessian", hessian)):

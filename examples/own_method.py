@@ -1,0 +1,74 @@
+"""A method of one's own, complete: `Mirror` flies to the next wall and reflects the velocity there, and nothing more.
+
+    python examples/own_method.py
+
+It is `swarm.Impact` without its care: nothing restores the energy from round-off, walls are elastic, and a particle
+that grazes its wall takes as many impacts as that takes. swarm/methods/contract.py says what a method may register.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import swarm
+from swarm.kernel.gravity import accelerated, displacement
+from swarm.kernel.jit import select
+from swarm.kernel.vector import dot
+from swarm.methods import contract
+from swarm.methods.base import Method
+from swarm.status import Status
+from swarm.surfaces import contract as surfaces
+from swarm.surfaces import flights, fold
+
+
+@dataclass(frozen=True)
+class Mirror(Method):
+    """Exact flights and reflections."""
+
+    def needs(self, scene):
+        return *flights.of_flights(scene.gravity is not None), surfaces.unit_normal
+
+    def numbers(self, scene):
+        return MirrorNumbers()
+
+
+class MirrorNumbers(NamedTuple):
+    """What kernels know of the method: which it is."""
+
+
+@contract.constants.register(MirrorNumbers)
+def _(method, mass, energy, v):
+    return 0.0, 0.0, 0.0
+
+
+@contract.own.register(MirrorNumbers)
+def _(method, first, second, third):
+    return method
+
+
+@contract.land.register(MirrorNumbers)
+def _(method, chain, gravity, lane, hit):
+    t = select(hit.time < lane.left, hit.time, lane.left)
+    r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
+    return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
+
+
+@contract.contact.register(MirrorNumbers)
+def _(method, chain, gravity, lane, wall, solution):
+    n = fold.unit_normal(chain, wall, lane.r)
+    b = dot(lane.v, n)
+    # v1 = v0 - 2 (v0.n) n where v0.n > 0
+    impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
+    hits = select(wall >= 0.0, 1.0, 0.0)
+    return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0)
+
+
+@contract.hard_pass.register(MirrorNumbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0), Status.STALLED.value
+
+
+if __name__ == "__main__":
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    result = swarm.simulate(scene, swarm.fill(scene, 1000, speed=1.0), Mirror(), until=10.0)
+    seen = result.observables
+    print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}")

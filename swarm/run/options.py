@@ -1,0 +1,107 @@
+"""What is asked of a run: the keywords of `simulate`, the [run] table of a scene file, the options of `swarm run`."""
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import checks
+from ..errors import SceneError
+from ..frames import FrameTimes
+from ..methods.base import Method
+from ..output import paths
+from ..output.storage import Storage
+from ..particles import Particles
+from ..scene import Scene
+from .tiers import CHOICES
+
+# More often than this [s] a run would do little else than save checkpoints.
+_OFTEN = 0.01
+
+
+# What [run] does not have: it belongs to one session, not to the run.
+_OF_A_SESSION = {"in_file": False}
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How long a run is, what it writes, and how it is carried out; `simulate` describes each.
+
+    Raises:
+        SceneError: a value is out of its range, or two files are the same.
+    """
+
+    until: float
+    every: float | None = None
+    trajectory: Any = None  # then a Path or None, as `recording`
+    recording: Any = None
+    record_particles: int = 5000
+    record_color: str = "speed"
+    record_megabytes: float = 100.0
+    live: Any = field(default=False, metadata=_OF_A_SESSION)
+    threads: int | None = None
+    progress: Any = field(default=False, metadata=_OF_A_SESSION)
+    overwrite: bool = field(default=False, metadata=_OF_A_SESSION)
+    scene_text: str | None = field(default=None, metadata=_OF_A_SESSION)
+    block_size: int | None = field(default=None, metadata=_OF_A_SESSION)
+    frames: str | int = "all"
+    precision: str = "float64"
+    compression: str = "none"
+    checkpoint: float | None = None
+    resume: bool = field(default=False, metadata=_OF_A_SESSION)
+    walltime: float | None = field(default=None, metadata=_OF_A_SESSION)
+    compile: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("trajectory", "recording"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, None if value is None else paths.target_of(name, value))
+        paths.check_distinct({**self.files(), "recording": self.recording}, {})
+        if self.checkpoint is not None:
+            checks.at_least("checkpoint", self.checkpoint, _OFTEN)
+        if self.walltime is not None:
+            checks.positive("walltime", self.walltime)
+        times = self.times
+        object.__setattr__(self, "until", times.until)
+        for name in ("threads", "block_size"):
+            if getattr(self, name) is not None:
+                checks.count(name, getattr(self, name))
+        checks.one_of("compile", self.compile, CHOICES)
+        _ = self.storage
+
+    @property
+    def times(self) -> FrameTimes:
+        """When the frames are."""
+        return FrameTimes(self.until, self.every)
+
+    @property
+    def storage(self) -> Storage:
+        """What the trajectory keeps."""
+        return Storage(self.frames, self.precision, self.compression)
+
+    def files(self) -> dict[str, Path | None]:
+        """The trajectory and its checkpoint, whether there will be one or not."""
+        saved = None if self.trajectory is None else paths.checkpoint_of(self.trajectory)
+        return {"trajectory": self.trajectory, "checkpoint": saved}
+
+    def thread_count(self) -> int:
+        """How many threads compute."""
+        if self.threads is not None:
+            return self.threads
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+    def checkpoint_file(self) -> Path | None:
+        """Where checkpoints are, if this run may have one."""
+        if self.trajectory is None and (self.checkpoint is not None or self.resume):
+            raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
+        return self.files()["checkpoint"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be run, and how; the particles are the run's own."""
+
+    scene: Scene
+    particles: Particles
+    method: Method
+    options: RunOptions

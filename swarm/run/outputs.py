@@ -1,0 +1,55 @@
+"""What a run writes: its trajectory, its recording, or both."""
+
+from typing import TYPE_CHECKING
+
+from ..errors import SceneError
+from .options import Task
+from .session import Session
+
+if TYPE_CHECKING:
+    from ..output.beside import Beside, Writer
+
+
+def recorder_of(task: Task) -> "Writer | None":
+    """What records for Rerun, if anything is to."""
+    options = task.options
+    if options.recording is None and not options.live:
+        return None
+    if options.resume:
+        raise SceneError(
+            "recording and live cannot go on with a run that was stopped; leave them out, and make the recording from "
+            "the trajectory: swarm record RUN.h5 -o OUT.rrd"
+        )
+    from ..output.extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from ..output.recording import RecordingWriter, Settings  # rerun takes half a second
+
+    settings = Settings(options.record_particles, options.record_color, options.record_megabytes, options.live)
+    return RecordingWriter(
+        options.recording, options.overwrite, task.scene, task.method, task.particles, options.times.count, settings
+    )
+
+
+def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Beside | None":
+    """A context that gives the function which writes a frame, in a thread of its own."""
+    outputs = [(_trajectory(task, session), task.options.storage.kept()), (recorder, slice(None))]
+    used = [(one, kept) for one, kept in outputs if one is not None]
+    if not used:
+        return None
+    from ..output.beside import Beside, Several
+
+    n = len(task.particles)
+    return Beside(Several(used), n) if len(used) > 1 else Beside(used[0][0], n, used[0][1])
+
+
+def _trajectory(task: Task, session: Session) -> "Writer | None":
+    options = task.options
+    if options.trajectory is None:
+        return None
+    from ..output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
+
+    return TrajectoryWriter(
+        options.trajectory, options.storage, task.scene, task.method, task.particles, options.scene_text,
+        session.start, session.first > 0,
+    )  # fmt: skip
