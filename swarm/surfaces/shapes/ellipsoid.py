@@ -107,6 +107,13 @@ def _(surface):
 # --- Contact ---------------------------------------------------------------------------------------------
 
 
+@contract.unit_normal.register(EllipsoidNumbers)
+def _(surface, r):
+    # Without the test for an apex, which was a sixth of the time of an impact
+    n = times(surface.a, r - surface.center)
+    return n * (surface.side / norm(n))
+
+
 @contract.rise.register(EllipsoidNumbers)
 def _(surface, r0, p, kappa):
     # s = r0 + r1 = (2 r0 + p)/(1 + kappa A) and e = r1 - r0 = (p - 2 kappa A r0)/(1 + kappa A): q1 - q0 = s.A e
