@@ -11,6 +11,7 @@ import swarm
 from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
 from swarm.kernel.vector import Vec, vec
+from swarm.run import tiers
 from swarm.surfaces import contract
 from swarm.surfaces.fold import Chain
 from swarm.surfaces.rotation import Rotated
@@ -25,6 +26,8 @@ settings.register_profile(
 )
 settings.load_profile("swarm")
 
+# What plain Python does sooner than a kernel is compiled is not worth compiling.
+tiers._PATIENCE = 4.0
 EPSILON = float(np.finfo(np.float64).eps)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import METHODS, SURFACES
+from conftest import METHODS, SURFACES, scene_of
 
 import swarm
 from swarm.kernel import cache
@@ -17,12 +17,15 @@ from swarm.run.engine import Run
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: there is one tier")
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
-# What is not a cavity is put into one.
-CAVITIES = ("sphere", "ellipsoid", "torus", "capsule", "rotated ellipsoid", "rotated torus", "formula")
+# A cavity and a solid of one kind have the same kernels; in the same scene they are compiled once.
+KINDS = [
+    ("sphere", "ball"), ("ellipsoid", "egg"), ("rotated ellipsoid", "rotated egg"), ("torus", "ring"),
+    ("rotated torus",), ("capsule", "rod"), ("plane",), ("formula",),
+]  # fmt: skip
 
 
 def scene_with(name):
-    return swarm.Scene([SURFACES[name]()] + ([] if name in CAVITIES else [swarm.Sphere(2.0)]))
+    return swarm.Scene([SURFACES[name](), swarm.Sphere(2.0)])
 
 
 def end_of(run, span):
@@ -32,13 +35,8 @@ def end_of(run, span):
         return [array.tobytes() for array in run.arrays().values()], repr(run.seen())
 
 
-@pytest.mark.physics
-@compiled_only
-@pytest.mark.parametrize("method", ["impact", "penalty"])
-@pytest.mark.parametrize("name", SURFACES)
-def test_both_tiers_and_a_run_that_changes_have_the_same_bits(monkeypatch, name, method):
-    """Wherever it changes: after one pass, or after seven."""
-    scene, method = scene_with(name), METHODS[method]
+def assert_same_bits(monkeypatch, scene, method):
+    """In plain Python, compiled, and wherever a run changes from one to the other: after one pass, or after seven."""
     start, span = swarm.fill(scene, 6, speed=1.0, seed=1), method.span("until", 4.0)
     plain = end_of(Run(scene, start.copy(), method, 1, None, "never"), span)
     assert end_of(Run(scene, start.copy(), method, 1, None, "always"), span) == plain
@@ -49,6 +47,25 @@ def test_both_tiers_and_a_run_that_changes_have_the_same_bits(monkeypatch, name,
         if not run.advance(span, 1.0):
             run._tier.left = 0.0
         assert end_of(run, span if run._tier.left == 0.0 else 0.0)[0] == plain[0]
+
+
+def test_every_surface_is_of_a_kind():
+    assert sorted(sum(KINDS, ())) == sorted(SURFACES)
+
+
+@pytest.mark.physics
+@compiled_only
+@pytest.mark.parametrize("names", KINDS, ids=lambda names: names[0])
+def test_both_tiers_have_the_same_bits_in_every_surface(monkeypatch, names):
+    for name in names:
+        assert_same_bits(monkeypatch, scene_with(name), METHODS["impact"])
+
+
+@pytest.mark.physics
+@compiled_only
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "impact"])
+def test_both_tiers_have_the_same_bits_with_every_method(monkeypatch, method):
+    assert_same_bits(monkeypatch, scene_of("ellipsoid"), METHODS[method])
 
 
 @compiled_only

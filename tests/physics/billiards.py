@@ -28,9 +28,9 @@ def scene_of(name, gravity=None):
     return swarm.Scene(SCENES[name], gravity=gravity)
 
 
-def run(scene, particles, method, until, every=None, threads=1):
+def run(scene, particles, method, until, every=None, compile="auto"):
     """`simulate` in the thread of the test."""
-    return swarm.simulate(scene, particles, method, until=until, every=every, threads=threads)
+    return swarm.simulate(scene, particles, method, until=until, every=every, threads=1, compile=compile)
 
 
 def equally_busy(scene, particles, impacts, time):

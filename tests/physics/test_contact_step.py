@@ -18,7 +18,7 @@ def test_chords_keep_energy_and_walls(name, part):
     """A chord is a reflection about the discrete gradient: |v| stays, both its ends are on the wall; 1e3 impacts."""
     scene = scene_of(name)
     start = swarm.fill(scene, 200, speed=0.5, seed=12)
-    result = run(scene, start, swarm.Impact(contact_step=part * scene.size() / 0.5), 1600.0, 8.0)
+    result = run(scene, start, swarm.Impact(contact_step=part * scene.size() / 0.5), 1600.0, 8.0, "always")
     assert result.observables["impacts"][-1] >= 200 * 1000
     assert result.observables["energy_error"].max() <= 1e-12
     assert worst_energy(start, result.particles) <= 1e-12
