@@ -11,7 +11,7 @@ import numpy as np
 
 from ..contact.regularisation import Power
 from ..kernel import cache
-from ..surfaces.formulas.march import OwnNumbers
+from ..surfaces.formulas.numbers import OwnNumbers
 
 CHOICES = ("auto", "always", "never")
 # Seconds of plain Python after which a run compiles its kernels.

@@ -30,7 +30,7 @@ from swarm.kernel.vector import column, square, vec
 from swarm.surfaces import contract
 from swarm.surfaces.flights import first_hit
 from swarm.surfaces.fold import chain_of
-from swarm.surfaces.formulas.march import OwnNumbers
+from swarm.surfaces.formulas.numbers import OwnNumbers
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
 from swarm.surfaces.shapes.rotated import own

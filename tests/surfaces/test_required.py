@@ -232,7 +232,7 @@ def test_what_is_given_is_not_replaced():
     assert shipped.__module__ == "swarm.surfaces.shapes.capsule"
     numbers = type(ball_like(*LEVEL, contract.first_hit, contract.bend)().numbers())
     assert contract.first_hit.dispatch(numbers).__module__ == __name__
-    assert contract.falling_hit.dispatch(numbers).__module__ == "swarm.surfaces.contract"
+    assert contract.falling_hit.dispatch(numbers).__module__ == "swarm.surfaces.march"
     assert contract.falling_hit.dispatch(numbers) is not contract.falling_hit.dispatch(object)
 
 

@@ -10,7 +10,7 @@ from exact import level_along, noise
 from test_surfaces import check_hit, start
 
 import swarm
-from swarm.surfaces import contract
+from swarm.surfaces import contract, march
 from swarm.surfaces import rotation as rotations
 
 every_march = pytest.mark.parametrize("name", ITERATED)
@@ -31,7 +31,7 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
         pull = heavy * scale * rng.uniform(-1.0, 1.0, 3)
         left = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
         for _ask in range(100):
-            time, found = call(contract.march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
+            time, found = call(march.march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
             check_hit(surface, position, velocity, pull, time, found, left)
             left -= time
             if found or left < 0.0:
@@ -78,7 +78,7 @@ def test_the_closed_form_of_the_capsule_is_the_march(side):
         if capsule.side * call(contract.phi, capsule, position) > 0.0:
             continue
         time, found = call(contract.first_hit, capsule, position, velocity)
-        marched, _found = call(contract.march, capsule, position, velocity, np.zeros(3))
+        marched, _found = call(march.march, capsule, position, velocity, np.zeros(3))
         assert found
         if time == math.inf:
             assert marched > 1e9

@@ -195,11 +195,6 @@ def level_window(surface, c, d, v, pull):
     return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
 
-@contract.is_quartic.register(QuadricNumbers)
-def _(surface):
-    return True
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
 
 

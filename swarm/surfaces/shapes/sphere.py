@@ -129,11 +129,6 @@ def _(surface, r, v, pull):
     return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
 
 
-@contract.is_quartic.register(SphereNumbers)
-def _(surface):
-    return True
-
-
 @contract.may_be_far.register(SphereCavity)
 def _(surface):
     return False
