@@ -14,15 +14,15 @@ Required are `phi`, `gradient` and one of
 for methods with steps in contact also `farthest_push` and one of
     push, rise and resolve                      the step in closed form,
     hessian                                     newton.py finds the step.
-Everything else has a definition here, and a surface registers its own only where that is faster or more exact. Who has
-an inner function other than phi registers `inner`, `slope`, `gap_of`, `level_of` and `gap_slope` for it.
+Everything else has a definition here, and a surface registers its own only where that is faster or more exact. A
+surface whose inner function is not phi registers `inner`, `slope`, `gap_of`, `level_of` and `gap_slope` together.
 `required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
 """
 
 import math
 
 from ..kernel.jit import by_type, select
-from ..kernel.vector import Vec, absolute, norm, square, times, total
+from ..kernel.vector import absolute, norm, square, times, total
 from .course import Quartic, first_rise, safe_rise_time
 
 # Newton steps of the chord.
@@ -115,7 +115,7 @@ def distance(surface, r):
 
 @by_type
 def gap_scale(surface, r):
-    """How far the gap moves at most when each coordinate moves by its own size: where its last bits are."""
+    """By how much the gap changes at most when each coordinate changes by itself: magnitude that sets its round-off."""
     return total(absolute(times(gradient(surface, r), r)))
 
 
@@ -146,8 +146,8 @@ def flat(surface):
 def first_hit(surface, r, v):
     """When the straight flight r + v t leaves the admissible side: (time, whether it does then).
 
-    Where the second is False the flight surely stays admissible until then, and more cannot be said without more work;
-    an infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of the
+    Where the second is False the flight surely stays admissible until then, and what comes after is not known yet; an
+    infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of the
     approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle moves outward.
     """
     raise NotImplementedError
@@ -163,7 +163,7 @@ def falling_hit(surface, r, v, pull):
 def safe_time(surface, r, v, pull):
     """A time during which that parabola surely stays admissible: a lower bound, cheap.
 
-    0 says nothing: a method then takes every one of its steps.
+    With 0, where nothing is known, a method takes every one of its steps.
     """
     return 0.0
 
@@ -221,7 +221,7 @@ def passed(surface, r, v):
 def inner_gradient(surface, r0, r1):
     """Discrete gradient of q: D.(r1 - r0) = q1 - q0. Gonzalez's; grad q(m) of the midpoint m for a quadric."""
     # grad q(m) + (q1 - q0 - grad q(m).d)/|d|^2 d
-    g = slope(surface, Vec(0.5 * (r0.x + r1.x), 0.5 * (r0.y + r1.y), 0.5 * (r0.z + r1.z)))
+    g = slope(surface, 0.5 * (r0 + r1))
     d = r1 - r0
     d2 = square(d)
     rest = difference(surface, r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z

@@ -13,7 +13,7 @@ from .fold import Chain, outside
 class Hit(NamedTuple):
     """Time of a hit and the wall's number.
 
-    The number is -1 where the flight is surely free until then, and more is not known yet.
+    The number is -1 where the flight is surely free until then, and what comes after is not known yet.
     """
 
     time: float

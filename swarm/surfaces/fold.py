@@ -45,14 +45,14 @@ length.register(Nothing, lambda chain: 0)
 def of_wall(function: Callable[..., Any], neutral: Any) -> Any:
     """The fold (chain, wall, ...) that is function(surface, ...) of the wall with this number.
 
-    Of another number it is the function of the last wall: whoever has no wall does not use the answer. `neutral` is any
-    value of the type of the result.
+    For any other number it is the function of the last wall: a caller that has no wall ignores the result. `neutral` is
+    any value of the type of the result.
     """
     count = len(inspect.signature(function).parameters) - 1
     return {1: _of_wall_1, 2: _of_wall_2, 3: _of_wall_3, 4: _of_wall_4}[count](function, neutral)
 
 
-# One factory for each number of arguments: Numba compiles functions with named arguments only.
+# One factory for each number of arguments: with one for `*rest` an impact with chords takes 10 % longer to compile.
 def _of_wall_1(function: Any, neutral: Any) -> Any:
     @by_type
     def fold(chain, wall, a):

@@ -15,14 +15,14 @@ from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface
 
-# Their definitions hold for the inner function q = phi only: who gives another q gives these too.
+# Their definitions hold for the inner function q = phi only: a surface with another q registers these too.
 _OF_PHI = (contract.gap_of, contract.gap_slope, contract.slope)
 # What a solid of several parts asks of each.
 _OF_PARTS = (
     contract.phi, contract.gradient, contract.distance, contract.gap_scale, contract.unit_normal, contract.first_hit,
 )  # fmt: skip
 _DESCRIPTION = ("size", "bounds", "extent")
-# What surfaces need not give themselves is defined in these modules, whose loops are functions of the last two.
+# Definitions that follow from others are in these modules and in contract.py; their helpers are read too.
 _LOOPS = (march, newton)
 _OWN = tuple(module.__name__ for module in (contract, *_LOOPS))
 
