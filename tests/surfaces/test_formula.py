@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import swarm
 from swarm import tables
 from swarm.surfaces import contract
-from swarm.surfaces.formulas import derivatives, march
+from swarm.surfaces.formulas import derivatives, numbers
 from swarm.surfaces.formulas.interval import Interval, bounds_of
 from swarm.surfaces.surface import UNBOUNDED
 
@@ -373,4 +373,4 @@ def test_a_scene_file_names_its_key(table, said):
 def test_other_values_of_parameters_are_the_same_code():
     kinds = {swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": r})._form.kind for r in (0.1, 2.0)}
     assert len(kinds) == 1
-    assert issubclass(kinds.pop(), march.OwnNumbers)
+    assert issubclass(kinds.pop(), numbers.OwnNumbers)
