@@ -1,6 +1,7 @@
 """Checks of arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
 import difflib
+import functools
 import math
 import re
 from collections.abc import Iterable
@@ -75,6 +76,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
     return result
 
 
+@functools.cache
 def memory() -> int:
     """Memory of this machine [bytes]."""
     import psutil

@@ -6,13 +6,13 @@ Sums run over fixed chunks of particles in a fixed order, so they have the same 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .contact.energy import contact_energy
 from .kernel.gravity import Nothing, potential
 from .kernel.jit import by_type, inlined, kernel, scratch, select
-from .kernel.vector import Vec, column, cross, dot, square
-from .particles import State
+from .kernel.vector import Vec, column, cross, dot, square, vec
+from .particles import Floats, State
+from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
 from .surfaces import fold as walls
@@ -23,8 +23,6 @@ CHUNK = 256
 _COLUMNS = 64
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
-
-Floats = NDArray[np.float64]
 
 
 @by_type
@@ -46,11 +44,15 @@ def _(chain, r):
 
 
 class Energies(NamedTuple):
-    """Kinetic, potential and contact energy per mass of one particle."""
+    """Kinetic, potential and contact energy per mass of one particle, or of many as arrays."""
 
-    kinetic: float
-    fall: float
-    stored: float
+    kinetic: Any
+    fall: Any
+    stored: Any
+
+    def total(self) -> Any:
+        """Their sum."""
+        return self.kinetic + self.fall + self.stored
 
 
 @inlined
@@ -58,17 +60,30 @@ def _energies(law, chain, gravity, m, r, v):
     return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, chain, 1.0 / m, r))
 
 
-@kernel
-def start_energies(law, chain, gravity, size, state):
-    """Fill `energy` and `inverse_scale`: energy errors are relative to kinetic + contact + m |G| size at the start."""
-    mass = state.mass
-    weight = abs(potential(gravity, Vec(size, 0.0, 0.0))) + abs(potential(gravity, Vec(0.0, size, 0.0)))
-    weight += abs(potential(gravity, Vec(0.0, 0.0, size)))
-    for i in range(mass.size):
-        e = _energies(law, chain, gravity, mass[i], column(state.position, 0, i), column(state.velocity, 0, i))
-        state.energy[i] = e.kinetic + e.fall + e.stored
-        scale = e.kinetic + e.stored + weight
-        state.inverse_scale[i] = 1.0 / scale if scale > 0.0 else 0.0
+def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
+    """The energies of particles, positions and velocities (3, N), without a kernel: those of one go through NumPy."""
+    stored, chain = np.zeros(len(mass)), scene.chain()
+    if law is not None:
+        # Few particles are in a wall, and its law takes one number.
+        for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
+            stored[i] = contact_energy(law, chain, 1.0 / mass[i], column(position, 0, i))
+    return Energies(0.5 * square(vec(velocity)), potential(scene.pull(), vec(position)), stored)
+
+
+def energy_scale(scene: Scene, start: Energies) -> Floats:
+    """What energy errors are relative to: kinetic + contact + m |G| size at the start, per mass."""
+    size, pull = scene.finite_size(), scene.pull()
+    weight = abs(potential(pull, Vec(size, 0.0, 0.0))) + abs(potential(pull, Vec(0.0, size, 0.0)))
+    weight += abs(potential(pull, Vec(0.0, 0.0, size)))
+    return np.asarray(start.kinetic + start.stored + weight)
+
+
+def start_energies(scene: Scene, law: Any, state: State) -> None:
+    """Fill `energy` and `inverse_scale` of the state."""
+    start = energies(scene, law, state.mass, state.position, state.velocity)
+    scale = energy_scale(scene, start)
+    state.energy[:] = start.total()
+    state.inverse_scale[:] = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
 
 
 @kernel

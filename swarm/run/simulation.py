@@ -175,14 +175,18 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
 def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", show: "Display") -> list[dict[str, Any]]:
     """All frames of this session; what was seen of each, where no trajectory holds it."""
     history: list[dict[str, Any]] = []
-    until, writing = task.options.until, writer or contextlib.nullcontext(lambda *frame: None)
-    with run, writing as write:
-        for step in task.options.times:
-            number, _before, moment = step
+    until, span_of = task.options.until, task.method.span
+    with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
+        for number, before, moment in task.options.times:
             session.require_same_time(number, moment)
             if number < session.first:
                 continue
-            _reach(step, task, run, session, writer, show)
+            if number == 0:
+                run.observe()
+            span = span_of("time", moment) - span_of("time", before)
+            while number > 0 and not run.advance(span, moment, *_meanwhile(session, writer, show)):
+                show.within(before + run.share_done(span) * (moment - before), until)
+                session.look(run, writer, number - 1, before, moment)
             seen = {"time": moment, **run.seen()}
             run.require_admissible(seen, moment)
             if task.options.trajectory is None:
@@ -194,20 +198,9 @@ def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", sho
     return history
 
 
-def _reach(
-    step: tuple[int, float, float], task: Task, run: Run, session: Session, writer: "Beside | None", show: "Display"
-) -> None:
-    """Advance from one frame to the next, and observe it; the first is the start."""
-    number, before, moment = step
-    if number == 0:
-        run.observe()
-        return
-    span = task.method.span("time", moment) - task.method.span("time", before)
-    while not run.advance(
-        span, moment, writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
-    ):
-        show.within(before + run.share_done(span) * (moment - before), task.options.until)
-        session.look(run, writer, number - 1, before, moment)
+def _meanwhile(session: Session, writer: "Beside | None", show: "Display") -> tuple[float, float]:
+    """What happens beside the computation: seconds that a frame takes to write, and when to look in again."""
+    return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
 
 
 def _require_room(task: Task, session: Session) -> None:

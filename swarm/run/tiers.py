@@ -7,8 +7,6 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from ..contact.regularisation import Power
 from ..kernel import cache
 from ..surfaces.formulas.march import OwnNumbers
@@ -35,7 +33,6 @@ class Tier:
         patience = 0.0 if particles > _FEW or not _same_bits(numbers) else _PATIENCE
         # Seconds that the run may still spend in plain Python.
         self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
-        # What is called once at the start is not worth its compilation.
         self.is_plain = self.left > 0.0
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
@@ -44,11 +41,9 @@ class Tier:
         self.is_plain = may and (self.left == math.inf or not all(cache.is_compiled(*call) for call in calls))
         return self.is_plain != before
 
-    def call(self, kernel: Any, arguments: tuple[Any, ...]) -> Any:
-        """Call a kernel in this tier."""
-        # As in compiled kernels: 1/0 is an infinity, which a select throws away, and no warning.
-        with np.errstate(all="ignore"):
-            return (cache.in_python(kernel) if self.is_plain else kernel)(*arguments)
+    def kernel(self, kernel: Any) -> Any:
+        """A kernel as this tier calls it."""
+        return cache.in_python(kernel) if self.is_plain else kernel
 
 
 def _same_bits(numbers: Any) -> bool:
