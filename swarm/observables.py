@@ -1,4 +1,4 @@
-"""What is measured at a frame: arrays in, numbers out.
+"""Observables of a frame, from arrays.
 
 Sums run over fixed chunks of particles in a fixed order, so they have the same bits for any number of threads.
 """
@@ -17,7 +17,7 @@ from .surfaces import contract as surfaces
 from .surfaces import flights
 from .surfaces import fold as walls
 
-# Particles a partial sum: a constant of the results, unlike the block size.
+# Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 64
@@ -133,11 +133,11 @@ def observe(law, chain, gravity, state, drawn, size, partial):
 
 @kernel
 def count_escaped(chain, gravity, far, faces, state):
-    """Particles that are on their way out of an open scene, and will not come back.
+    """The number of particles that leave an open scene and do not come back.
 
-    Those farther from the origin than `far`; those in a straight flight that meets no wall; and those beyond one of the
-    open `faces`, rows (n, offset), that fly on in its direction n: walls beside that face go on without end, and would
-    stop them, but not from going.
+    Those farther from the origin than `far`; those in a straight flight that hits no wall; and those beyond one of the
+    open `faces`, rows (n, offset), that fly in its direction n: the walls beside that face are endless, and a particle
+    that hits them there still leaves.
     """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(position.shape[1]):
@@ -152,7 +152,7 @@ def count_escaped(chain, gravity, far, faces, state):
 
 @by_type
 def _escapes(gravity, chain, r, v):
-    """Gravity brings particles back, or not: only their distance tells."""
+    """Under gravity only the distance decides."""
     return False
 
 

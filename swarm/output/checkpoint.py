@@ -1,4 +1,4 @@
-"""Checkpoints: all that a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
+"""Checkpoints: what a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
 
 A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Each
 has a checksum.
@@ -118,7 +118,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def is_one(path: Path) -> bool:
-    """Whether a file begins like a checkpoint, even if it is incomplete."""
+    """Whether a file starts like a checkpoint, complete or not."""
     if not path.is_file():
         return False
     with open(path, "rb") as file:
@@ -135,7 +135,7 @@ def read(path: Path) -> tuple[Job, Arrays]:
         with zipfile.ZipFile(path) as archive:
             # Every entry has a checksum, which is checked when it is read to its end.
             entries = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in archive.infolist()}
-        # Parsed only after that: the header of a damaged array may state any size.
+        # Parsed after the checksums: the header of a damaged array may state any size.
         arrays = {
             name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
         }

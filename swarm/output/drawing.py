@@ -22,7 +22,7 @@ MAP = ListedColormap(colours.table(), name="swarm")
 BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _DPI = 100
-# Matplotlib leaves room around 3-D axes: this much larger they fill their cell.
+# Matplotlib leaves room around 3-D axes: with this zoom they fill their cell.
 _ZOOM = 1.3
 
 

@@ -25,8 +25,8 @@ from . import layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
-# HDF5 wants the same locking flags from all who open a file in one process with the same driver. The driver for logs
-# reads like the usual one, logs nothing by default, and is unlikely to be used by other code.
+# In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
+# another. The logging driver reads like the default one, logs nothing by default, and is rarely used.
 _DRIVER = "swarm"
 
 
@@ -216,7 +216,7 @@ def _opened(path: Path) -> h5py.File:
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
-            # Its writer is at this moment between marking it and clearing the mark, or was killed there.
+            # Its writer has marked it and not yet cleared the mark, or was killed in between.
             return h5py.File(superblock.Unmarked(path), "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):

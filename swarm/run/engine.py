@@ -1,4 +1,4 @@
-"""A run under way: its state, and the threads that advance and observe it. The border to the kernels."""
+"""The state of a run, and the threads that advance and observe it: the only callers of the kernels."""
 
 import math
 import time
@@ -21,7 +21,7 @@ from .tiers import Tier
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
-# A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
+# Beyond this part of the scene's size a particle outside rigid walls is an error; round-off is 1e-15 of it.
 _OUTSIDE = 1e-9
 # The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it stays
 # free to handle an interrupt.
@@ -82,19 +82,19 @@ class Run:
         self._pool.shutdown(wait=True)
 
     def halt(self, passes: int = 0) -> None:
-        """Let each call of a kernel return after so many passes, before its frame is done; 0: at once.
+        """Make every kernel call of this frame return after so many passes; 0: at once.
 
-        It holds until `advance` returns. It never takes back a halt that comes sooner, not even one that a signal or
-        another thread asks for meanwhile: NumPy compares and writes under one hold of the interpreter's lock.
+        It ends when `advance` returns. Of two halts the sooner one counts, also if a signal or another thread sets the
+        second at the same time: NumPy compares and writes without releasing the interpreter's lock.
         """
         np.minimum(self._halt, passes, out=self._halt)
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
 
-        If not, `halt` was called, or `latest` has come [s of time.monotonic], or the time of plain Python is over, and
-        the next call goes on with the frame, bit by bit as if it had not been cut short. `writing` a frame takes
-        seconds.
+        It is not if `halt` was called, at the time `latest` [s of time.monotonic], or when the time for plain Python
+        is used up. The next call then continues the frame, with the same bits as without the halt. `writing` is the
+        time to write a frame [s].
         """
         if not self._cut_short:
             self._done.fill(False)
@@ -130,7 +130,7 @@ class Run:
 
     @np.errstate(all="ignore")  # as in compiled kernels: 1/0 is an infinity, which a select discards
     def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
-        """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
+        """Advance and observe what one thread draws: (status, particle, what a halt left in its lanes)."""
         draws, mine = self._lanes()
         advance_block, observe = self._tier.kernel(blocks.advance_block), self._tier.kernel(observables.observe)
         status, particle, drawn = advance_block(*self._advancing(span, draws, mine))
@@ -142,7 +142,7 @@ class Run:
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
     def observe(self) -> None:
-        """Observe the start, at which every particle is."""
+        """Observe the start: every particle is there."""
         self._done.fill(True)
         self._ticket[0] = 0
         self._share(0.0)
@@ -173,7 +173,7 @@ class Run:
         return sentence
 
     def _lanes(self) -> tuple[lanes.Draws, lanes.Lanes]:
-        """What a thread alone needs: what it has drawn, and its lanes."""
+        """Arrays of one thread: its draws and its lanes."""
         return lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64)), lanes.empty(len(self._owners))
 
     def _advancing(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> tuple[Any, ...]:
@@ -198,7 +198,7 @@ class Run:
             self._pace = math.inf
 
     def _keep(self, left_behind: list[lanes.Halted]) -> None:
-        """What a halt left in the lanes, and what an earlier one left that no lane has picked up since."""
+        """Keep what a halt left in the lanes, and what an earlier one left and no lane has taken since."""
         picked_up = np.concatenate([np.flatnonzero(self._done), *(left.particle for left in left_behind)])
         waiting = ~np.isin(self._halted.particle, picked_up)
         parts = [lanes.Halted(self._halted.particle[waiting], self._halted.rows[:, waiting]), *left_behind]
@@ -208,14 +208,14 @@ class Run:
         self._halted = lanes.Halted(particle[order], np.ascontiguousarray(rows))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All that `restore` needs for a run to go on bit by bit, not copied; between two calls of `advance`."""
+        """What `restore` needs to continue with the same bits, not copied; to be called between calls of `advance`."""
         arrays: dict[str, NDArray[Any]] = {"done": self._done, **_named("halted", self._halted)}
         for name, array in self.state._asdict().items():
             arrays |= _named(name, array) if isinstance(array, Multipliers) else {name: array}
         return {name: array for name, array in arrays.items() if array is not None}
 
     def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
-        """Be as the run was that gave these `arrays`, at a frame or, `cut_short`, on the way to the next."""
+        """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")

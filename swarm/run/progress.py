@@ -81,10 +81,10 @@ def _bar() -> Iterator[Display]:
 
 
 def lines(interval: float) -> Display:
-    """Prints a line when the last one is `interval` seconds old."""
+    """Print a line when the last one is `interval` seconds old."""
     recent, last = _Recent(), time.monotonic()
 
-    def tell(share: float, line: str) -> None:
+    def put(share: float, line: str) -> None:
         nonlocal last
         now = time.monotonic()
         if now - last >= interval:
@@ -94,10 +94,10 @@ def lines(interval: float) -> Display:
     def frame(done: Any) -> None:
         line = recent.frame(done)
         if done.number > 0:
-            tell(done.time / done.until, line)
+            put(done.time / done.until, line)
 
     def within(moment: float, until: float) -> None:
-        tell(moment / until, recent.within(moment, until))
+        put(moment / until, recent.within(moment, until))
 
     def compiling(sentence: str) -> None:
         print(sentence, file=sys.stderr, flush=True)
@@ -114,7 +114,7 @@ class _Recent:
         self._energy = ""
 
     def frame(self, frame: Any) -> str:
-        """Time, ETA, speed and energy error, now that this frame is done."""
+        """Time, ETA, speed and energy error after this frame."""
         self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
         if frame.number == 0:
             return ""
@@ -122,7 +122,7 @@ class _Recent:
         return self.within(frame.time, frame.until)
 
     def within(self, moment: float, until: float) -> str:
-        """The same on the way to a frame, speed and energy error being those of the last one."""
+        """The same within a frame, with speed and energy error of the last one."""
         elapsed, advanced = _note(self._moments, moment)
         line = f"{moment:.4g}/{until:.4g} s"
         if elapsed > 0.0 and advanced > 0.0:
@@ -135,7 +135,7 @@ class _Recent:
 
 
 def _note(values: deque[tuple[float, float]], value: float) -> tuple[float, float]:
-    """Add a value of now, forget those of long ago: (seconds, difference) from the first to the last."""
+    """Add a value, drop those before the window: (seconds, difference) from the first to the last."""
     now = time.perf_counter()
     values.append((now, value))
     while len(values) > 2 and now - values[0][0] > _WINDOW:
