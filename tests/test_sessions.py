@@ -287,7 +287,7 @@ def test_what_is_missing_or_damaged_is_said(tmp_path):
             run(path, resume=True)
     saved.write_bytes(whole)
     path.unlink()
-    with pytest.raises(swarm.SceneError, match=r"needs its trajectory .* gone"):
+    with pytest.raises(swarm.SceneError, match=r"needs its trajectory .* which does not exist"):
         run(path, resume=True)
     run(path, until=1.0, every=1.0)
     saved.write_bytes(whole)

@@ -161,12 +161,9 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
                     f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
                 )
         particles = arrays["halted.particle"]
-        if len(particles) and not (particles[0] >= 0 and particles[-1] < len(run["mass"]) and _ascends(particles)):
+        bounded = np.concatenate([[-1], particles, [len(run["mass"])]])
+        if (np.diff(bounded) <= 0).any():
             raise ValueError("it names particles that do not exist")
-
-
-def _ascends(values: NDArray[Any]) -> bool:
-    return bool((np.diff(values) > 0).all())
 
 
 @contextlib.contextmanager

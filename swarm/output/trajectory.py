@@ -8,6 +8,7 @@ dataset by hard links. writer.py writes them.
 
 import contextlib
 import operator
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -181,7 +182,7 @@ class Trajectory:
     def scene(self) -> Scene:
         """The scene that was run."""
         with self._reading("its scene"):
-            table = _toml(self._text("scene"))
+            table = tomllib.loads(self._text("scene"))
             surfaces = table["surface"]
             own = any(surface["kind"] == "own" for surface in surfaces)
         # An OwnSurface is not damage: the error says that no file holds it.
@@ -192,7 +193,7 @@ class Trajectory:
     def method(self) -> Method:
         """The method that was run."""
         with self._reading("its method"):
-            return tables.method_of(_toml(self._text("method")))
+            return tables.method_of(tomllib.loads(self._text("method")))
 
     @property
     def scene_text(self) -> str | None:
@@ -248,12 +249,6 @@ def _whole(name: str, value: Any) -> int:
         return operator.index(value)
     except TypeError:
         raise SceneError(f"{name} must be a whole number, got {value!r}") from None
-
-
-def _toml(text: str) -> dict[str, Any]:
-    import tomllib
-
-    return tomllib.loads(text)
 
 
 def load(path: str | Path) -> Trajectory:

@@ -62,27 +62,21 @@ def _bar() -> Iterator[Display]:
         TextColumn("{task.percentage:3.0f}%"),
         TextColumn("{task.fields[line]}"),
     )
-    recent = _Recent()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0, line="")
 
-        def frame(done: Any) -> None:
-            line = recent.frame(done)
-            if done.number > 0:  # the first frame is the start: kernels compile after it
-                bar.update(task, completed=done.time / done.until, line=line)
-
-        def within(moment: float, until: float) -> None:
-            bar.update(task, completed=moment / until, line=recent.within(moment, until))
+        def put(share: float, line: str) -> None:
+            bar.update(task, completed=share, line=line)
 
         def compiling(sentence: str) -> None:
             bar.update(task, line=sentence, refresh=True)
 
-        yield Display(frame, within, _A_MOMENT, compiling)
+        yield _put_by(put, _A_MOMENT, compiling)
 
 
 def lines(interval: float) -> Display:
     """Print a line when the last one is `interval` seconds old."""
-    recent, last = _Recent(), time.monotonic()
+    last = time.monotonic()
 
     def put(share: float, line: str) -> None:
         nonlocal last
@@ -91,18 +85,25 @@ def lines(interval: float) -> Display:
             print(f"{100.0 * share:.1f}%  {line}", file=sys.stderr, flush=True)
             last = now
 
+    def compiling(sentence: str) -> None:
+        print(sentence, file=sys.stderr, flush=True)
+
+    return _put_by(put, interval, compiling)
+
+
+def _put_by(put: Callable[[float, str], None], every: float, compiling: Callable[[str], None]) -> Display:
+    """A display of the share that is done, and of a line about the last seconds."""
+    recent = _Recent()
+
     def frame(done: Any) -> None:
         line = recent.frame(done)
-        if done.number > 0:
+        if done.number > 0:  # the first frame is the start: kernels compile after it
             put(done.time / done.until, line)
 
     def within(moment: float, until: float) -> None:
         put(moment / until, recent.within(moment, until))
 
-    def compiling(sentence: str) -> None:
-        print(sentence, file=sys.stderr, flush=True)
-
-    return Display(frame, within, interval, compiling)
+    return Display(frame, within, every, compiling)
 
 
 class _Recent:

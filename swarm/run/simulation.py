@@ -183,10 +183,11 @@ def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", sho
                 continue
             if number == 0:
                 run.observe()
-            span = span_of("time", moment) - span_of("time", before)
-            while number > 0 and not run.advance(span, moment, *_meanwhile(session, writer, show)):
-                show.within(before + run.share_done(span) * (moment - before), until)
-                session.look(run, writer, number - 1, before, moment)
+            else:
+                span = span_of("time", moment) - span_of("time", before)
+                while not run.advance(span, moment, *_meanwhile(session, writer, show)):
+                    show.within(before + run.share_done(span) * (moment - before), until)
+                    session.look(run, writer, number - 1, before, moment)
             seen = {"time": moment, **run.seen()}
             run.require_admissible(seen, moment)
             if task.options.trajectory is None:
