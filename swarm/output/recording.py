@@ -226,9 +226,10 @@ def _blueprint(lines: list[series.Line]) -> rrb.Blueprint:
         origin="/scene", name="particles", background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
     )
     plots = []
-    for view, together in series.views_of(lines).items():
+    for group, together in series.views_of(lines).items():
+        view, logarithm = series.VIEWS[group]
         legend = rrb.PlotLegend(visible=len(together) > 1)
-        name = f"{view}, log10" if together[0].logarithm else view
+        name = f"{view}, log10" if logarithm else view
         paths = [line.path for line in together]
         plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
     about = rrb.TextDocumentView(origin="/about", name="legend")

@@ -23,6 +23,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import paths, superblock
+from .layout import PARTS
 from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
@@ -37,7 +38,6 @@ _PACKED: dict[str, dict[str, Any]] = {
     "gzip": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
     "lzf": {"compression": "lzf", "shuffle": True},
 }
-PARTS = ("position", "velocity")
 
 # Number, time [s], positions and velocities, observables.
 Written = tuple[int, float, State, dict[str, Any]]
