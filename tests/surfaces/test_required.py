@@ -147,7 +147,7 @@ PARTICLES = swarm.Particles([[0.1], [0.2], [0.3]], [[0.5], [0.0], [0.1]])
 
 def refused(surface, method, gravity=None):
     """The sentence, after which nothing has been compiled."""
-    kernels = (blocks.advance_block, observables.observe, observables.start_energies)
+    kernels = (blocks.advance_block, observables.observe)
     before = [] if numba.config.DISABLE_JIT else [len(kernel.signatures) for kernel in kernels]
     scene = swarm.Scene([swarm.Box((2.0, 2.0, 2.0)), surface], gravity)
     with pytest.raises(swarm.SceneError) as caught:
