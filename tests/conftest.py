@@ -83,9 +83,15 @@ scales = st.sampled_from([1e-6, 1e-3, 1.0, 1e3, 1e6])
 
 
 @functools.cache
+def surface_of(name, scale=1.0):
+    """A surface of the table. A formula takes a third of a second to make, so each is made once."""
+    return SURFACES[name](scale)
+
+
+@functools.cache
 def numbers_of(name, scale=1.0):
     """The tuple of numbers of a surface of the table, as kernels take it."""
-    (wall,) = SURFACES[name](scale).walls()
+    (wall,) = surface_of(name, scale).walls()
     return wall
 
 
@@ -138,4 +144,4 @@ def gap(surface, point):
 
 def scene_of(*names, **keywords):
     """A scene of surfaces from the table."""
-    return swarm.Scene([SURFACES[name]() for name in names], **keywords)
+    return swarm.Scene([surface_of(name) for name in names], **keywords)

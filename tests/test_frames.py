@@ -47,7 +47,7 @@ def test_frames_are_held_against_the_disk_and_what_they_replace(tmp_path, monkey
     usage, path = namedtuple("Usage", "total used free"), tmp_path / "run.h5"
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage(0, 0, 50_000))
     run = {"until": 100.0, "every": 1.0, "trajectory": path, "overwrite": True}
-    many = swarm.fill(SPHERE, 20, speed=1.0, seed=1)
+    many = swarm.fill(SPHERE, 20, speed=1e-3, seed=1)
     with pytest.raises(swarm.SceneError, match=r"101 frames, 118 kB, and what is free in .* is 50 kB"):
         swarm.simulate(SPHERE, many, swarm.Impact(), **run)
     # The half of it, or none of the particles, fits; of what is compressed nobody knows.

@@ -1,6 +1,7 @@
 """Compilation: the same definitions in Python and in kernels, a cache that notices edits, and who may import whom."""
 
 import ast
+import functools
 import graphlib
 import importlib
 import importlib.util
@@ -238,10 +239,16 @@ assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 # --- The cache -------------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def digests(tmp_path_factory):
+    """A cache folder that already has the digest of the package as it is."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.fixture
-def copied(tmp_path, monkeypatch):
+def copied(tmp_path, monkeypatch, digests):
     """A copy of the package, and the cache folder that its `cache` names."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(digests))
     shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
 
     parent = types.ModuleType("copied")
@@ -292,8 +299,9 @@ def test_an_edit_of_what_is_not_in_kernels_names_the_same_cache(copied):
     assert folder() == before
 
 
-def test_where_nothing_can_be_written_the_folder_is_the_same(copied, monkeypatch):
+def test_where_nothing_can_be_written_the_folder_is_the_same(copied, tmp_path, monkeypatch):
     _package, folder = copied
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     before = folder()
     known = next((before.parent / "sources").iterdir())
     assert known.read_text() == before.name
@@ -309,7 +317,7 @@ def in_kernels(path):
 def test_nothing_else_is_in_kernels():
     """What names the cache is complete: functions, constants and the types of arguments are from its files."""
     for parts, path in modules().items():
-        for target, names in imported_names(parts, path):
+        for target, names in imported_names(parts):
             source = modules()[target]
             if not in_kernels(path):
                 assert target != ("kernel", "jit"), f"{path} has functions of kernels"
@@ -439,15 +447,17 @@ LAYERS = [
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 
 
+@functools.cache
 def modules():
     """Every module of the package as its path of names."""
     return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
 
 
-def imported_names(parts, path):
+@functools.cache
+def imported_names(parts):
     """The modules of the package that a module imports, at its top or inside a function, and what from each."""
-    known = modules()
-    for node in ast.walk(ast.parse(path.read_text())):
+    known, found = modules(), []
+    for node in ast.walk(ast.parse(known[parts].read_text())):
         if isinstance(node, ast.Import):
             assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -455,21 +465,22 @@ def imported_names(parts, path):
             for alias in node.names:
                 targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
                 target = next(target for target in targets if target in known)
-                yield target, [] if target in targets[:2] else [alias.name]
+                found.append((target, [] if target in targets[:2] else [alias.name]))
+    return found
 
 
-def imported(parts, path):
+def imported(parts):
     """The modules of the package that a module imports."""
-    return [target for target, _names in imported_names(parts, path)]
+    return [target for target, _names in imported_names(parts)]
 
 
 @pytest.mark.parametrize("parts", modules(), ids=".".join)
 def test_a_module_imports_only_from_below(parts):
-    for target in imported(parts, modules()[parts]):
+    for target in imported(parts):
         below = LAYER[target[0]] > LAYER[parts[0]]
         assert below or (len(target) > 1 and target[0] == parts[0]), f"{'.'.join(parts)} imports {'.'.join(target)}"
 
 
 def test_no_imports_go_in_circles():
-    graph = {parts: set(imported(parts, path)) for parts, path in modules().items()}
+    graph = {parts: set(imported(parts)) for parts in modules()}
     assert len(list(graphlib.TopologicalSorter(graph).static_order())) >= len(modules())

@@ -98,7 +98,7 @@ def along_diameters(n):
     return swarm.Particles(np.zeros((3, n)), directions)
 
 
-@pytest.mark.parametrize(("halts", "share"), [([3], 0.25), ([5, 2, 4], 0.15), ([1, 0], 0.0), ([0, 7], 0.0)])
+@pytest.mark.parametrize(("halts", "share"), [([3], 0.625), ([5, 2, 4], 0.375), ([1, 0], 0.0), ([0, 7], 0.0)])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_halts_at_the_pass_it_was_told(threads, halts, share):
     """At the soonest one, each thread by its own count, and that frame only: a pass is a flight to the wall."""
@@ -106,11 +106,11 @@ def test_a_run_halts_at_the_pass_it_was_told(threads, halts, share):
     with Run(SPHERE, along_diameters(n), swarm.Impact(), threads, None) as run:
         for passes in halts:
             run.halt(passes)
-        assert not run.advance(10.0, 10.0)
-        assert run.share_done(10.0) == pytest.approx(share, abs=1e-14)
-        assert run.advance(10.0, 10.0)
-        assert (run.state.impacts == 10).all()
-        assert run.advance(10.0, 20.0)
+        assert not run.advance(4.0, 4.0)
+        assert run.share_done(4.0) == pytest.approx(share, abs=1e-14)
+        assert run.advance(4.0, 4.0)
+        assert (run.state.impacts == 4).all()
+        assert run.advance(2.0, 6.0)
 
 
 def test_at_its_end_a_run_is_halted_for_good():
