@@ -234,7 +234,7 @@ def nearest_exit(stops, levels, middles, time, close):
 
 @register_jitable
 def judge(stops, levels, middles, time, found, near, touch):
-    """(verdict, error of the time, residual) of a time at which a flight is said to leave, or be free until then.
+    """(verdict, error of the time, residual) of an answer: a hit at that time, or free flight until then.
 
     EXACT: the flight leaves at that time, to `near` of it or of the unit, and has not left before. TOUCHED: it is on
     the wall at that time to `touch` of the terms of the level, but leaves elsewhere or not. MISSED: it was outside by

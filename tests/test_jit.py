@@ -1,4 +1,4 @@
-"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and who may import whom."""
+"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and the layers of imports."""
 
 import ast
 import functools
@@ -189,7 +189,7 @@ def select_all(a, b):
 
 @pytest.mark.parametrize("first", [1.0, 3.0])
 def test_select(first):
-    """Both sides are evaluated, one is taken; an infinity on the other side does no harm."""
+    """Both sides are evaluated, one is taken; an infinity on the other side has no effect."""
     expected = (max(first, 2.0), 1.0 if first > 2.0 else math.inf, -first if first > 2.0 else first)
     assert call(select_all, first, 2.0) == expected
     assert (
@@ -216,7 +216,7 @@ def used_up_often(rounds):
 
 
 def test_scratch_is_zero_each_time():
-    """Far more of it than a stack holds, if it were not given back."""
+    """Far more of it than a stack holds, if it were not released."""
     assert used_up_often(10)
     assert compiled(used_up_often)(1_000_000 if not numba.config.DISABLE_JIT else 10)
 
@@ -282,7 +282,7 @@ def test_an_edit_of_code_of_kernels_names_another_cache(copied, edited):
 
 
 @pytest.mark.parametrize("edited", KERNEL_FILES)
-def test_an_edit_of_words_names_the_same_cache(copied, edited):
+def test_an_edit_of_comments_names_the_same_cache(copied, edited):
     package, folder = copied
     before, source = folder(), (package / edited).read_text()
     # The docstring, which is the first, and lines that move all others.
@@ -359,7 +359,7 @@ with cache.kernels_compiled(lambda sentence: None):
 
 
 @compiled_only
-def test_an_edit_of_words_compiles_nothing_and_one_of_code_does(copied):
+def test_an_edit_of_comments_compiles_nothing_and_one_of_code_does(copied):
     """Of the file of a kernel itself, whose time and size Numba looks at: this fails when it stores them elsewhere."""
     package, _folder = copied
     file, told = package / "observables.py", []
@@ -374,7 +374,7 @@ def test_an_edit_of_words_compiles_nothing_and_one_of_code_does(copied):
     assert told == [(0.5, 1), (0.5, 0), (1.5, 1)]
 
 
-def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
+def test_the_user_sets_the_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
     assert cache.cache_folder().parent == tmp_path / "numba"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
@@ -390,7 +390,7 @@ def one_more(x):
 
 
 @compiled_only
-def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkeypatch, caplog):
+def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     told = []
     with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(told.append):
@@ -399,7 +399,7 @@ def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkey
         numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
     sentence = "compiling kernels for this scene, once: one_more"
     assert told == caplog.messages == [sentence]
-    first(1)  # nobody listens
+    first(1)  # no observer
     with cache.kernels_compiled(told.append):
         assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
     assert told == [sentence]
@@ -422,7 +422,7 @@ assert "scipy.linalg" in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-# --- Who may import whom ---------------------------------------------------------------------------------
+# --- Layers ----------------------------------------------------------------------------------------------
 
 # The architecture, from the top down; a module imports only from layers below its own, or from its own package.
 # `check` and `numbers` of a method take the Scene and the Particles, so these are below.

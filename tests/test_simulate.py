@@ -112,7 +112,7 @@ def test_threads_and_blocks_change_no_bit(scene, method):
 
 
 def test_a_particle_does_not_depend_on_its_neighbours():
-    """Lanes share a loop, no number."""
+    """Lanes share a loop and no data."""
     all_of_them = swarm.fill(NESTED, 700, speed=1.0, seed=3)
     together = swarm.simulate(NESTED, all_of_them, swarm.Impact(), until=3.0, threads=1).particles
     for i in (0, 255, 256, 699):
@@ -204,7 +204,7 @@ def test_particles_on_the_wall_and_at_rest_are_valid(method):
 
 
 @pytest.mark.parametrize("name", ["position", "velocity", "mass"])
-def test_numbers_spoiled_after_construction_are_refused(name):
+def test_arrays_changed_to_nan_after_construction_are_refused(name):
     """`Particles` checks its arrays, but they can be written to: `simulate` looks again."""
     particles = swarm.fill(SPHERE, 5, speed=1.0)
     getattr(particles, name)[..., 3] = np.nan
@@ -224,8 +224,8 @@ def test_numbers_spoiled_after_construction_are_refused(name):
         ("mass", np.float32(0.1), [np.float32(0.1)]),
     ],
 )
-def test_what_is_assigned_to_particles_runs_as_what_it_says(name, assigned, as_run):
-    """Arrays of whole numbers would take the kernel's velocities without their fractions."""
+def test_assigned_arrays_run_as_their_values(name, assigned, as_run):
+    """An integer array would truncate the kernel's velocities."""
     arrays = {"position": np.array([[0.1], [0.2], [0.0]]), "velocity": np.array([[0.3], [0.4], [0.5]]), "mass": [1.0]}
     expected = swarm.Particles(**{**arrays, name: np.asarray(as_run, np.float64)})
     particles = swarm.Particles(**arrays)
@@ -269,8 +269,8 @@ def test_a_huge_block_is_all_particles():
 
 @pytest.mark.parametrize("side", ["+z", "-x"])
 @pytest.mark.parametrize("gravity", [None, "out", "back", "across"])
-def test_who_is_beyond_an_open_face_has_escaped(side, gravity):
-    """The walls beside it go on without end, and stop nobody from going; gravity may."""
+def test_particles_beyond_an_open_face_have_escaped(side, gravity):
+    """The side walls extend without end and stop no escaping particle; gravity may."""
     turn = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
     box = swarm.Box((0.5, 0.4, 0.3), center=(0.1, 0.2, 0.3), open=[side], rotation=turn)
     axes = rotation.matrix(rotation.quaternion("turn", turn))
@@ -300,7 +300,7 @@ def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_hard_contact_brings_its_kernel_and_changes_no_bit(monkeypatch, threads):
+def test_a_slow_path_contact_loads_its_kernel_and_changes_no_bit(monkeypatch, threads):
     """A cavity starts without the slow-path kernel; a block with a grazing particle is restarted where it halted."""
     start = swarm.fill(SPHERE, 1100, speed=1.0, seed=6)
     start.position[:, 800], start.velocity[:, 800] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -317,8 +317,8 @@ def test_a_hard_contact_brings_its_kernel_and_changes_no_bit(monkeypatch, thread
     assert swarm.simulate(SPHERE, grazing, method, until=1.2, threads=1).observables["impacts"][-1] > 100
 
 
-def test_a_frame_that_begins_at_the_wall_is_no_hard_contact():
-    """A flight that a frame cuts short does not graze: a cavity without grazing never needs that kernel."""
+def test_a_frame_that_begins_at_the_wall_needs_no_slow_path():
+    """A flight that a frame cuts short does not graze: a cavity without grazing never needs the slow-path kernel."""
     wall = swarm.Particles((0.5 - 1e-9, 0.0, 0.0), (1.0, 0.2, 0.0))
     with Run(SPHERE, wall, swarm.Impact(), 1, None) as one:
         one.advance(3.0, 3.0)
@@ -327,7 +327,7 @@ def test_a_frame_that_begins_at_the_wall_is_no_hard_contact():
 
 
 @pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["no gravity", "gravity"])
-def test_an_open_scene_is_said_once_and_the_escaped_are_counted(caplog, gravity):
+def test_an_open_scene_is_reported_once_and_escaped_particles_are_counted(caplog, gravity):
     scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), open=["-z"])], gravity)
     velocity = [[0.0, 0.0, 0.3, 0.1], [0.0, 0.0, 0.0, 0.2], [-1.0, 1.0, 0.0, -0.5]]
     with caplog.at_level("WARNING", "swarm"):
@@ -337,7 +337,7 @@ def test_an_open_scene_is_said_once_and_the_escaped_are_counted(caplog, gravity)
     assert [record.getMessage() for record in caplog.records] == [
         "the scene is open: particles may fly to infinity; the observable 'escaped' counts them"
     ]
-    # Without gravity the third goes to and fro for ever.
+    # Without gravity the third bounces between two walls without end.
     assert result.observables["escaped"][-1] == (4 if gravity else 3)
     caplog.clear()
     closed = swarm.simulate(SPHERE, swarm.fill(SPHERE, 5, speed=1.0), swarm.Impact(), until=1.0)

@@ -17,7 +17,6 @@ import itertools
 import math
 import time as clock
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -27,6 +26,7 @@ from exact import EARLY, EXACT, MISSED, NEAR, TOUCH, TOUCHED, Course, Terms, exa
 from roots import Courses, judge_all
 
 import swarm
+from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import column, square, vec
@@ -65,7 +65,10 @@ CASES = [("plane", "inside"), *itertools.product(BODIES, ("inside", "outside"))]
 
 def surface_of(name, side, scale):
     """One surface of the table, of this size."""
-    return WALLS[name](scale) if name == "plane" else replace(BODIES[name](scale), side=side)
+    if name == "plane":
+        return WALLS[name](scale)
+    table = {**tables.table_of(BODIES[name](scale)), "side": side}
+    return tables.scene_of([table], None).surfaces[0]
 
 
 # --- Flights ---------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Frames written by a thread of their own: all of them, in order, as they were; what went wrong is raised."""
+"""Frames written by a background thread: all of them, in order, unchanged; its errors are raised."""
 
 import threading
 
@@ -11,7 +11,7 @@ from swarm.particles import State
 
 
 class Writer:
-    """Keeps what it is told to write, each frame when `waits` returns; fails at frame `fails`."""
+    """Keeps the frames, each when `waits` returns; fails at frame `fails`."""
 
     def __init__(self, fails=None, waits=lambda: None):
         self.fails, self.waits = fails, waits

@@ -1,4 +1,4 @@
-"""What a kill, a full disk or a stranger's hand leaves of a trajectory: every frame that was reported as written."""
+"""After a kill, on a full disk or beside another process a trajectory keeps every frame that was reported written."""
 
 import contextlib
 import os
@@ -135,7 +135,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
     assert cases > 100
 
 
-def test_frames_are_rows_whoever_writes_them(tmp_path):
+def test_sessions_write_the_same_rows(tmp_path):
     """A session that goes on from an older frame writes the same rows again: no gap, no duplicate."""
     path = tmp_path / "run.h5"
     for first, last in ((0, 12), (7, 20), (19, 25)):

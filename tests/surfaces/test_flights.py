@@ -61,7 +61,7 @@ def test_a_fall_that_is_no_graze_ends_after_a_few_passes(name, point, direction,
 @pytest.mark.parametrize("off", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_a_parabola_that_just_touches(name, off, scale):
-    """Double roots, missed or crossed by a little: no hit is skipped, and none is made up."""
+    """Double roots, missed or crossed by a little: no hit is skipped, and none is invented."""
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * np.array([0.3, 0.5, -0.4]))
     normal = np.array(call(contract.unit_normal, surface, wall))

@@ -33,7 +33,7 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
 
 
 def march(surface, *flight):
-    """Ask the march itself, which knows the surface in its own frame."""
+    """Ask the march itself, in the surface's own frame."""
     turn = np.array(surface[1:]) if surface is not body_of(surface) else np.eye(3)
     return call(contract.march, body_of(surface), *(turn.T @ vector for vector in flight))
 

@@ -143,7 +143,7 @@ def test_flights_aimed_at_edges_and_corners(name, scale, off):
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("lean", [0.5, 1e-3, 1e-7])
 def test_from_a_face_the_direction_decides(name, scale, lean):
-    """Inward: now. Outward from a convex body: never again, and under gravity not at once."""
+    """Inward: now. Outward from a convex body: never, and under gravity not immediately."""
     rng, parts = np.random.default_rng(5), BODIES[name](scale)
     solid = body(parts)
     for _ in range(40):
