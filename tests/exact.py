@@ -272,7 +272,7 @@ class Flight:
         terms = levels(walls, Terms, *([abs(float(part)) for part in row] for row in rows))[1]
         # The time in which the flight changes the terms by as much as they are
         times = [
-            (one.parts[0] / part) ** (1.0 / k)
+            (float(one.parts[0]) / float(part)) ** (1.0 / k)
             for one in terms
             for k, part in enumerate(one.parts)
             if k and part > 0.0 and one.parts[0] > 0.0
