@@ -80,7 +80,7 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
         compared += 1
         (time, found), (expected, _) = (call(contract.first_hit, one, point, velocity) for one in (formula, other))
         assert found
-        # A flight that all but touches may hit for one and miss for the other.
+        # A flight that nearly touches may hit one and miss the other.
         if math.isfinite(time) and math.isfinite(expected):
             assert time == pytest.approx(expected, rel=1e-9, abs=1e-12)
         else:

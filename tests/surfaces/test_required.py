@@ -1,4 +1,4 @@
-"""What a surface must give: said in one sentence before anything compiles, and no default that means "never"."""
+"""What a surface must provide: one error sentence before anything compiles, and no default that means "never"."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -191,7 +191,7 @@ def test_without_gravity_it_is_not_asked():
     methods.check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
 
 
-def test_steps_that_know_no_safe_time_are_all_taken():
+def test_without_a_safe_time_every_step_is_taken():
     """A lower bound that says nothing is 0, never infinity."""
     wall = ball_like(*LEVEL)().numbers()
     assert call(contract.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
