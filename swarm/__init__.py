@@ -32,10 +32,11 @@ if TYPE_CHECKING:
         Slab,
         Sphere,
         Torus,
-    )
+    )  # fmt: skip
 
 __version__ = VERSION
 
+# A module of the package and the public names that it defines.
 _HOMES = {
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
@@ -47,61 +48,18 @@ _HOMES = {
     "scene": ("Scene",),
     "run.simulation": ("Result", "simulate"),
     "surfaces": (
-        "Box",
-        "Capsule",
-        "Cone",
-        "Cylinder",
-        "Ellipsoid",
-        "Formula",
-        "OwnSurface",
-        "Paraboloid",
-        "Plane",
-        "Quadric",
-        "Slab",
-        "Sphere",
-        "Torus",
+        "Box", "Capsule", "Cone", "Cylinder", "Ellipsoid", "Formula", "OwnSurface", "Paraboloid", "Plane", "Quadric",
+        "Slab", "Sphere", "Torus",
     ),
-}
+}  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "AugmentedLagrangian",
-    "Box",
-    "Capsule",
-    "CompleteError",
-    "Cone",
-    "ContactHistory",
-    "Cylinder",
-    "Ellipsoid",
-    "FileError",
-    "Formula",
-    "Frame",
-    "Impact",
-    "Midpoint",
-    "OwnSurface",
-    "Paraboloid",
-    "Particles",
-    "Penalty",
-    "Plane",
-    "Quadric",
-    "Result",
-    "RunError",
-    "Scene",
-    "SceneError",
-    "Slab",
-    "Sphere",
-    "SwarmError",
-    "Torus",
-    "Trajectory",
-    "Trapezoidal",
-    "Verlet",
-    "WallTimeError",
-    "__version__",
-    "contact_history",
-    "fill",
-    "load",
-    "simulate",
-]
+    "AugmentedLagrangian", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory", "Cylinder", "Ellipsoid",
+    "FileError", "Formula", "Frame", "Impact", "Midpoint", "OwnSurface", "Paraboloid", "Particles", "Penalty", "Plane",
+    "Quadric", "Result", "RunError", "Scene", "SceneError", "Slab", "Sphere", "SwarmError", "Torus", "Trajectory",
+    "Trapezoidal", "Verlet", "WallTimeError", "__version__", "contact_history", "fill", "load", "simulate",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

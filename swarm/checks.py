@@ -1,6 +1,7 @@
 """Checks of arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
 import difflib
+import functools
 import math
 import re
 from collections.abc import Iterable
@@ -22,7 +23,7 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
     """`value` as a finite float."""
     try:
-        # float() takes the last two, without the imaginary part and without the mask.
+        # float() accepts the last two, without the imaginary part and without the mask.
         if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
             raise TypeError
         result = float(value)
@@ -75,6 +76,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
     return result
 
 
+@functools.cache
 def memory() -> int:
     """Memory of this machine [bytes]."""
     import psutil
@@ -83,7 +85,7 @@ def memory() -> int:
 
 
 def in_bytes(size: float) -> str:
-    """A number of bytes in a unit that suits it.
+    """A number of bytes in a suitable unit.
 
     >>> in_bytes(1.46e14)
     '146 TB'
@@ -95,7 +97,7 @@ def in_bytes(size: float) -> str:
 
 
 def particles_fit(name: str, count: int) -> None:
-    """Raise a SceneError if so many particles do not fit into the memory of this machine."""
+    """Raise a SceneError if this many particles do not fit in the memory of this machine."""
     count = min(count, 10**300)  # which float() can convert
     size = _PARTICLE * count
     if count > _FEW and size > memory():

@@ -66,7 +66,9 @@ def run(  # noqa: PLR0913  one argument an option
     compile: Annotated[
         str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print how the run ended as JSON, also if it fails.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the outcome of the run as JSON, also if it fails.")
+    ] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
     # An exception in the middle of an import may be lost; nothing is open yet.
@@ -110,7 +112,7 @@ def run(  # noqa: PLR0913  one argument an option
         result = carry_out(job.scene, particles, job.method, options)
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
-        # A second signal may end the process here: the files are closed.
+        # The files are closed: a second signal may end the process here.
         with interrupt.at_once():
             has_frames = target.exists() and (resumes or paths.identity(target) != before)
             again = _stopped(status, target, has_frames)
@@ -132,7 +134,7 @@ def run(  # noqa: PLR0913  one argument an option
 
 
 def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
-    """Say how to resume a run that was stopped: the command, or None if there is nothing to resume from."""
+    """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
     from .output import paths
 
     reason = "interrupted" if status == "interrupted" else "the wall time limit is reached"
@@ -143,13 +145,13 @@ def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
     if not paths.checkpoint_of(target).exists():
         print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
         return None
-    command = shlex.join(["swarm", *_words_again(sys.argv[1:]), "--resume"])
+    command = shlex.join(["swarm", *_arguments_again(sys.argv[1:]), "--resume"])
     print(f"{held}; resume with\n  {command}", file=sys.stderr)
     return command
 
 
-def _words_again(words: list[str]) -> list[str]:
-    """The arguments of this command, without those that a resumed run cannot have."""
+def _arguments_again(words: list[str]) -> list[str]:
+    """The arguments of this command, without those that do not apply to a resumed run."""
     again: list[str] = []
     for before, word in itertools.pairwise(["", *words]):
         name = word.partition("=")[0]
@@ -188,7 +190,7 @@ def record(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
 ) -> None:
     """Make a Rerun recording of a trajectory."""
-    from .output.extras import needed_by
+    from .output.sources import needed_by
 
     with needed_by("a recording", "record"):
         from .output import recording
@@ -219,7 +221,7 @@ def view(
     ] = None,
 ) -> None:
     """Draw a contact sheet of a recording; no screen and no GPU are needed."""
-    from .output.extras import needed_by
+    from .output.sources import needed_by
 
     with needed_by("a contact sheet", "record"):
         from .output.playback import Playback
@@ -240,7 +242,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw energy error, penetration, impacts, pressure, speeds and the particles of a trajectory."""
-    from .output.extras import needed_by
+    from .output.sources import needed_by
 
     with needed_by("a plot", "plot"):
         from .output import plots

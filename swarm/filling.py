@@ -9,7 +9,7 @@ from .particles import Floats, Particles
 from .scene import Scene
 
 _BATCH = 1 << 18
-# The search ends after so many points if fewer than one in a million was admissible.
+# The search ends after this many points if fewer than one in a million was admissible.
 _TRIES = 20_000_000
 
 

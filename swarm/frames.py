@@ -1,4 +1,4 @@
-"""The frames of a run: their times, their size, and what a progress display gets of each."""
+"""The frames of a run: their times, their size, and the record of each for progress displays."""
 
 import copy
 import logging
@@ -29,10 +29,10 @@ class Frame:
     time: float
     until: float
     observables: dict[str, Any]
-    written: int = 0  # frames that are in the trajectory
+    written: int = 0  # number of frames in the trajectory
 
     def apart(self) -> "Frame":
-        """A copy with observables of its own, which its receiver may change."""
+        """A copy with its own observables, which the receiver may change."""
         return replace(self, observables=copy.deepcopy(self.observables))
 
 

@@ -1,4 +1,4 @@
-"""The iteration of one particle's one contact step, sweep by sweep: for looking at a method, not for running it."""
+"""The iteration of a single contact step of one particle, sweep by sweep: to study a method, not to run it."""
 
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
@@ -61,7 +61,7 @@ class ContactHistory:
 def contact_history(
     scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float, method: Method
 ) -> ContactHistory:
-    """Uzawa's iteration of one particle's one step with a method.
+    """Uzawa's iteration of a single step of one particle.
 
     Args:
         scene: the walls and gravity.
@@ -93,7 +93,7 @@ def contact_history(
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
     check_surfaces(method, scene)
     method.check(scene, particle)
-    # Plain Python runs the functions that kernels are made of; with NumPy's numbers 1/0 is an infinity there too.
+    # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
     start = Start(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
@@ -108,7 +108,7 @@ def contact_history(
 
 
 class Start(NamedTuple):
-    """The particle before its step."""
+    """Position and velocity before the step."""
 
     r: Vec
     v: Vec
@@ -185,7 +185,7 @@ def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactH
     r1 = walls.push(chain, wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
     reactions[int(wall), :3] = kappa * np.array(walls.inner_gradient(chain, wall, r0, r1))
-    # What Uzawa's loop with exponent 1 tends to.
+    # The limit of Uzawa's loop with exponent 1.
     multiplier[int(wall)] = uzawa.multiplier_of(chain, wall, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
     rows.add(multiplier, np.zeros(count), reactions, 0.0)
     return rows.history(True)

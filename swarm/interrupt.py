@@ -8,20 +8,20 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
-# As a shell's for a process that SIGINT ended; and where it says so.
+# The exit code that a shell gives a process that SIGINT ended; the descriptor of standard error.
 _EXIT, _STDERR = 130, 2
 _DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
 @contextlib.contextmanager
 def at_once() -> Iterator[None]:
-    """Let a SIGINT end the process without another word than that, exit code 130.
+    """Let a SIGINT end the process with the word "interrupted" alone, exit code 130.
 
-    For imports and the last words of a command: an exception in the midst of an import may be lost, or become another
-    one and a traceback.
+    For imports and the last output of a command: an exception within an import may be lost, or become another one
+    with a traceback.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield  # the caller handles it himself, or ignores it
+        yield  # the caller handles it, or ignores it
         return
 
     leave_at_once()
@@ -32,7 +32,7 @@ def at_once() -> Iterator[None]:
 
 
 def leave_at_once() -> None:
-    """Let a SIGINT end the process from now on: there is nothing left to lose."""
+    """Let a SIGINT end the process from now on: all files are closed."""
 
     def leave(number: int, frame: FrameType | None) -> None:
         os.write(_STDERR, b"interrupted\n")
@@ -44,7 +44,7 @@ def leave_at_once() -> None:
 
 @contextlib.contextmanager
 def taken_by(stop: Callable[[], None]) -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM call `stop`; after it both do at once what they do in Python.
+    """Let the first SIGINT or SIGTERM call `stop`; after that both have their default effect in Python.
 
     Python raises KeyboardInterrupt between any two of its instructions. Where that is inside a callback of the garbage
     collector, which runs often while Numba compiles, the exception is printed and lost, and the run goes on.
@@ -52,15 +52,15 @@ def taken_by(stop: Callable[[], None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted
         return
-    # The others the caller handles himself, or ignores.
+    # The caller handles the others, or ignores them.
     taken = [number for number, default in _DEFAULTS.items() if signal.getsignal(number) is default]
 
-    def give_back() -> None:
+    def restore() -> None:
         for number in taken:
             signal.signal(number, _DEFAULTS[number])
 
     def handle(number: int, frame: FrameType | None) -> None:
-        give_back()
+        restore()
         stop()
 
     for number in taken:
@@ -68,4 +68,4 @@ def taken_by(stop: Callable[[], None]) -> Iterator[None]:
     try:
         yield
     finally:
-        give_back()
+        restore()

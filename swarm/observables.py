@@ -1,4 +1,4 @@
-"""What is measured at a frame: arrays in, numbers out.
+"""Observables of a frame, from arrays.
 
 Sums run over fixed chunks of particles in a fixed order, so they have the same bits for any number of threads.
 """
@@ -6,25 +6,23 @@ Sums run over fixed chunks of particles in a fixed order, so they have the same 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .contact.energy import contact_energy
 from .kernel.gravity import Nothing, potential
 from .kernel.jit import by_type, inlined, kernel, scratch, select
-from .kernel.vector import Vec, column, cross, dot, square
-from .particles import State
+from .kernel.vector import Vec, column, cross, dot, square, vec
+from .particles import Floats, State
+from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
 from .surfaces import fold as walls
 
-# Particles a partial sum: a constant of the results, unlike the block size.
+# Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 64
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
-
-Floats = NDArray[np.float64]
 
 
 @by_type
@@ -46,11 +44,15 @@ def _(chain, r):
 
 
 class Energies(NamedTuple):
-    """Kinetic, potential and contact energy per mass of one particle."""
+    """Kinetic, potential and contact energy per mass of one particle, or of many as arrays."""
 
-    kinetic: float
-    fall: float
-    stored: float
+    kinetic: Any
+    fall: Any
+    stored: Any
+
+    def total(self) -> Any:
+        """Their sum."""
+        return self.kinetic + self.fall + self.stored
 
 
 @inlined
@@ -58,17 +60,30 @@ def _energies(law, chain, gravity, m, r, v):
     return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, chain, 1.0 / m, r))
 
 
-@kernel
-def start_energies(law, chain, gravity, size, state):
-    """Fill `energy` and `inverse_scale`: energy errors are relative to kinetic + contact + m |G| size at the start."""
-    mass = state.mass
-    weight = abs(potential(gravity, Vec(size, 0.0, 0.0))) + abs(potential(gravity, Vec(0.0, size, 0.0)))
-    weight += abs(potential(gravity, Vec(0.0, 0.0, size)))
-    for i in range(mass.size):
-        e = _energies(law, chain, gravity, mass[i], column(state.position, 0, i), column(state.velocity, 0, i))
-        state.energy[i] = e.kinetic + e.fall + e.stored
-        scale = e.kinetic + e.stored + weight
-        state.inverse_scale[i] = 1.0 / scale if scale > 0.0 else 0.0
+def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
+    """The energies of particles, positions and velocities (3, N), without a kernel: those of one go through NumPy."""
+    stored, chain = np.zeros(len(mass)), scene.chain()
+    if law is not None:
+        # Few particles are in a wall, and its law takes one number.
+        for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
+            stored[i] = contact_energy(law, chain, 1.0 / mass[i], column(position, 0, i))
+    return Energies(0.5 * square(vec(velocity)), potential(scene.pull(), vec(position)), stored)
+
+
+def energy_scale(scene: Scene, start: Energies) -> Floats:
+    """What energy errors are relative to: kinetic + contact + m |G| size at the start, per mass."""
+    size, pull = scene.finite_size(), scene.pull()
+    weight = abs(potential(pull, Vec(size, 0.0, 0.0))) + abs(potential(pull, Vec(0.0, size, 0.0)))
+    weight += abs(potential(pull, Vec(0.0, 0.0, size)))
+    return np.asarray(start.kinetic + start.stored + weight)
+
+
+def start_energies(scene: Scene, law: Any, state: State) -> None:
+    """Fill `energy` and `inverse_scale` of the state."""
+    start = energies(scene, law, state.mass, state.position, state.velocity)
+    scale = energy_scale(scene, start)
+    state.energy[:] = start.total()
+    state.inverse_scale[:] = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
 
 
 @kernel
@@ -118,11 +133,11 @@ def observe(law, chain, gravity, state, drawn, size, partial):
 
 @kernel
 def count_escaped(chain, gravity, far, faces, state):
-    """Particles that are on their way out of an open scene, and will not come back.
+    """The number of particles that leave an open scene and do not come back.
 
-    Those farther from the origin than `far`; those in a straight flight that meets no wall; and those beyond one of the
-    open `faces`, rows (n, offset), that fly on in its direction n: walls beside that face go on without end, and would
-    stop them, but not from going.
+    Those farther from the origin than `far`; those in a straight flight that hits no wall; and those beyond one of the
+    open `faces`, rows (n, offset), that fly in its direction n: the walls beside that face are endless, and a particle
+    that hits them there still leaves.
     """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(position.shape[1]):
@@ -137,7 +152,7 @@ def count_escaped(chain, gravity, far, faces, state):
 
 @by_type
 def _escapes(gravity, chain, r, v):
-    """Gravity brings particles back, or not: only their distance tells."""
+    """Under gravity only the distance decides."""
     return False
 
 

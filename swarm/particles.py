@@ -25,8 +25,8 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
 
-    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. What is assigned to
-    them later is checked and converted in the same way when a run begins.
+    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Arrays that are
+    assigned later are checked and converted in the same way when a run starts.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass not from 1e-100 to

@@ -1,4 +1,4 @@
-"""The scene: surfaces, gravity, and the volume that the surfaces leave."""
+"""The scene: surfaces, gravity, and the volume that the surfaces enclose."""
 
 import itertools
 import math
@@ -18,10 +18,10 @@ from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
-# The search for an admissible point: this many starts, each moved to the surface it violates most this many times.
+# The search for an admissible point: number of starts, and moves of each onto the surface that it violates most.
 _STARTS = 512
 _MOVES = 30
-# Then this many of the nearest are moved onto all surfaces that they violate at once.
+# Then this many of the nearest are moved onto all surfaces that they violate together.
 _NEAREST = 32
 _STEPS = 100
 # Each move aims this far, relative to the gap: a little past the surface, so that thin volumes are hit.
@@ -144,7 +144,7 @@ class Scene:
         return not np.isfinite(self.bounds()).all()
 
     def open_faces(self) -> NDArray[np.float64]:
-        """Open faces through which gravity pulls no particle back: rows (n, offset), beyond is n.r > offset."""
+        """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
         faces = [(*n, offset) for surface in self.surfaces for n, offset in surface.open_faces()]
         rows = np.array(faces).reshape(-1, 4)
         return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]

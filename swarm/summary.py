@@ -50,8 +50,8 @@ def of_trajectory(file: Path) -> dict[str, str]:
 
 
 def of_recording(file: Path, repair: bool) -> dict[str, str]:
-    """What a recording holds; with `repair`, after its repair."""
-    from .output.extras import needed_by
+    """What a recording holds; `repair` repairs it first."""
+    from .output.sources import needed_by
 
     with needed_by("a recording", "record"):
         from .output import playback
@@ -73,7 +73,7 @@ def of_recording(file: Path, repair: bool) -> dict[str, str]:
 
 
 def of_result(result: Result, volume: float | None) -> dict[str, str]:
-    """How a run went; `volume` is what its particles were filled into [m^3]."""
+    """The outcome of a run; `volume` is the volume its particles were filled into [m^3]."""
     seen = result.observables
     rate = seen["impacts"][-1] / result.wall_time
     return {
@@ -85,7 +85,7 @@ def of_result(result: Result, volume: float | None) -> dict[str, str]:
 
 
 def _figures(seen: dict[str, Any]) -> dict[str, str]:
-    """The figures that say whether a run went well."""
+    """The figures that show whether a run went well."""
     escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
     lost = seen.get("dissipated_energy", [0.0])[-1]
     dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}

@@ -1,4 +1,4 @@
-"""Surfaces, scenes and methods as plain tables, which scene files and trajectories hold, and back.
+"""Surfaces, scenes and methods to and from plain tables, the form that scene files and trajectories hold.
 
 Every error names the key by its full path, such as surface[1].radius.
 """
@@ -52,7 +52,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     """A dataclass from a table: no unknown key, no missing one, every value of its type."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
-    # What has no place in a file is an unknown key there.
+    # Options of a session are unknown keys in a file.
     fields = [one for one in dataclasses.fields(cls) if one.metadata.get("in_file", True)]  # type: ignore[arg-type]
     names = {field.metadata.get("key", field.name): field for field in fields}
     for key in table:
@@ -91,7 +91,7 @@ def _type_name(kind: Any) -> str:
 
 
 def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[str, str]) -> str:
-    """Msgspec's "Expected `float`, got `str` - at `$.radius`", with the key first and the value."""
+    """A message of msgspec, "Expected `float`, got `str` - at `$.radius`", with the key first, and the value."""
     match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*)`)?", message)
     assert match is not None
     reason, path = match.groups()

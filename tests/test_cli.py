@@ -94,7 +94,7 @@ def test_record_view_plot_and_info(folder):
     assert (refused.returncode, "recording: scene.h5 is also the trajectory" in refused.stderr) == (2, True)
     refused = command("run", "scene.toml", "--resume", "--record", "more.rrd", cwd=folder)
     assert refused.returncode == 2
-    assert "recording and live cannot go on with a run that was stopped" in refused.stderr
+    assert "recording and live cannot continue a run that was stopped" in refused.stderr
 
 
 def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):

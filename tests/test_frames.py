@@ -1,4 +1,4 @@
-"""When frames are, whether they fit, and that nobody who is told of one can change it."""
+"""The times of frames, whether they fit on the disk, and that a progress function cannot change them."""
 
 import logging
 import shutil
@@ -43,14 +43,14 @@ def test_endless_frames_are_refused_before_the_run_with_their_number_and_size(tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_frames_are_held_against_the_disk_and_what_they_replace(tmp_path, monkeypatch, caplog):
+def test_frames_are_compared_with_the_disk_and_what_they_replace(tmp_path, monkeypatch, caplog):
     usage, path = namedtuple("Usage", "total used free"), tmp_path / "run.h5"
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage(0, 0, 50_000))
     run = {"until": 100.0, "every": 1.0, "trajectory": path, "overwrite": True}
-    many = swarm.fill(SPHERE, 20, speed=1.0, seed=1)
+    many = swarm.fill(SPHERE, 20, speed=1e-3, seed=1)
     with pytest.raises(swarm.SceneError, match=r"101 frames, 118 kB, and what is free in .* is 50 kB"):
         swarm.simulate(SPHERE, many, swarm.Impact(), **run)
-    # The half of it, or none of the particles, fits; of what is compressed nobody knows.
+    # Half of it, or no particles, fits; the size of compressed frames is unknown.
     for fits in ({"precision": "float32", "until": 50.0}, {"frames": "none"}, {"compression": "gzip"}):
         with caplog.at_level(logging.INFO, "swarm"):
             swarm.simulate(SPHERE, many, swarm.Impact(), **{**run, **fits})

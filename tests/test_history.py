@@ -42,7 +42,7 @@ def _three(numbers):
 
 @pytest.mark.parametrize("name", PAPER)
 def test_every_sweep_of_the_papers_examples(name):
-    """Relative 1e-9; below a constraint of 1e-8 doubles know the gap only to the last place of the coordinates."""
+    """Relative 1e-9; below a constraint of 1e-8 the gap is exact only to the last place of the coordinates."""
     history, rows = swarm.contact_history(*_example(name)), PAPER[name]["history"]
     assert len(history) == len(rows)
     assert history.converged == (len(rows) < 50)

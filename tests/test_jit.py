@@ -1,6 +1,7 @@
-"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and who may import whom."""
+"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and the layers of imports."""
 
 import ast
+import functools
 import graphlib
 import importlib
 import importlib.util
@@ -188,7 +189,7 @@ def select_all(a, b):
 
 @pytest.mark.parametrize("first", [1.0, 3.0])
 def test_select(first):
-    """Both sides are evaluated, one is taken; an infinity on the other side does no harm."""
+    """Both sides are evaluated, one is taken; an infinity on the other side has no effect."""
     expected = (max(first, 2.0), 1.0 if first > 2.0 else math.inf, -first if first > 2.0 else first)
     assert call(select_all, first, 2.0) == expected
     assert (
@@ -215,7 +216,7 @@ def used_up_often(rounds):
 
 
 def test_scratch_is_zero_each_time():
-    """Far more of it than a stack holds, if it were not given back."""
+    """Far more of it than a stack holds, if it were not released."""
     assert used_up_often(10)
     assert compiled(used_up_often)(1_000_000 if not numba.config.DISABLE_JIT else 10)
 
@@ -238,10 +239,16 @@ assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 # --- The cache -------------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def digests(tmp_path_factory):
+    """A cache folder that already has the digest of the package as it is."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.fixture
-def copied(tmp_path, monkeypatch):
+def copied(tmp_path, monkeypatch, digests):
     """A copy of the package, and the cache folder that its `cache` names."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(digests))
     shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
 
     parent = types.ModuleType("copied")
@@ -275,7 +282,7 @@ def test_an_edit_of_code_of_kernels_names_another_cache(copied, edited):
 
 
 @pytest.mark.parametrize("edited", KERNEL_FILES)
-def test_an_edit_of_words_names_the_same_cache(copied, edited):
+def test_an_edit_of_comments_names_the_same_cache(copied, edited):
     package, folder = copied
     before, source = folder(), (package / edited).read_text()
     # The docstring, which is the first, and lines that move all others.
@@ -292,8 +299,9 @@ def test_an_edit_of_what_is_not_in_kernels_names_the_same_cache(copied):
     assert folder() == before
 
 
-def test_where_nothing_can_be_written_the_folder_is_the_same(copied, monkeypatch):
+def test_where_nothing_can_be_written_the_folder_is_the_same(copied, tmp_path, monkeypatch):
     _package, folder = copied
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     before = folder()
     known = next((before.parent / "sources").iterdir())
     assert known.read_text() == before.name
@@ -309,7 +317,7 @@ def in_kernels(path):
 def test_nothing_else_is_in_kernels():
     """What names the cache is complete: functions, constants and the types of arguments are from its files."""
     for parts, path in modules().items():
-        for target, names in imported_names(parts, path):
+        for target, names in imported_names(parts):
             source = modules()[target]
             if not in_kernels(path):
                 assert target != ("kernel", "jit"), f"{path} has functions of kernels"
@@ -351,7 +359,7 @@ with cache.kernels_compiled(lambda sentence: None):
 
 
 @compiled_only
-def test_an_edit_of_words_compiles_nothing_and_one_of_code_does(copied):
+def test_an_edit_of_comments_compiles_nothing_and_one_of_code_does(copied):
     """Of the file of a kernel itself, whose time and size Numba looks at: this fails when it stores them elsewhere."""
     package, _folder = copied
     file, told = package / "observables.py", []
@@ -366,7 +374,7 @@ def test_an_edit_of_words_compiles_nothing_and_one_of_code_does(copied):
     assert told == [(0.5, 1), (0.5, 0), (1.5, 1)]
 
 
-def test_the_folder_stands_where_the_user_says(monkeypatch, tmp_path):
+def test_the_user_sets_the_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
     assert cache.cache_folder().parent == tmp_path / "numba"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
@@ -382,7 +390,7 @@ def one_more(x):
 
 
 @compiled_only
-def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkeypatch, caplog):
+def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     told = []
     with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(told.append):
@@ -391,7 +399,7 @@ def test_what_is_compiled_is_told_and_what_the_cache_has_is_not(tmp_path, monkey
         numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
     sentence = "compiling kernels for this scene, once: one_more"
     assert told == caplog.messages == [sentence]
-    first(1)  # nobody listens
+    first(1)  # no observer
     with cache.kernels_compiled(told.append):
         assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
     assert told == [sentence]
@@ -414,7 +422,7 @@ assert "scipy.linalg" in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-# --- Who may import whom ---------------------------------------------------------------------------------
+# --- Layers ----------------------------------------------------------------------------------------------
 
 # The architecture, from the top down; a module imports only from layers below its own, or from its own package.
 # `check` and `numbers` of a method take the Scene and the Particles, so these are below.
@@ -439,15 +447,17 @@ LAYERS = [
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 
 
+@functools.cache
 def modules():
     """Every module of the package as its path of names."""
     return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
 
 
-def imported_names(parts, path):
+@functools.cache
+def imported_names(parts):
     """The modules of the package that a module imports, at its top or inside a function, and what from each."""
-    known = modules()
-    for node in ast.walk(ast.parse(path.read_text())):
+    known, found = modules(), []
+    for node in ast.walk(ast.parse(known[parts].read_text())):
         if isinstance(node, ast.Import):
             assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -455,21 +465,22 @@ def imported_names(parts, path):
             for alias in node.names:
                 targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
                 target = next(target for target in targets if target in known)
-                yield target, [] if target in targets[:2] else [alias.name]
+                found.append((target, [] if target in targets[:2] else [alias.name]))
+    return found
 
 
-def imported(parts, path):
+def imported(parts):
     """The modules of the package that a module imports."""
-    return [target for target, _names in imported_names(parts, path)]
+    return [target for target, _names in imported_names(parts)]
 
 
 @pytest.mark.parametrize("parts", modules(), ids=".".join)
 def test_a_module_imports_only_from_below(parts):
-    for target in imported(parts, modules()[parts]):
+    for target in imported(parts):
         below = LAYER[target[0]] > LAYER[parts[0]]
         assert below or (len(target) > 1 and target[0] == parts[0]), f"{'.'.join(parts)} imports {'.'.join(target)}"
 
 
 def test_no_imports_go_in_circles():
-    graph = {parts: set(imported(parts, path)) for parts, path in modules().items()}
+    graph = {parts: set(imported(parts)) for parts in modules()}
     assert len(list(graphlib.TopologicalSorter(graph).static_order())) >= len(modules())

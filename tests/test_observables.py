@@ -44,7 +44,7 @@ def seen():
     """A scene with every term, its state, and what is seen of it."""
     scene, law = scene_of("sphere", "plane", gravity=(0.5, -1.0, 2.0)), regularisation(30.0, 1.5)
     state = state_of(N, 2)
-    observables.start_energies(law, scene.chain(), scene.pull(), 0.7, state)
+    observables.start_energies(scene, law, state)
     return scene, law, state, observe(law, scene, state)
 
 
@@ -78,7 +78,7 @@ def test_energy_error_is_that_of_the_worst_particle(seen):
     after = observe(law, scene, state._replace(velocity=faster))
     m, kinetic = state.mass[worst], 0.5 * state.mass[worst] * (state.velocity[:, worst] ** 2).sum()
     stored = call(observables.contact_energy, law, scene.chain(), 1.0, state.position[:, worst])
-    scale = kinetic + stored + m * 0.7 * np.abs(scene.gravity).sum()
+    scale = kinetic + stored + m * scene.finite_size() * np.abs(scene.gravity).sum()
     assert after["energy_error"] == pytest.approx(3.0 * kinetic / scale, rel=1e-12)
 
 
@@ -92,7 +92,7 @@ def test_max_penetration_is_the_largest_distance_outside(seen):
 
 def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
     scene, state = scene_of("sphere"), state_of(10, 1, reach=0.2)
-    observables.start_energies(None, scene.chain(), None, 0.7, state)
+    observables.start_energies(scene, None, state)
     found = observe(None, scene, state)
     assert found["contact_energy"] == found["potential_energy"] == found["max_penetration"] == 0.0
     assert (state.inverse_scale > 0.0).all()
@@ -101,7 +101,7 @@ def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
 def test_at_rest_the_energy_error_has_no_scale():
     scene, state = scene_of("sphere"), state_of(3, 1, reach=0.2)
     state.velocity[:] = 0.0
-    observables.start_energies(None, scene.chain(), None, 0.7, state)
+    observables.start_energies(scene, None, state)
     assert (state.inverse_scale == 0.0).all()
     assert observe(None, scene, state)["energy_error"] == 0.0
 

@@ -1,4 +1,4 @@
-"""The shares of a frame: every particle in one of them, whoever draws it; and where a frame is halted."""
+"""The shares of a frame: every particle is in one, whichever thread takes it; and where a frame halts."""
 
 import threading
 
@@ -71,7 +71,7 @@ def test_the_start_and_every_frame_are_observed_whole(n, threads, block_size):
             assert seen["kinetic_energy"] == pytest.approx(0.5 * n, rel=1e-13)
 
 
-def test_a_short_frame_wakes_no_thread(monkeypatch):
+def test_a_short_frame_uses_no_thread(monkeypatch):
     """And a long one after it does: what counts is the work in it, by the pace of the last."""
     particles = swarm.fill(SPHERE, 4 * observables.CHUNK, speed=1.0, seed=1)
     with Run(SPHERE, particles, swarm.Impact(), 2, None) as run:
@@ -98,23 +98,23 @@ def along_diameters(n):
     return swarm.Particles(np.zeros((3, n)), directions)
 
 
-@pytest.mark.parametrize(("halts", "share"), [([3], 0.25), ([5, 2, 4], 0.15), ([1, 0], 0.0), ([0, 7], 0.0)])
+@pytest.mark.parametrize(("halts", "share"), [([3], 0.625), ([5, 2, 4], 0.375), ([1, 0], 0.0), ([0, 7], 0.0)])
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_run_halts_at_the_pass_it_was_told(threads, halts, share):
+def test_a_run_halts_at_the_pass_requested(threads, halts, share):
     """At the soonest one, each thread by its own count, and that frame only: a pass is a flight to the wall."""
     n = threads * lanes.LANES
     with Run(SPHERE, along_diameters(n), swarm.Impact(), threads, None) as run:
         for passes in halts:
             run.halt(passes)
-        assert not run.advance(10.0, 10.0)
-        assert run.share_done(10.0) == pytest.approx(share, abs=1e-14)
-        assert run.advance(10.0, 10.0)
-        assert (run.state.impacts == 10).all()
-        assert run.advance(10.0, 20.0)
+        assert not run.advance(4.0, 4.0)
+        assert run.share_done(4.0) == pytest.approx(share, abs=1e-14)
+        assert run.advance(4.0, 4.0)
+        assert (run.state.impacts == 4).all()
+        assert run.advance(2.0, 6.0)
 
 
 def test_at_its_end_a_run_is_halted_for_good():
-    """What a thread still does then, or begins, ends at once: here on its own, since none is waited for."""
+    """A share that runs then, or begins, is interrupted immediately; no thread waits for it."""
     with Run(SPHERE, along_diameters(lanes.LANES), swarm.Impact(), 1, None) as run:
         pass
     run.halt(1000)

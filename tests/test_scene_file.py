@@ -1,4 +1,4 @@
-"""Scene files: what they may say, and the sentence for everything else."""
+"""Scene files: what they may contain, and the error sentence for everything else."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: the folder that holds them, whether one is there, and the report of compilations."""
+"""Compiled kernels on disk: their folder, whether a kernel is there, and reports of compilations."""
 
 import ast
 import contextlib
@@ -44,7 +44,7 @@ def _base() -> Path:
 def cache_folder() -> Path:
     """Folder of the compiled kernels: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then a digest of their code.
 
-    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would answer with
+    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would return
     the old code.
     """
     texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
@@ -100,13 +100,13 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
 
 
 def registered(kind: Any, definition: Callable[..., Any]) -> None:
-    """Note a definition for a class: the folder's name covers no code outside of this package."""
+    """Record a definition for a class: the folder is named by the code of this package alone."""
     if str(definition.__module__).partition(".")[0] != "swarm":
         _outside.setdefault(kind, []).append(definition)
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """A kernel of a class with such definitions is found only where they are the same."""
+    """A kernel of a class with such definitions is found only if they are unchanged."""
 
     def _index_key(self, kinds: Any, codegen: Any) -> Any:
         return (*super()._index_key(kinds, codegen), *_digests(kinds))
@@ -135,7 +135,7 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     takes a millisecond.
     """
     if in_python(kernel) is kernel:
-        return True  # without the compiler there is nothing to wait for
+        return True  # the compiler is disabled
     kinds = tuple(map(numba.typeof, arguments))
     disk = kernel._cache
     return kinds in kernel.overloads or (
@@ -145,7 +145,7 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
 
 @contextlib.contextmanager
 def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """Tell the logger and `tell`, by a sentence, of every kernel that is compiled in this context."""
+    """Report every kernel that is compiled in this context to the logger and to `tell`, in a sentence."""
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, compiled: Any) -> None:

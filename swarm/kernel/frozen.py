@@ -1,7 +1,7 @@
-"""A function that is not of this package, frozen: a copy of it and of all it refers to, and a digest of the two.
+"""A user's function, frozen: a copy of it and of all it refers to, and a digest of them.
 
-What is compiled is the copy, so code that is found again by its digest is the code that was digested: after an edit
-anywhere, or when a global changes, the digest is another one.
+The copy is compiled, so what the cache has under a digest is the code that was digested: after an edit anywhere, or
+when a global changes, the digest differs.
 """
 
 import builtins
@@ -32,7 +32,7 @@ class Frozen:
     """Copies of functions and of everything they refer to, and the digest of all of them together.
 
     Args:
-        prepared: what makes a copy one that kernels can call, where that is wanted.
+        prepared: makes a copy callable in kernels, if needed.
     """
 
     def __init__(self, prepared: Callable[[Function], Function] = lambda copy: copy) -> None:
@@ -52,7 +52,7 @@ class Frozen:
             self._add("again", list(self._copies).index(function))
             return self._copies[function]
         code = function.__code__
-        # Numba finds the module of a function again by this name when it loads a kernel.
+        # Numba looks up the module of a function by this name when it loads a kernel.
         scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
         cells = tuple(types.CellType() for _ in code.co_freevars)
         copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
@@ -64,10 +64,10 @@ class Frozen:
         self._add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
         for cell, original in zip(cells, function.__closure__ or (), strict=True):
-            # A cell is empty where the name has no value yet: its use fails as it would have.
+            # A cell is empty while the name has no value: its use fails as in the original.
             with contextlib.suppress(ValueError):
                 cell.cell_contents = self.value(original.cell_contents, code)
-        # The names in the code alone are those of attributes too.
+        # co_names has the names of attributes too.
         instructions = (one for part in _parts(code) for one in dis.get_instructions(part))
         for name in sorted({one.argval for one in instructions if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}):
             self._add("global", name)
@@ -93,7 +93,7 @@ class Frozen:
         elif isinstance(value, types.ModuleType) and code is not None:
             return self._module(value, code)
         else:
-            # Nothing is known of what it does: never the same again.
+            # Nothing is known about it: a digest that never repeats.
             self._add("unknown", os.urandom(16))
         return value
 

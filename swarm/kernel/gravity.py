@@ -67,7 +67,7 @@ def _(gravity, r):
 
 @by_type
 def weight(gravity, s):
-    """How far the potential energy per mass moves at most when the coordinates move by s."""
+    """The largest change of the potential energy per mass when the coordinates change by s."""
     raise NotImplementedError
 
 

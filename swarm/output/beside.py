@@ -14,7 +14,7 @@ from ..particles import State
 from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
-# single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits for others longer than this [s].
+# single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits longer than this for others [s].
 _CHUNK_FRAMES = 10
 _PATIENCE = 0.05
 # Most frames in the queue: half of them are written while the others are computed. More would only hide a slow disk in
@@ -39,7 +39,7 @@ class Writer(Protocol):
 
 
 class Several:
-    """Several writers as one, each with the particles that it keeps; they write one after the other."""
+    """Several writers as one, each with the particles that it keeps; they write in turn."""
 
     def __init__(self, writers: list[tuple[Writer, slice]]) -> None:
         self._writers = writers
@@ -73,8 +73,8 @@ def _some(state: State, kept: slice) -> State:
 class Beside:
     """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
 
-    When the context ends, every frame is written. An error of the writer is raised by the next frame, or at the end. Of
-    the n particles only those `kept` are copied.
+    When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end. Of
+    the n particles only the `kept` ones are copied.
     """
 
     def __init__(self, writer: Writer, n: int, kept: slice = slice(None)) -> None:
@@ -141,7 +141,7 @@ class Beside:
                 try:
                     self._write(frames)
                     self.written = frames[-1][0] + 1
-                except BaseException as problem:  # of any kind: the computing thread raises it
+                except BaseException as problem:  # the computing thread raises it
                     self._problem = problem
                 self.seconds = (time.perf_counter() - began) / len(frames)
             for frame in frames:

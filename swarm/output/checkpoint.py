@@ -1,4 +1,4 @@
-"""Checkpoints: all that a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
+"""Checkpoints: what a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
 
 A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Each
 has a checksum.
@@ -118,7 +118,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def is_one(path: Path) -> bool:
-    """Whether a file begins like a checkpoint, even if it is incomplete."""
+    """Whether a file starts like a checkpoint, complete or not."""
     if not path.is_file():
         return False
     with open(path, "rb") as file:
@@ -135,7 +135,7 @@ def read(path: Path) -> tuple[Job, Arrays]:
         with zipfile.ZipFile(path) as archive:
             # Every entry has a checksum, which is checked when it is read to its end.
             entries = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in archive.infolist()}
-        # Parsed only after that: the header of a damaged array may state any size.
+        # Parsed after the checksums: the header of a damaged array may state any size.
         arrays = {
             name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
         }
@@ -161,12 +161,9 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
                     f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
                 )
         particles = arrays["halted.particle"]
-        if len(particles) and not (particles[0] >= 0 and particles[-1] < len(run["mass"]) and _ascends(particles)):
+        bounded = np.concatenate([[-1], particles, [len(run["mass"])]])
+        if (np.diff(bounded) <= 0).any():
             raise ValueError("it names particles that do not exist")
-
-
-def _ascends(values: NDArray[Any]) -> bool:
-    return bool((np.diff(values) > 0).all())
 
 
 @contextlib.contextmanager

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.regularisation import stored_energy
+from .. import observables
 from ..errors import SceneError
-from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Floats, Particles
 from ..scene import Scene
-from ..surfaces import contract
-from ..surfaces.surface import side_sign
 
 BY = ("speed", "energy-error")
 
@@ -71,7 +68,9 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
     Raises:
         SceneError: energy errors are asked for where impacts dissipate energy.
     """
-    energy, scale = _energies(scene, method, start)
+    law = method.law()
+    at_start = observables.energies(scene, law, start.mass, start.position, start.velocity)
+    scale = observables.energy_scale(scene, at_start)
     if by == "speed":
         fastest = _FASTER * math.sqrt(2.0 * scale.mean()) or 1.0
         # Two digits are enough on a legend.
@@ -82,11 +81,11 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
             "record_color must be 'speed' where a surface has a restitution below 1, got 'energy-error': energy that "
             "impacts dissipate is not an error"
         )
-    before, inverse = energy(start.position, start.velocity), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
+    before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 
     def errors(position: Floats, velocity: Floats) -> Floats:
-        error = np.abs(energy(position, velocity) - before) * inverse
-        return np.asarray(np.log10(np.maximum(error, 10.0 ** _DECADES[0])))
+        now = observables.energies(scene, law, start.mass, position, velocity).total()
+        return np.asarray(np.log10(np.maximum(np.abs(now - before) * inverse, 10.0 ** _DECADES[0])))
 
     return Scale("log10 of the relative energy error", *_DECADES), errors
 
@@ -94,26 +93,3 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
 def _speed(velocity: Floats) -> Floats:
     x, y, z = velocity
     return np.asarray(np.sqrt(x * x + y * y + z * z))
-
-
-def _energies(scene: Scene, method: Method, start: Particles) -> tuple[Values, Floats]:
-    """Energies per mass as a function of positions and velocities, and the scale of their errors."""
-    law, gravity, mass = method.law(), np.array(scene.gravity or (0.0, 0.0, 0.0)), start.mass
-
-    def stored(position: Floats) -> Floats:
-        total = np.zeros(len(mass))
-        if law is not None:
-            for surface in scene.surfaces:
-                side = side_sign(getattr(surface, "side", "inside"))
-                for wall in surface.walls():
-                    gap = side * contract.phi(wall, vec(position))
-                    # Few particles are in a wall, and the law takes one number.
-                    for i in np.flatnonzero(gap > 0.0):
-                        total[i] += stored_energy(law, float(gap[i])) / mass[i]
-        return total
-
-    def energy(position: Floats, velocity: Floats) -> Floats:
-        return 0.5 * _speed(velocity) ** 2 - gravity @ position + stored(position)
-
-    scale = 0.5 * _speed(start.velocity) ** 2 + stored(start.position) + np.abs(gravity).sum() * scene.finite_size()
-    return energy, scale

@@ -22,7 +22,7 @@ MAP = ListedColormap(colours.table(), name="swarm")
 BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _DPI = 100
-# Matplotlib leaves room around 3-D axes: this much larger they fill their cell.
+# Matplotlib leaves room around 3-D axes: with this zoom they fill their cell.
 _ZOOM = 1.3
 
 
@@ -68,7 +68,7 @@ def colour_bar(picture: Any, axes: Any, quantity: str, low: float, high: float) 
     bar.ax.tick_params(colors=LIGHT, labelsize=8)
 
 
-def lines(axes: Any, view: str, drawn: dict[str, tuple[Floats, Floats]], logarithm: bool) -> None:
+def lines(axes: Any, view: str, logarithm: bool, drawn: dict[str, tuple[Floats, Floats]]) -> None:
     """The time series of one plot, by their names: (times [s], values). Rates have no value at the first frame."""
     axes.set_title(view, fontsize=10)
     if not any(len(times) for times, _values in drawn.values()):

@@ -12,8 +12,8 @@ from . import paths
 def only_writer(trajectory: Path) -> Iterator[None]:
     """Hold the lock of a trajectory.
 
-    A file beside it is locked, since a lock on the trajectory itself would block readers. A lock file that a killed run
-    leaves blocks no later run.
+    A file beside it is locked, since a lock on the trajectory itself would block readers. A lock file that is left by a
+    killed run blocks no later run.
 
     Raises:
         FileError: another run holds it, or its file cannot be made.

@@ -31,7 +31,7 @@ class Playback:
         entities: path -> number of rows.
         series: path -> (times, values).
         names: path -> name in the legend.
-        about: what its colours mean: quantity, low, high; particles and how many are shown; the stride of its frames.
+        about: meaning of the colours: quantity, low, high; number of particles, how many are shown, stride of frames.
         wires: of each surface, whether it is a solid and its curves.
 
     Raises:

@@ -50,10 +50,10 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
     views = series.views_of(lines)
     cells = right.subplots(2, 3).ravel()
-    for cell, (view, together) in zip(cells, views.items(), strict=False):
+    for cell, (group, together) in zip(cells, views.items(), strict=False):
         known = {line.name: ~np.isnan(columns[line.path]) for line in together}
         curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}
-        drawing.lines(cell, view, curves, together[0].logarithm)
+        drawing.lines(cell, *series.VIEWS[group], curves)
     _speeds(cells[len(views)], trajectory)
     for cell in cells[len(views) + 1 :]:
         cell.set_axis_off()

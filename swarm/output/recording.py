@@ -26,10 +26,9 @@ from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
 from . import colours, paths, series, viewer
-from .rows import rows
 from .shapes import shapes_of
 from .trajectory import Trajectory
-from .writer import WriteFrames, Written
+from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), and at most of a number of a time series, which may be a chunk of its own.
 _PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
@@ -37,7 +36,7 @@ _MEGABYTE = 1e6
 _AT_ONCE = 10  # frames of a trajectory
 # Rows of the time series that are sent together, unless that takes longer than this [s].
 _ROWS, _PATIENCE = 50, 0.5
-# Longest flush [s]: it takes milliseconds, but may never return if the file cannot be written.
+# Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
 
 _BACKGROUND = (24, 24, 27)
@@ -122,7 +121,7 @@ class RecordingWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._failed:
-            return  # another flush would never return
+            return  # another flush never returns
         try:
             self._send_rows()
             self._stream.flush(timeout_sec=_LONGEST)
@@ -185,11 +184,11 @@ class RecordingWriter:
             # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
                 self._send_rows()
-            # Without it a full disk would go unnoticed, and sending to the thread that it has ended would never return.
+            # Without a flush a full disk is not noticed, and the next `send` to the thread that it ended never returns.
             self._stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             self._failed = True
-            # Closing the stream, or Rerun at the exit of the process, would wait for its dead thread for ever.
+            # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
@@ -217,7 +216,7 @@ class RecordingWriter:
 
 
 def _cycled(lines: list[series.Line]) -> list[tuple[int, int, int]]:
-    """A colour a line: in each view they begin anew."""
+    """The colour of each line; every view starts with the first."""
     return [LINES[k % len(LINES)] for together in series.views_of(lines).values() for k in range(len(together))]
 
 
@@ -227,9 +226,10 @@ def _blueprint(lines: list[series.Line]) -> rrb.Blueprint:
         origin="/scene", name="particles", background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
     )
     plots = []
-    for view, together in series.views_of(lines).items():
+    for group, together in series.views_of(lines).items():
+        view, logarithm = series.VIEWS[group]
         legend = rrb.PlotLegend(visible=len(together) > 1)
-        name = f"{view}, log10" if together[0].logarithm else view
+        name = f"{view}, log10" if logarithm else view
         paths = [line.path for line in together]
         plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
     about = rrb.TextDocumentView(origin="/about", name="legend")

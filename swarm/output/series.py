@@ -12,52 +12,61 @@ from .shapes import Shape
 # Stands for the logarithm of zero.
 NOTHING = -18.0
 
+# Of each plot, by the first part of the entities on it: its title, and whether the values are a log10.
+VIEWS = {
+    "energy": ("energy [J]", False),
+    "energy_error": ("worst relative energy error", True),
+    "penetration": ("largest penetration [m]", True),
+    "impacts": ("impacts per second [1/s]", False),
+    "pressure": ("pressure on each surface [Pa]", False),
+    "force": ("force on each surface [N]", False),
+}
+
 # A frame's time [s] and its observables.
 Seen = tuple[float, dict[str, Any]] | None
 
 
 @dataclass(frozen=True)
 class Line:
-    """A time series: its plot, its entity, its name in the legend, and its value at a frame.
+    """A time series: its entity, its name in the legend, and its value at a frame.
 
-    The value is a function of the frame's time and observables, and of those of the frame before. If `logarithm`, it is
-    a log10.
+    The value is a function of the frame's time and observables, and of those of the frame before.
     """
 
-    view: str
     path: str
     name: str
     value: Callable[[float, dict[str, Any], Seen], float]
-    logarithm: bool = False
+
+
+def group_of(path: str) -> str:
+    """The key in `VIEWS` of an entity."""
+    return path.split("/")[1]
 
 
 def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
     """The time series of a scene, without those that are always zero in it."""
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {"contact": method.law() is not None, "dissipated": scene.restitution() is not None}
-    lines = [
-        Line("energy [J]", f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there
-    ]
+    lines = [Line(f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there]
     lines += [
-        Line("worst relative energy error", "/energy_error", "of a particle", _logarithm_of("energy_error"), True),
-        Line("largest penetration [m]", "/penetration", "of a particle", _logarithm_of("max_penetration"), True),
-        Line("impacts per second [1/s]", "/impacts", "all particles", _rate("impacts", 1.0)),
+        Line("/energy_error", "of a particle", _logarithm_of("energy_error")),
+        Line("/penetration", "of a particle", _logarithm_of("max_penetration")),
+        Line("/impacts", "all particles", _rate("impacts", 1.0)),
     ]
     # The walls of an open volume are drawn in part, so they have no area.
-    group, unit = ("force", "N") if scene.is_open() else ("pressure", "Pa")
+    group = "force" if scene.is_open() else "pressure"
     for i, shape in enumerate(shapes):
         area = 1.0 if scene.is_open() else shape.area()
         if area > 0.0:
-            value = _rate("impulse", area, i)
-            lines.append(Line(f"{group} on each surface [{unit}]", f"/{group}/{shape.name}", shape.name, value))
+            lines.append(Line(f"/{group}/{shape.name}", shape.name, _rate("impulse", area, i)))
     return lines
 
 
 def views_of(lines: list[Line]) -> dict[str, list[Line]]:
-    """The lines of each plot."""
+    """The lines of each plot, by the key in `VIEWS`."""
     views: dict[str, list[Line]] = {}
     for line in lines:
-        views.setdefault(line.view, []).append(line)
+        views.setdefault(group_of(line.path), []).append(line)
     return views
 
 

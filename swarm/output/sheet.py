@@ -8,18 +8,10 @@ import numpy as np
 from matplotlib import pyplot
 
 from ..errors import RunError, SceneError
-from . import drawing, viewer
+from . import drawing, series, viewer
 from .playback import Playback
 
 _COLUMNS = 3
-_GROUPS = {
-    "energy": ("energy [J]", False),
-    "energy_error": ("worst relative energy error", True),
-    "penetration": ("largest penetration [m]", True),
-    "impacts": ("impacts per second [1/s]", False),
-    "pressure": ("pressure on each surface [Pa]", False),
-    "force": ("force on each surface [N]", False),
-}
 
 
 def draw(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
@@ -75,8 +67,7 @@ def _pictures(
 def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
     groups: dict[str, dict[str, Any]] = {}
     for path, values in sorted(playback.series.items()):
-        group = path.strip("/").split("/")[0]
-        groups.setdefault(group, {})[playback.names[path]] = values
+        groups.setdefault(series.group_of(path), {})[playback.names[path]] = values
     above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
     picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
@@ -98,6 +89,6 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {count}"
     top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
-    for place, (group, (view, logarithm)) in enumerate((g, v) for g, v in _GROUPS.items() if g in groups):
-        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), view, groups[group], logarithm)
+    for place, group in enumerate(group for group in series.VIEWS if group in groups):
+        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], groups[group])
     return picture

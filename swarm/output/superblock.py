@@ -1,4 +1,4 @@
-"""Clearing the mark that HDF5 sets on a file that is open for writing.
+"""Clears the mark that HDF5 sets on a file that is open for writing.
 
 In the mode for one writer and many readers (SWMR) HDF5 orders its writes so that every prefix of them is a valid file:
 a file that a killed run leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
@@ -41,8 +41,8 @@ def make_appendable(file: BinaryIO) -> None:
 class Unmarked(io.FileIO):
     """A file for h5py to read as if it had no mark.
 
-    A marked file can only be opened in SWMR mode, where HDF5 waits for the writer to complete what is damaged: for
-    ever, if there is no writer.
+    A marked file can only be opened in SWMR mode, where HDF5 waits for the writer to complete what is damaged:
+    forever, if there is no writer.
     """
 
     def __init__(self, path: Path) -> None:

@@ -8,6 +8,7 @@ dataset by hard links. writer.py writes them.
 
 import contextlib
 import operator
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,8 @@ from . import layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
-# HDF5 wants the same locking flags from all who open a file in one process with the same driver. The driver for logs
-# reads like the usual one, logs nothing by default, and is unlikely to be used by other code.
+# In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
+# another. The logging driver reads like the default one, logs nothing by default, and is rarely used.
 _DRIVER = "swarm"
 
 
@@ -181,7 +182,7 @@ class Trajectory:
     def scene(self) -> Scene:
         """The scene that was run."""
         with self._reading("its scene"):
-            table = _toml(self._text("scene"))
+            table = tomllib.loads(self._text("scene"))
             surfaces = table["surface"]
             own = any(surface["kind"] == "own" for surface in surfaces)
         # An OwnSurface is not damage: the error says that no file holds it.
@@ -192,7 +193,7 @@ class Trajectory:
     def method(self) -> Method:
         """The method that was run."""
         with self._reading("its method"):
-            return tables.method_of(_toml(self._text("method")))
+            return tables.method_of(tomllib.loads(self._text("method")))
 
     @property
     def scene_text(self) -> str | None:
@@ -216,7 +217,7 @@ def _opened(path: Path) -> h5py.File:
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
-            # Its writer is at this moment between marking it and clearing the mark, or was killed there.
+            # Its writer has marked it and not yet cleared the mark, or was killed in between.
             return h5py.File(superblock.Unmarked(path), "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
@@ -248,12 +249,6 @@ def _whole(name: str, value: Any) -> int:
         return operator.index(value)
     except TypeError:
         raise SceneError(f"{name} must be a whole number, got {value!r}") from None
-
-
-def _toml(text: str) -> dict[str, Any]:
-    import tomllib
-
-    return tomllib.loads(text)
 
 
 def load(path: str | Path) -> Trajectory:

@@ -1,4 +1,4 @@
-"""The Rerun viewer: shown during a run, or without a screen, for pictures."""
+"""The Rerun viewer: live during a run, or headless for pictures."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ from ..errors import RunError, SceneError
 _PORT = 9876
 _PATIENCE = 30.0  # [s]
 _PAUSE = 0.1
-# Time that the viewer takes to draw a frame with a software driver [s].
+# Time to draw a frame with a software driver [s].
 _DRAWING = 1.0
 _HERE = "127.0.0.1"
 

@@ -1,4 +1,4 @@
-"""Whether a run may begin: all that can be known before its first step."""
+"""Checks before a run starts."""
 
 import numpy as np
 
@@ -15,10 +15,10 @@ _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 
 
 def task_of(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> Task:
-    """What will be run, with particles of its own.
+    """The run, checked, with its own copy of the particles.
 
     Raises:
-        SceneError: an argument is wrong, or they do not go together.
+        SceneError: an argument is wrong, or the arguments do not go together.
     """
     for name, value, kind in (("scene", scene, Scene), ("particles", particles, Particles), ("method", method, Method)):
         if not isinstance(value, kind):

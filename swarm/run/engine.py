@@ -1,6 +1,5 @@
-"""A run under way: its state, and the threads that advance and observe it. The border to the kernels."""
+"""The state of a run, and the threads that advance and observe it: the only callers of the kernels."""
 
-import functools
 import math
 import time
 from collections.abc import Iterator
@@ -22,7 +21,7 @@ from .tiers import Tier
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
-# A particle outside rigid walls by this part of the scene's size is no round-off, which is 1e-15 of it.
+# Beyond this part of the scene's size a particle outside rigid walls is an error; round-off is 1e-15 of it.
 _OUTSIDE = 1e-9
 # The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it stays
 # free to handle an interrupt.
@@ -40,7 +39,7 @@ class Run:
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
         compile: str = "always",
     ) -> None:  # fmt: skip
-        n = len(particles)
+        n, self._owners = len(particles), scene.owners()
         self.state = State(
             particles.position,
             particles.velocity,
@@ -48,18 +47,17 @@ class Run:
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
-            np.zeros((len(scene.owners()), n)),
+            np.zeros((len(self._owners), n)),
             np.zeros(0 if scene.restitution() is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
         )
-        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
-        self._faces = scene.open_faces()
-        self._too_fast = functools.partial(method.too_fast, scene)
-        self._failure, self._owners, self._scene = method.failure, scene.owners(), scene
-        self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
-        self._method, self._law = method.numbers(scene), method.law()
+        self._scene, self._method = scene, method
+        self._numbers, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
-        self._escaping = self._chain, self._gravity, self._far, self._faces, self.state
+        observables.start_energies(scene, self._law, self.state)
+        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
+        self._escaping = self._chain, self._gravity, self._far, scene.open_faces(), self.state
+        self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._draws = math.ceil(n / self._size)
@@ -73,9 +71,7 @@ class Run:
         self._threads = min(threads, self._draws)
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._pace = math.inf  # work of the last frame [s], over its span
-        self._tier = Tier(compile, (self._method, self._law, self._chain), n)
-        starting = self._law, self._chain, self._gravity, scene.finite_size(), self.state
-        self._tier.call(observables.start_energies, starting)
+        self._tier = Tier(compile, (self._numbers, self._law, self._chain), n)
         self._choose_tier()
 
     def __enter__(self) -> "Run":
@@ -86,95 +82,111 @@ class Run:
         self._pool.shutdown(wait=True)
 
     def halt(self, passes: int = 0) -> None:
-        """Let each call of a kernel return after so many passes, before its frame is done; 0: at once.
+        """Make every kernel call of this frame return after so many passes; 0: at once.
 
-        It holds until `advance` returns. It never takes back a halt that comes sooner, not even one that a signal or
-        another thread asks for meanwhile: NumPy compares and writes under one hold of the interpreter's lock.
+        It ends when `advance` returns. Of two halts the sooner one counts, also if a signal or another thread sets the
+        second at the same time: NumPy compares and writes without releasing the interpreter's lock.
         """
         np.minimum(self._halt, passes, out=self._halt)
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
 
-        If not, `halt` was called, or `latest` has come [s of time.monotonic], or the time of plain Python is over, and
-        the next call goes on with the frame, bit by bit as if it had not been cut short. `writing` a frame takes
-        seconds.
+        It is not if `halt` was called, at the time `latest` [s of time.monotonic], or when the time for plain Python
+        is used up. The next call then continues the frame, with the same bits as without the halt. `writing` is the
+        time to write a frame [s].
         """
         if not self._cut_short:
             self._done.fill(False)
-        if self._tier.is_plain and self._tier.left <= 0.0:
-            self._choose_tier()
-        status, particle = self._all_shares(span, writing, latest)
-        if status == Status.HARD_CONTACT:
-            self._hard = blocks.Hard(blocks.MOST_HITS)
-            self._choose_tier()
-            status, particle = self._all_shares(span, writing, latest)
-        self._cut_short = status == Status.INTERRUPTED
-        self._halt[0] = blocks.NEVER
-        if status not in (Status.DONE, Status.INTERRUPTED):
-            sentence = f"the frame at {moment:g} s failed at particle {particle}: {Status(status).sentence}"
-            if status == Status.TOO_FAST:
-                sentence += f", {self._too_fast()}"
-            multipliers = self.state.multipliers
-            if status == Status.UNCONVERGED and multipliers is not None:
-                left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-                sentence += f" {self._failure(moment, left, multipliers.sweeps[particle], stored)}"
-            raise RunError(sentence)
-        return not self._cut_short
-
-    def share_done(self, span: float) -> float:
-        """How much of a frame that was cut short is done, on average over the particles."""
-        left = self._halted.rows[lanes.LEFT]
-        return float(self._done.sum() + (1.0 - left / span).sum()) / len(self._done)
-
-    def observe(self) -> None:
-        """Observe the start."""
-        self._done.fill(True)
-        self._all_shares(0.0)
-
-    def _all_shares(self, span: float, writing: float = 0.0, latest: float = math.inf) -> tuple[int, int]:
-        """Every particle that is not done by `span`, all threads: the worst (status, particle)."""
-        self._ticket[0] = 0
-        # The caller's thread is one of them, unless it has to be free.
-        work = self._pace * span if span > 0.0 else 0.0
-        helps = work < _SHORT_FRAME * self._threads
-        # A thread that writes for as long as one computes has a processor of its own: three that share two of them wait
-        # for one another.
-        threads = max(1, self._threads - (writing > _MUCH_WRITING * work))
         if self._tier.is_plain:
-            # Python runs one thread at a time.
-            threads, latest = 1, min(latest, time.monotonic() + self._tier.left)
-        others = threads - helps if work > _LITTLE_WORK else 0
+            if self._tier.left <= 0.0:
+                self._choose_tier()
+            latest = min(latest, time.monotonic() + self._tier.left)
+        self._ticket[0] = 0
+        others, helps = self._hands(span, writing)
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
         ends = [self._share(span)] if helps else []
         if latest < math.inf and wait(shares, max(0.0, latest - time.monotonic())).not_done:
             self.halt()
         ends += [share.result() for share in shares]
-        self._tier.left -= time.perf_counter() - began
-        status, particle, _ = max(ends, key=lambda end: end[:2])
+        seconds = time.perf_counter() - began
+        self._tier.left -= seconds
+        status, particle, _left = max(ends, key=lambda end: end[:2])
+        self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
+        if status == Status.HARD_CONTACT:
+            self._hard = blocks.Hard(blocks.MOST_HITS)
+            self._choose_tier()
+            return self.advance(span, moment, writing, latest)
+        self._halt[0] = blocks.NEVER
         if status == Status.INTERRUPTED:
             self._keep([left for *_, left in ends if left is not None])
+        elif status != Status.DONE:
+            raise RunError(self._failure(Status(status), particle, moment))
         elif span > 0.0:
             self._halted = lanes.none_halted(len(self._owners))
-            self._pace = (time.perf_counter() - began) * (others + helps) / span
-        return status, particle
+            self._pace = seconds * (others + helps) / span
+        return not self._cut_short
+
+    @np.errstate(all="ignore")  # as in compiled kernels: 1/0 is an infinity, which a select discards
+    def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
+        """Advance and observe what one thread draws: (status, particle, what a halt left in its lanes)."""
+        draws, mine = self._lanes()
+        advance_block, observe = self._tier.kernel(blocks.advance_block), self._tier.kernel(observables.observe)
+        status, particle, drawn = advance_block(*self._advancing(span, draws, mine))
+        if status == Status.DONE:
+            observe(*self._observing(draws.mine[:drawn]))
+        if status != Status.INTERRUPTED:
+            return status, particle, None
+        live = particle
+        return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
+
+    def observe(self) -> None:
+        """Observe the start: every particle is there."""
+        self._done.fill(True)
+        self._ticket[0] = 0
+        self._share(0.0)
+
+    def share_done(self, span: float) -> float:
+        """How much of a frame that was cut short is done, on average over the particles."""
+        left = self._halted.rows[lanes.LEFT]
+        return float(self._done.sum() + (1.0 - left / span).sum()) / len(self._done)
+
+    def _hands(self, span: float, writing: float) -> tuple[int, bool]:
+        """How many threads of the pool advance a frame, and whether the caller's thread does too."""
+        work = self._pace * span if span > 0.0 else 0.0
+        helps = work < _SHORT_FRAME * self._threads
+        # A thread that writes for as long as one computes has a processor of its own: three threads that share two
+        # processors wait for one another. And Python runs one thread at a time.
+        threads = 1 if self._tier.is_plain else max(1, self._threads - (writing > _MUCH_WRITING * work))
+        return threads - helps if work > _LITTLE_WORK else 0, helps
+
+    def _failure(self, status: Status, particle: int, moment: float) -> str:
+        """The sentence about a frame that failed."""
+        sentence = f"the frame at {moment:g} s failed at particle {particle}: {status.sentence}"
+        if status == Status.TOO_FAST:
+            sentence += f", {self._method.too_fast(self._scene)}"
+        multipliers = self.state.multipliers
+        if status == Status.UNCONVERGED and multipliers is not None:
+            left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
+            sentence += f" {self._method.failure(moment, left, multipliers.sweeps[particle], stored)}"
+        return sentence
 
     def _lanes(self) -> tuple[lanes.Draws, lanes.Lanes]:
-        """What a thread alone needs: what it has drawn, and its lanes."""
+        """Arrays of one thread: its draws and its lanes."""
         return lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64)), lanes.empty(len(self._owners))
 
     def _advancing(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
         share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
-        return self._method, self._chain, self._gravity, self._hard, share, mine
+        return self._numbers, self._chain, self._gravity, self._hard, share, mine
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
         return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
 
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-        """Every kernel that frames call, with arguments of the types that it is called with from now on."""
+        """Every kernel of a frame, with arguments of the types that it is called with from now on."""
         draws, mine = self._lanes()
         yield blocks.advance_block, self._advancing(0.0, draws, mine)
         yield observables.observe, self._observing(draws.mine)
@@ -186,7 +198,7 @@ class Run:
             self._pace = math.inf
 
     def _keep(self, left_behind: list[lanes.Halted]) -> None:
-        """What a halt left in the lanes, and what an earlier one left that no lane has picked up since."""
+        """Keep what a halt left in the lanes, and what an earlier one left and no lane has taken since."""
         picked_up = np.concatenate([np.flatnonzero(self._done), *(left.particle for left in left_behind)])
         waiting = ~np.isin(self._halted.particle, picked_up)
         parts = [lanes.Halted(self._halted.particle[waiting], self._halted.rows[:, waiting]), *left_behind]
@@ -195,60 +207,46 @@ class Run:
         rows = np.concatenate([part.rows for part in parts], axis=1)[:, order]
         self._halted = lanes.Halted(particle[order], np.ascontiguousarray(rows))
 
-    def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
-        """What one thread draws, advanced and observed: (status, particle, what a halt left in its lanes)."""
-        draws, mine = self._lanes()
-        status, particle, drawn = self._tier.call(blocks.advance_block, self._advancing(span, draws, mine))
-        if status == Status.DONE:
-            self._tier.call(observables.observe, self._observing(draws.mine[:drawn]))
-        if status != Status.INTERRUPTED:
-            return status, particle, None
-        live, particle = particle, 0
-        return status, particle, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
-
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All that `restore` needs for a run to go on bit by bit, not copied; between two calls of `advance`."""
+        """What `restore` needs to continue with the same bits, not copied; to be called between calls of `advance`."""
         arrays: dict[str, NDArray[Any]] = {"done": self._done, **_named("halted", self._halted)}
         for name, array in self.state._asdict().items():
             arrays |= _named(name, array) if isinstance(array, Multipliers) else {name: array}
         return {name: array for name, array in arrays.items() if array is not None}
 
     def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
-        """Be as the run was that gave these `arrays`, at a frame or, `cut_short`, on the way to the next."""
+        """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
 
+    @np.errstate(all="ignore")
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
         seen = observables.summary(self._partial, self.state, self._owners)
-        escaped = 0
-        if self._far < math.inf:
-            escaped = int(self._tier.call(observables.count_escaped, self._escaping))
-        return {**seen, "escaped": escaped}
+        is_open = self._far < math.inf
+        escaped = self._tier.kernel(observables.count_escaped)(*self._escaping) if is_open else 0
+        return {**seen, "escaped": int(escaped)}
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
+        failed = f"the frame at {moment:g} s failed at particle"
+        position, size = self.state.position, self._scene.finite_size()
         # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
         if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
-            good = np.isfinite(self.state.position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
-            raise RunError(
-                f"the frame at {moment:g} s failed at particle {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}"
-            )
-        if seen["max_penetration"] > self._deepest:
-            self._require_inside(moment)
-
-    def _require_inside(self, moment: float) -> None:
-        # Far out in an open scene a position is as exact as its own size.
-        distances = self._scene.distances_outside(self.state.position)
-        magnitude = np.maximum(np.abs(self.state.position).max(axis=0), self._scene.finite_size())
-        outside = distances > self._deepest / self._scene.finite_size() * magnitude
+            good = np.isfinite(position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
+            raise RunError(f"{failed} {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
+        if seen["max_penetration"] <= self._deepest:
+            return
+        distances = self._scene.distances_outside(position)
+        # Far out in an open scene the round-off of a position is that of its own size.
+        outside = distances > self._deepest / size * np.maximum(np.abs(position).max(axis=0), size)
         if outside.any():
             wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
             raise RunError(
-                f"the frame at {moment:g} s failed at particle {particle}: it is {distances[wall, particle]:.3g} m "
-                f"outside surfaces[{wall}] ({type(self._scene.surfaces[wall]).__name__})"
+                f"{failed} {particle}: it is {distances[wall, particle]:.3g} m outside surfaces[{wall}] "
+                f"({type(self._scene.surfaces[wall]).__name__})"
             )
 
 

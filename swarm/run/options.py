@@ -1,4 +1,4 @@
-"""What is asked of a run: the keywords of `simulate`, the [run] table of a scene file, the options of `swarm run`."""
+"""Options of a run: the keywords of `simulate`, the [run] table of a scene file, the options of `swarm run`."""
 
 import os
 from dataclasses import dataclass, field
@@ -15,11 +15,9 @@ from ..particles import Particles
 from ..scene import Scene
 from .tiers import CHOICES
 
-# More often than this [s] a run would do little else than save checkpoints.
+# At shorter intervals [s] a run would do little but save checkpoints.
 _OFTEN = 0.01
-
-
-# What [run] does not have: it belongs to one session, not to the run.
+# Not a key of [run]: it belongs to one session, not to the run.
 _OF_A_SESSION = {"in_file": False}
 
 
@@ -71,7 +69,7 @@ class RunOptions:
 
     @property
     def times(self) -> FrameTimes:
-        """When the frames are."""
+        """The times of the frames."""
         return FrameTimes(self.until, self.every)
 
     @property
@@ -80,18 +78,18 @@ class RunOptions:
         return Storage(self.frames, self.precision, self.compression)
 
     def files(self) -> dict[str, Path | None]:
-        """The trajectory and its checkpoint, whether there will be one or not."""
+        """The trajectory and its checkpoint, which may never be made."""
         saved = None if self.trajectory is None else paths.checkpoint_of(self.trajectory)
         return {"trajectory": self.trajectory, "checkpoint": saved}
 
     def thread_count(self) -> int:
-        """How many threads compute."""
+        """Number of threads that compute."""
         if self.threads is not None:
             return self.threads
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     def checkpoint_file(self) -> Path | None:
-        """Where checkpoints are, if this run may have one."""
+        """The checkpoint; None without a trajectory."""
         if self.trajectory is None and (self.checkpoint is not None or self.resume):
             raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
         return self.files()["checkpoint"]
@@ -99,7 +97,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be run, and how; the particles are the run's own."""
+    """A run, checked; the particles are its own copy."""
 
     scene: Scene
     particles: Particles

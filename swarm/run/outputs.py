@@ -11,16 +11,16 @@ if TYPE_CHECKING:
 
 
 def recorder_of(task: Task) -> "Writer | None":
-    """What records for Rerun, if anything is to."""
+    """The writer of the recording, if there is one."""
     options = task.options
     if options.recording is None and not options.live:
         return None
     if options.resume:
         raise SceneError(
-            "recording and live cannot go on with a run that was stopped; leave them out, and make the recording from "
+            "recording and live cannot continue a run that was stopped; leave them out, and make the recording from "
             "the trajectory: swarm record RUN.h5 -o OUT.rrd"
         )
-    from ..output.extras import needed_by
+    from ..output.sources import needed_by
 
     with needed_by("a recording", "record"):
         from ..output.recording import RecordingWriter, Settings  # rerun takes half a second
@@ -32,7 +32,7 @@ def recorder_of(task: Task) -> "Writer | None":
 
 
 def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Beside | None":
-    """A context that gives the function which writes a frame, in a thread of its own."""
+    """A context that gives the function which writes a frame, in a background thread."""
     outputs = [(_trajectory(task, session), task.options.storage.kept()), (recorder, slice(None))]
     used = [(one, kept) for one, kept in outputs if one is not None]
     if not used:

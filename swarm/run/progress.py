@@ -62,47 +62,48 @@ def _bar() -> Iterator[Display]:
         TextColumn("{task.percentage:3.0f}%"),
         TextColumn("{task.fields[line]}"),
     )
-    recent = _Recent()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0, line="")
 
-        def frame(done: Any) -> None:
-            line = recent.frame(done)
-            if done.number > 0:  # the first frame is the start: kernels compile after it
-                bar.update(task, completed=done.time / done.until, line=line)
-
-        def within(moment: float, until: float) -> None:
-            bar.update(task, completed=moment / until, line=recent.within(moment, until))
+        def put(share: float, line: str) -> None:
+            bar.update(task, completed=share, line=line)
 
         def compiling(sentence: str) -> None:
             bar.update(task, line=sentence, refresh=True)
 
-        yield Display(frame, within, _A_MOMENT, compiling)
+        yield _put_by(put, _A_MOMENT, compiling)
 
 
 def lines(interval: float) -> Display:
-    """Prints a line when the last one is `interval` seconds old."""
-    recent, last = _Recent(), time.monotonic()
+    """Print a line when the last one is `interval` seconds old."""
+    last = time.monotonic()
 
-    def tell(share: float, line: str) -> None:
+    def put(share: float, line: str) -> None:
         nonlocal last
         now = time.monotonic()
         if now - last >= interval:
             print(f"{100.0 * share:.1f}%  {line}", file=sys.stderr, flush=True)
             last = now
 
-    def frame(done: Any) -> None:
-        line = recent.frame(done)
-        if done.number > 0:
-            tell(done.time / done.until, line)
-
-    def within(moment: float, until: float) -> None:
-        tell(moment / until, recent.within(moment, until))
-
     def compiling(sentence: str) -> None:
         print(sentence, file=sys.stderr, flush=True)
 
-    return Display(frame, within, interval, compiling)
+    return _put_by(put, interval, compiling)
+
+
+def _put_by(put: Callable[[float, str], None], every: float, compiling: Callable[[str], None]) -> Display:
+    """A display of the share that is done, and of a line about the last seconds."""
+    recent = _Recent()
+
+    def frame(done: Any) -> None:
+        line = recent.frame(done)
+        if done.number > 0:  # the first frame is the start: kernels compile after it
+            put(done.time / done.until, line)
+
+    def within(moment: float, until: float) -> None:
+        put(moment / until, recent.within(moment, until))
+
+    return Display(frame, within, every, compiling)
 
 
 class _Recent:
@@ -114,7 +115,7 @@ class _Recent:
         self._energy = ""
 
     def frame(self, frame: Any) -> str:
-        """Time, ETA, speed and energy error, now that this frame is done."""
+        """Time, ETA, speed and energy error after this frame."""
         self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
         if frame.number == 0:
             return ""
@@ -122,7 +123,7 @@ class _Recent:
         return self.within(frame.time, frame.until)
 
     def within(self, moment: float, until: float) -> str:
-        """The same on the way to a frame, speed and energy error being those of the last one."""
+        """The same within a frame, with speed and energy error of the last one."""
         elapsed, advanced = _note(self._moments, moment)
         line = f"{moment:.4g}/{until:.4g} s"
         if elapsed > 0.0 and advanced > 0.0:
@@ -135,7 +136,7 @@ class _Recent:
 
 
 def _note(values: deque[tuple[float, float]], value: float) -> tuple[float, float]:
-    """Add a value of now, forget those of long ago: (seconds, difference) from the first to the last."""
+    """Add a value, drop those before the window: (seconds, difference) from the first to the last."""
     now = time.perf_counter()
     values.append((now, value))
     while len(values) > 2 and now - values[0][0] > _WINDOW:

@@ -1,4 +1,4 @@
-"""One session of a run that may take several: what it takes up, when it saves, when it has to end."""
+"""One session of a run: where it starts, when it saves a checkpoint, when it ends. A run may take several."""
 
 import contextlib
 import dataclasses
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Session:
-    """From a start or a checkpoint to the end, a signal or the limit of wall time; no other holds the trajectory then.
+    """From a start or a checkpoint to the end, a signal or the wall time limit; it locks the trajectory.
 
     Without a trajectory nothing can be saved.
     """
@@ -54,7 +54,7 @@ class Session:
         return 0 if self._arrays is None or self._job is None else self._job.frame + 1
 
     def prepare(self, task: Task) -> None:
-        """Where this session begins: with a new file, or, to resume, where the checkpoint is, if there is one.
+        """Find where this session starts: at 0 s with a new file or, to resume, at the checkpoint if there is one.
 
         Raises:
             SceneError: the trajectory cannot become a new file; or it, or the checkpoint, is of another run, is damaged
@@ -82,12 +82,12 @@ class Session:
         if not self._resumes:
             return
         if self._path.exists():
-            self._take_up(self._trajectory, until)
+            self._resume(self._trajectory, until)
         elif self._trajectory.exists() and not overwrite:
-            self._refuse_to_begin_again(self._trajectory, until)
+            self._refuse_to_restart(self._trajectory, until)
 
-    def _refuse_to_begin_again(self, trajectory: Path, until: float) -> None:
-        """Say what the trajectory of a run without checkpoint is."""
+    def _refuse_to_restart(self, trajectory: Path, until: float) -> None:
+        """Raise an error that says what the trajectory without a checkpoint is."""
         from ..output.trajectory import load
 
         assert self._job is not None
@@ -108,7 +108,7 @@ class Session:
             f"{frames} frames of {trajectory}; to do so, overwrite it with --overwrite"
         )
 
-    def _take_up(self, trajectory: Path, until: float) -> None:
+    def _resume(self, trajectory: Path, until: float) -> None:
         from ..output import checkpoint
         from ..output.trajectory import load
 
@@ -118,21 +118,21 @@ class Session:
         saved.require_same(self._job, self._path)
         if not trajectory.exists():
             raise SceneError(
-                f"{self._path} needs its trajectory {trajectory}, which is gone; start afresh without resume"
+                f"{self._path} needs its trajectory {trajectory}, which does not exist; start again without resume"
             )
         with load(trajectory) as before:
             before.require_index()
             if len(before) <= saved.frame:
                 raise SceneError(
                     f"{trajectory} must hold {saved.frame + 1} frames, as {self._path} says, got {len(before)}: it was "
-                    "changed since; remove both to start afresh"
+                    "changed since; remove both to start again"
                 )
         if saved.time >= until:
             raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
         self._job, self._arrays = saved, arrays
 
     def restore(self, run: Run) -> None:
-        """Let the run be where the checkpoint is."""
+        """Put the run into the state of the checkpoint."""
         if self._arrays is not None and self._job is not None and self._path is not None:
             from ..output.checkpoint import require_fit
 
@@ -154,11 +154,11 @@ class Session:
 
     @property
     def latest(self) -> float:
-        """When to look in again [s of time.monotonic]."""
+        """When `look` is due [s of time.monotonic]."""
         return min(self._due, self._end)
 
     def stop(self) -> None:
-        """Let the next look end the session."""
+        """End the session at the next `look`."""
         self._stops = True
 
     def wall_time(self) -> float:
@@ -166,11 +166,11 @@ class Session:
         return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
 
     def look(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
-        """Save if it is time to, and end if it is: the last frame that is written, and the one under way.
+        """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
 
         Raises:
             KeyboardInterrupt: `stop` was called.
-            WallTimeError: the limit is over.
+            WallTimeError: the wall time limit is reached.
             FileError: the checkpoint cannot be written.
         """
         now = time.monotonic()
@@ -195,6 +195,6 @@ class Session:
         checkpoint.save(self._path, job, run.arrays())
 
     def finish(self) -> None:
-        """All frames are written: nothing is left to go on with."""
+        """Remove the checkpoint: all frames are written."""
         if self._path is not None and (self._saves or self._arrays is not None):
             self._path.unlink(missing_ok=True)

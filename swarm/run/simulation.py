@@ -41,7 +41,7 @@ class Result:
             (frames, surfaces).
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
-        multipliers: for a method with multipliers, what their loops took of each particle; else None.
+        multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
     """
 
     particles: Particles
@@ -84,7 +84,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             advance all blocks to the frame   (not for the first)
             observe; fail if a number is not finite, or a particle outside rigid walls
             copy the frame; a thread beside writes and flushes it
-            tell the progress display
+            update the progress display
             save a checkpoint if one is due (within a long frame too)
 
     Args:
@@ -95,25 +95,25 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
-        record_particles: at most so many are recorded, evenly chosen.
-        record_color: what colours them, "speed" or "energy-error".
-        record_megabytes: how large the recording may become, above 0: of too many frames every k-th is recorded.
+        record_particles: the most particles recorded, evenly chosen.
+        record_color: what their colour shows, "speed" or "energy-error".
+        record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
         progress: True for a progress bar, or a function that is called with every `Frame`.
-        overwrite: replace an existing recording, and an existing trajectory as soon as the first frame is whole.
+        overwrite: replace an existing recording, and an existing trajectory as soon as the first frame is complete.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
-        block_size: particles that a thread takes on at once. Results do not depend on it.
+        block_size: particles that a thread takes at a time. Results do not depend on it.
         frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
         precision: "float64", or "float32" for frames of half the size; observables and checkpoints stay exact.
         compression: of the frames, "none", "gzip" or "lzf".
-        checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none is made. It lies beside
-            the trajectory, as TRAJECTORY.checkpoint, until the run is complete.
-        resume: go on from that checkpoint, with the same bits as if the run had never stopped; begin where there is
-            neither a checkpoint nor a trajectory.
+        checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none. It is the
+            file TRAJECTORY.checkpoint, until the run is complete.
+        resume: continue from that checkpoint, with the same bits as if the run had never stopped; start a new run if
+            there is neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops.
         compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
-            and what is not done after about a second goes on compiled. "always": compiled from the start. "never":
+            and after about a second the rest of the run is compiled. "always": compiled from the start. "never":
             plain Python only.
 
     Returns:
@@ -124,7 +124,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         FileError: the trajectory or the recording cannot be written, or another run is writing it.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
-        WallTimeError: the wall time is over; the frames before it are in the trajectory.
+        WallTimeError: the wall time limit is reached; the frames before it are in the trajectory.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -132,7 +132,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    # Here are the names of the keywords alone.
+    # So far the only local names are the arguments.
     keywords = {name: value for name, value in locals().items() if name not in ("scene", "particles", "method")}
     return carry_out(scene, particles, method, RunOptions(**keywords))
 
@@ -173,16 +173,21 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
 
 
 def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", show: "Display") -> list[dict[str, Any]]:
-    """All frames of this session; what was seen of each, where no trajectory holds it."""
+    """All frames of this session: their observables, if no trajectory holds them."""
     history: list[dict[str, Any]] = []
-    until, writing = task.options.until, writer or contextlib.nullcontext(lambda *frame: None)
-    with run, writing as write:
-        for step in task.options.times:
-            number, _before, moment = step
+    until, span_of = task.options.until, task.method.span
+    with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
+        for number, before, moment in task.options.times:
             session.require_same_time(number, moment)
             if number < session.first:
                 continue
-            _reach(step, task, run, session, writer, show)
+            if number == 0:
+                run.observe()
+            else:
+                span = span_of("time", moment) - span_of("time", before)
+                while not run.advance(span, moment, *_meanwhile(session, writer, show)):
+                    show.within(before + run.share_done(span) * (moment - before), until)
+                    session.look(run, writer, number - 1, before, moment)
             seen = {"time": moment, **run.seen()}
             run.require_admissible(seen, moment)
             if task.options.trajectory is None:
@@ -194,24 +199,13 @@ def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", sho
     return history
 
 
-def _reach(
-    step: tuple[int, float, float], task: Task, run: Run, session: Session, writer: "Beside | None", show: "Display"
-) -> None:
-    """Advance from one frame to the next, and observe it; the first is the start."""
-    number, before, moment = step
-    if number == 0:
-        run.observe()
-        return
-    span = task.method.span("time", moment) - task.method.span("time", before)
-    while not run.advance(
-        span, moment, writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
-    ):
-        show.within(before + run.share_done(span) * (moment - before), task.options.until)
-        session.look(run, writer, number - 1, before, moment)
+def _meanwhile(session: Session, writer: "Beside | None", show: "Display") -> tuple[float, float]:
+    """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
+    return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
 
 
 def _require_room(task: Task, session: Session) -> None:
-    """Raise a SceneError where the frames do not fit."""
+    """Raise a SceneError if the frames do not fit on the disk or in memory."""
     options, storage = task.options, task.options.storage
     numbers, packed = storage.bytes_of(len(task.particles)), storage.compression != "none"
     options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed)
@@ -222,7 +216,7 @@ def _columns(history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
 
 
 def _read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
-    """All frames of all sessions. They are not kept in memory too, which would grow without end."""
+    """All frames of all sessions. During the run they are not kept in memory, which would grow without limit."""
     from ..output.trajectory import load
 
     with load(trajectory) as written:

@@ -1,4 +1,4 @@
-"""Two tiers of kernels with the same bits: in plain Python, which begins at once, and compiled, where that pays.
+"""Two tiers of kernels with the same bits: plain Python, which starts at once, and compiled, where that pays.
 
 Plain Python takes 30 to 150 us an impact, the compiler 5 to 20 s for a new kind of scene.
 """
@@ -7,52 +7,47 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from ..contact.regularisation import Power
 from ..kernel import cache
-from ..surfaces.formulas.march import OwnNumbers
+from ..surfaces.formulas.numbers import OwnNumbers
 
 CHOICES = ("auto", "always", "never")
 # Seconds of plain Python after which a run compiles its kernels.
 _PATIENCE = 1.0
-# More particles than this come to a few impacts each in that time: nearly all of such a run is to be compiled anyway.
+# In that time more particles than this have a few impacts each: nearly all of such a run is compiled anyway.
 _FEW = 2000
 
 
 class Tier:
-    """The tier that a run is in.
+    """The tier of a run.
 
     Args:
         choice: "auto": compiled where the kernels are found compiled, else in plain Python for about a second first;
             "always" or "never" compiled.
-        numbers: what is given to the kernels. Where it calls functions of a library, whose last bit is not the same in
-            both tiers, "auto" compiles at once, since the result must not depend on the wall time.
-        particles: how many there are.
+        numbers: the arguments of the kernels. Where they call library functions, whose last bit may differ between
+            the tiers, "auto" compiles at once: the result must not depend on the wall time.
+        particles: their number.
     """
 
     def __init__(self, choice: str, numbers: Any, particles: int) -> None:
         patience = 0.0 if particles > _FEW or not _same_bits(numbers) else _PATIENCE
-        # Seconds that the run may still spend in plain Python.
+        # Time left for plain Python [s].
         self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
-        # What is called once at the start is not worth its compilation.
         self.is_plain = self.left > 0.0
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
-        """Choose the tier of the calls that follow, kernels and their arguments; whether it is another than before."""
+        """Choose the tier for the next calls, kernels and their arguments; whether it has changed."""
         before, may = self.is_plain, self.left > 0.0
         self.is_plain = may and (self.left == math.inf or not all(cache.is_compiled(*call) for call in calls))
         return self.is_plain != before
 
-    def call(self, kernel: Any, arguments: tuple[Any, ...]) -> Any:
-        """Call a kernel in this tier."""
-        # As in compiled kernels: 1/0 is an infinity, which a select throws away, and no warning.
-        with np.errstate(all="ignore"):
-            return (cache.in_python(kernel) if self.is_plain else kernel)(*arguments)
+    def kernel(self, kernel: Any) -> Any:
+        """The function that this tier calls for a kernel."""
+        return cache.in_python(kernel) if self.is_plain else kernel
 
 
 def _same_bits(numbers: Any) -> bool:
-    """Whether kernels of these numbers, nested tuples, are made of + - * / and sqrt alone, as far as is known."""
+    """Whether the kernels of these numbers, nested tuples, are known to use + - * / and sqrt alone."""
     if not isinstance(numbers, tuple):
         return True
     kind = type(numbers)

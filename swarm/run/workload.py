@@ -1,4 +1,4 @@
-"""How many impacts a run will take, from the flights of a few particles: before it, in plain Python."""
+"""An estimate of the impacts of a run, from the flights of a few particles, in plain Python."""
 
 import logging
 import math
@@ -19,16 +19,16 @@ from ..surfaces import fold as walls
 from ..surfaces.fold import Chain
 
 _LOG = logging.getLogger("swarm")
-# A particle takes some 10 ns an impact: minutes a frame, in which nothing is seen; and days of a processor.
+# At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
 _MOST_A_FRAME, _MANY = 1e10, 1e13
-# Particles whose flights are looked at, and parts of a fall until its hit is known.
+# Particles whose flights are computed, and most parts of a fall until its hit is known.
 _PARTICLES, _PARTS = 8, 8
 # Chords of a walk through the volume, and how many of the last of them count.
 _CHORDS, _COUNTED = 60, 30
 
 
 class Flights(NamedTuple):
-    """Typical time from impact to impact [s], and the wall that is met most."""
+    """Typical time from impact to impact [s], and the wall that is hit most often."""
 
     between: float
     wall: int
@@ -37,14 +37,14 @@ class Flights(NamedTuple):
 def check(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
     """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
     impact = method.time_of_impact()
-    # Where energy is lost particles come to rest: what comes later is no part of the first flights.
+    # Where energy is lost particles come to rest: the first flights say nothing of the later ones.
     if impact is None or scene.restitution() is not None:
         return
     with np.errstate(all="ignore"):
         found = _of_particles(scene, particles, impact)
         if not _is_much(found, particles, until, every):
             return
-        # They may have started in a narrow corner, and leave it: what matters is the volume around.
+        # They may start in a narrow corner and leave it: then the volume around decides.
         found = max(found, _of_volume(scene, particles, impact))
     if every > _MOST_A_FRAME * found.between:
         i = scene.owners()[found.wall]
@@ -67,7 +67,7 @@ def _is_much(found: Flights, particles: Particles, until: float, every: float) -
 
 
 def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
-    """Of the flights that some particles are on at the start, from their last impact to the next."""
+    """From the flights of some particles at the start, from the impact before it to the one after it."""
     chain, pull, seen = scene.chain(), scene.pull(), []
     for i in _chosen(particles):
         position, velocity = particles.position[:, i], particles.velocity[:, i]
@@ -80,9 +80,9 @@ def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
 
 
 def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
-    """Of the chords of the volume around some particles: a walk from a random point of one to that of the next.
+    """From the chords of the volume around some particles: a random walk from chord to chord.
 
-    Between two of them it goes along the wall, which leads out of a narrow corner, but not of a narrow slit.
+    Between two chords it moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
     """
     chain, random, seen = scene.chain(), np.random.default_rng(0), []
     pull = math.hypot(*(scene.gravity or (0.0,)))
@@ -107,7 +107,7 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
 
 
 def _chord(chain: Chain | None, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
-    """The chord through a point, in units of the vector along it: its length, what is ahead, and the wall there."""
+    """The chord through a point, in units of the vector along it: its length, the part ahead, and the wall there."""
     (ahead, wall), (behind, _wall) = _hit(chain, None, point, way), _hit(chain, None, point, -way)
     return ahead + behind, ahead, wall
 
@@ -119,7 +119,7 @@ def _chosen(particles: Particles) -> list[int]:
 def _hit(
     chain: Chain | None, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> tuple[float, int]:
-    """The time to the first hit and its wall, infinite where it is not found soon."""
+    """The time to the first hit and its wall, infinite if it is not found in a few parts."""
     total = 0.0
     gravity = np.zeros(3) if pull is None else np.array(pull)
     for _part in range(_PARTS):

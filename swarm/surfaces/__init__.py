@@ -7,7 +7,9 @@ others have a default. Then name the class in ALL_SURFACES below. examples/own_s
 method needs a function that is missing, an error says so before the run.
 """
 
-# These only register their definitions.
+# First, so that what follows from `bend` and from `hessian` is registered with them.
+from . import march as _march  # noqa: F401
+from . import newton as _newton  # noqa: F401
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes import rotated as _rotated  # noqa: F401

@@ -18,10 +18,10 @@ MORE_STEPS = 16
 # A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
 _CLOSE = 1e-16
 # A fall at a solid from more than this many of its sizes away ends where it has come this many times nearer: the
-# coefficients of the level know the place only to round-off of the distance, and are made again from there. (To end it
-# on the way there, whether or not it comes near, cost a fall in a sphere with a small ball 6 times its time.)
+# round-off of the level's coefficients is that of the distance, so they are computed anew from there. (To end every
+# such fall on the way, even one that misses, made a fall in a sphere with a small ball 6 times slower.)
 _FAR = 32.0
-# The length of a last step that found no hit: no time is changed by it.
+# Length of a last step that found no hit: too short to change a time.
 _NO_HIT = float(np.finfo(np.float64).tiny)
 
 

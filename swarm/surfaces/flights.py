@@ -13,7 +13,7 @@ from .fold import Chain, outside
 class Hit(NamedTuple):
     """Time of a hit and the wall's number.
 
-    The number is -1 where the flight is surely free until then, and more is not known yet.
+    The number is -1 where the flight is surely free until then, and what comes after is not known yet.
     """
 
     time: float
@@ -42,14 +42,8 @@ def hit(gravity, surface, r, v):
     raise NotImplementedError
 
 
-@hit.register(Nothing)
-def _(gravity, surface, r, v):
-    return contract.first_hit(surface, r, v)
-
-
-@hit.register(Gravity)
-def _(gravity, surface, r, v):
-    return contract.falling_hit(surface, r, v, as_vector(gravity))
+hit.register(Nothing, lambda gravity, surface, r, v: contract.first_hit(surface, r, v))
+hit.register(Gravity, lambda gravity, surface, r, v: contract.falling_hit(surface, r, v, as_vector(gravity)))
 
 
 @by_type
@@ -64,9 +58,7 @@ def _(chain, gravity, r, v):
     return _sooner(time, found, first_hit(chain.rest, gravity, r, v))
 
 
-@first_hit.register(Nothing)
-def _(chain, gravity, r, v):
-    return NEVER
+first_hit.register(Nothing, lambda chain, gravity, r, v: NEVER)
 
 
 @inlined
@@ -134,9 +126,7 @@ def _(chain, course, row, lane):
     return _sooner(course[row + _TIME, lane], found, end_fall(chain.rest, course, row + COURSE, lane))
 
 
-@end_fall.register(Nothing)
-def _(chain, course, row, lane):
-    return NEVER
+end_fall.register(Nothing, lambda chain, course, row, lane: NEVER)
 
 
 # --- Of one wall, and of all but one ---------------------------------------------------------------------
@@ -156,9 +146,7 @@ def _(chain, gravity, wall, r, v):
     return select(here, time, other), (here & found) | ((not here) & found_other)
 
 
-@hit_of.register(Nothing)
-def _(chain, gravity, wall, r, v):
-    return math.inf, True
+hit_of.register(Nothing, lambda chain, gravity, wall, r, v: (math.inf, True))
 
 
 @by_type
@@ -167,9 +155,7 @@ def other_hit(chain, wall, r, v):
     raise NotImplementedError
 
 
-@other_hit.register(Chain)
-def _(chain, wall, r, v):
-    return _other_hit(chain.rest, chain, wall, r, v)
+other_hit.register(Chain, lambda chain, wall, r, v: _other_hit(chain.rest, chain, wall, r, v))
 
 
 @by_type
@@ -177,15 +163,9 @@ def _other_hit(rest, chain, wall, r, v):
     raise NotImplementedError
 
 
-@_other_hit.register(Nothing)
-def _(rest, chain, wall, r, v):
-    # The only wall has no other: without this the compiler would compute its hit and throw it away at run time.
-    return NEVER
-
-
-@_other_hit.register(Chain)
-def _(rest, chain, wall, r, v):
-    return _hit_but(chain, wall, r, v)
+# The only wall has no other: without this the compiler would compute its hit and throw it away at run time.
+_other_hit.register(Nothing, lambda rest, chain, wall, r, v: NEVER)
+_other_hit.register(Chain, lambda rest, chain, wall, r, v: _hit_but(chain, wall, r, v))
 
 
 @by_type
@@ -201,9 +181,7 @@ def _(chain, wall, r, v):
     return Hit(select(use, other.time, time), select(use, other.wall + 1.0, 0.0))
 
 
-@_hit_but.register(Nothing)
-def _(chain, wall, r, v):
-    return NEVER
+_hit_but.register(Nothing, lambda chain, wall, r, v: NEVER)
 
 
 # --- Free time, with and without gravity -----------------------------------------------------------------
@@ -220,9 +198,7 @@ def _(gravity, chain, r, v):
     return select(outside(chain, -1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
 
 
-@free_time.register(Gravity)
-def _(gravity, chain, r, v):
-    return safe_time(chain, r, v, as_vector(gravity))
+free_time.register(Gravity, lambda gravity, chain, r, v: safe_time(chain, r, v, as_vector(gravity)))
 
 
 @by_type
@@ -238,6 +214,4 @@ def _(chain, r, v, pull):
     return select(other < time, other, time)
 
 
-@safe_time.register(Nothing)
-def _(chain, r, v, pull):
-    return math.inf
+safe_time.register(Nothing, lambda chain, r, v, pull: math.inf)

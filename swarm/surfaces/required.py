@@ -1,7 +1,7 @@
 """What a surface must give for what is done with it: asked before anything is compiled, and said in one sentence.
 
-Which functions a definition in contract.py is made of is read from its code. One that has no definition there, such as
-`hessian`, must be given where it is asked for, or something that is made of it is.
+Which functions a definition in contract.py, march.py or newton.py is made of is read from its code. One that has no
+definition there, such as `hessian`, must be given where it is asked for, or something that is made of it is.
 """
 
 import types
@@ -9,19 +9,22 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..errors import SceneError
-from . import contract
+from . import contract, march, newton
 from .fold import Chain
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface
 
-# Their definitions hold for the inner function q = phi only: who gives another q gives these too.
+# Their definitions hold for the inner function q = phi only: a surface with another q registers these too.
 _OF_PHI = (contract.gap_of, contract.gap_slope, contract.slope)
 # What a solid of several parts asks of each.
 _OF_PARTS = (
     contract.phi, contract.gradient, contract.distance, contract.gap_scale, contract.unit_normal, contract.first_hit,
 )  # fmt: skip
 _DESCRIPTION = ("size", "bounds", "extent")
+# Definitions that follow from others are in these modules and in contract.py; their helpers are read too.
+_LOOPS = (march, newton)
+_OWN = tuple(module.__name__ for module in (contract, *_LOOPS))
 
 
 def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[Any]) -> None:
@@ -71,7 +74,7 @@ def _lacking(wall: Any, function: Any) -> Iterator[str]:
     definition = function.dispatch(type(wall))
     if function is contract.falling_hit and contract.is_quartic(wall) and not _gives(wall, contract.course):
         yield _named(contract.course)
-    if definition.__module__ != contract.__name__:
+    if definition.__module__ not in _OWN:
         return
     if function in _OF_PHI and _gives(wall, contract.inner):
         yield f"{_named(function)} for its `inner`"
@@ -86,20 +89,22 @@ def _lacking(wall: Any, function: Any) -> Iterator[str]:
 
 
 def _names_in(definition: types.FunctionType) -> Iterator[str]:
-    """The names that a definition uses, in the functions of contract.py that it calls too."""
+    """The names that a definition uses, in the loops that it calls too."""
     for name in definition.__code__.co_names:
         yield name
-        called = getattr(contract, name, None)
-        is_helper = isinstance(called, types.FunctionType) and not hasattr(called, "dispatch")
-        if is_helper and called.__module__ == contract.__name__:
-            yield from _names_in(called)  # type: ignore[arg-type]
+        for module in _LOOPS:
+            called = vars(module).get(name)
+            if isinstance(called, types.FunctionType) and called.__module__ == module.__name__:
+                yield from _names_in(called)
 
 
 def _gives(wall: Any, function: Any) -> bool:
-    return bool(function.dispatch(type(wall)).__module__ != contract.__name__)
+    return function.dispatch(type(wall)).__module__ not in _OWN
 
 
 def _named(function: Any) -> str:
+    if function in (contract.push, contract.rise, contract.resolve):
+        return "contract.hessian"
     name = f"contract.{function.__name__}"
     follows = function in (contract.first_hit, contract.falling_hit)
     return f"{name} (or contract.bend, from which it follows by safe steps)" if follows else name

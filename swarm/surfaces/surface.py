@@ -13,6 +13,8 @@ from ..kernel.vector import Vec, vec
 from . import contract
 from . import rotation as rotations
 
+# A tilt of an axis this small is the round-off of a rotation.
+TILT = 1e-15
 SIDES = {"inside": 1.0, "outside": -1.0}
 
 Box = tuple[Vector, Vector]
@@ -120,6 +122,13 @@ def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
     middle, half = (np.array(box[0]) + box[1]) / 2.0, (np.array(box[1]) - box[0]) / 2.0
     middle, half = center + matrix @ (middle - center), np.abs(matrix) @ half
     return tuple((middle - half).tolist()), tuple((middle + half).tolist())
+
+
+def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:
+    """Half extents along x, y, z of an ellipsoid; an infinite semi-axis makes a cylinder of it."""
+    tilts = np.where(abs(axes) > TILT, axes, 0.0)
+    x, y, z = (math.hypot(*(n * a for n, a in zip(row, semi_axes, strict=True) if n)) for row in tilts.tolist())
+    return x, y, z
 
 
 def farthest(point: Vector) -> float:

@@ -78,7 +78,7 @@ def size(vector):
 
 
 def scalar_form(law, radius, r0, r1):
-    """The paper's (9) for the cavity |r| <= radius, as it stands there: 0/0 where |r1| = |r0|."""
+    """The paper's (9) for the cavity |r| <= radius, as written there: 0/0 where |r1| = |r0|."""
     q0, q1 = r0 @ r0, r1 @ r1
     phi0, phi1 = (call(laws.constraint, law, math.sqrt(q) - radius) for q in (q0, q1))
     return (phi1 - phi0) / (q1 - q0) * (r0 + r1)
@@ -433,7 +433,7 @@ def test_reaction_of_the_mean_value_form_solves_its_step(name, law):
 @pytest.mark.parametrize("name", CONVEX)
 @pytest.mark.parametrize("law", SMOOTH[:3], ids=map(exponent_of, SMOOTH[:3]))
 def test_reaction_of_the_mean_value_form_just_below_the_surface(name, law):
-    """A step that ends (or starts) in the wall by a small part of its length is balanced, or said to be unsolved.
+    """A step that ends (or starts) in the wall by a small part of its length is balanced, or reported as unsolved.
 
     For exponents near 1 Phi' rises there faster than beta has digits. The composite form has no such limit.
     """

@@ -333,7 +333,7 @@ def contact_on(name, depth, acceleration, exponent=1.0, tolerance=1e-10):
 
 @every_surface
 def test_state_two_does_not_converge(name):
-    """From inside lambda grows without end, and the energy misses lambda Phi1."""
+    """From inside lambda grows without bound, and the energy misses lambda Phi1."""
     loop = contact_on(name, 5e-3, "none")
     assert not loop.converged
     assert loop.sweeps == 50

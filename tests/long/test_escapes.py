@@ -1,8 +1,8 @@
-"""1e9 impacts in all kinds of scenes: no particle is ever outside of its walls, no energy is lost.
+"""1e9 impacts in scenes of all kinds: no particle leaves its walls, and no energy is lost.
 
-At every frame no particle is outside any wall by more than 1e-12 of the scene's size, and the energy of every particle,
-with what restitution took of it, is that of the start to 1e-11. The bulk is flown in the scenes whose impacts cost
-nanoseconds; the others fly a million and more. `pytest -m long -s` prints what was counted.
+At every frame no particle is outside a wall by more than 1e-12 of the scene's size, and the energy of every particle,
+plus what restitution dissipated, is that of the start to 1e-11. Most impacts are in the scenes where one costs
+nanoseconds; the others have a million and more. `pytest -m long -s` prints the counts.
 """
 
 import math
@@ -18,7 +18,7 @@ from swarm import scene_file
 pytestmark = pytest.mark.long
 
 FILES = sorted((Path(__file__).parents[2] / "examples" / "scenes").glob("*.toml"))
-# Soft walls let particles in, by design.
+# Particles enter soft walls by design.
 SHIPPED = [path for path in FILES if isinstance(scene_file.read(path).method, swarm.Impact)]
 OUTSIDE, LOST = 1e-12, 1e-11
 FRAMES = 50
@@ -28,7 +28,7 @@ TURN = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
 DOWN = (0.3, -0.2, -9.81)
 LID = swarm.Plane((0.0, 0.0, 1.0), 0.6)
 
-# Scenes, and how many impacts each flies at least. Those of a contact step or of little gravity are as fast.
+# Scenes, gravity, and the least number of impacts in each.
 SCENES = {
     "sphere": ([swarm.Sphere(0.5)], None, 250e6),
     "ellipsoid": ([swarm.Ellipsoid((0.3, 0.4, 0.6), (0.1, 0.2, 0.3), rotation=TURN)], None, 250e6),
@@ -67,7 +67,7 @@ COUNTED = {}
 
 
 def checked(scene, particles, method, until, name):
-    """Run to `until` and look at every frame: the number of impacts."""
+    """Run to `until` and check every frame. Returns the number of impacts."""
     result = swarm.simulate(scene, particles, method, until=until, every=until / FRAMES, threads=2, progress=False)
     seen, size = result.observables, scene.finite_size()
     outside, lost = float(seen["max_penetration"].max()) / size, float(seen["energy_error"].max())
@@ -76,15 +76,15 @@ def checked(scene, particles, method, until, name):
     COUNTED[name] = [worst[0] + impacts, max(worst[1], outside), max(worst[2], lost)]
     assert outside <= OUTSIDE
     assert lost <= LOST
-    # Independently of the observables: no wall has the particle behind it.
+    # Independently of the observables: no particle is behind a wall.
     gaps = scene.gaps(result.particles.position)
     assert np.isfinite(result.particles.position).all()
     assert gaps.max() <= 1e-9
     return impacts
 
 
-def told(name, began, capsys):
-    """One line on what was counted."""
+def report(name, began, capsys):
+    """Print one line with the counts."""
     impacts, outside, lost = COUNTED[name]
     with capsys.disabled():
         print(
@@ -98,7 +98,7 @@ def told(name, began, capsys):
 def test_nothing_escapes_in_the_shipped_scenes(path, capsys):
     began, job = clock.perf_counter(), scene_file.read(path)
     checked(job.scene, job.particles(), job.method, job.run.until, path.stem)
-    told(path.stem, began, capsys)
+    report(path.stem, began, capsys)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -107,25 +107,25 @@ def test_nothing_escapes(name, capsys):
     surfaces, gravity, wanted = SCENES[name]
     scene = swarm.Scene(surfaces, gravity=gravity)
     particles = swarm.fill(scene, 2000, speed=1.0, seed=9)
-    # A resting particle slides in as many steps as it likes: coarse ones are as good to escape from.
+    # Particles come to slide: coarse sliding steps are cheap, and test escapes as well as fine ones.
     method = swarm.Impact(shortest_flight=1e-3) if gravity else swarm.Impact()
     trial = 2.0
     impacts = checked(scene, particles, method, trial, name)
     if impacts < wanted:
-        # Losses bring impacts to an end, or slides to no end.
+        # With losses impacts end, or sliding does not.
         until = trial * min(wanted / max(impacts, 1), 1e7)
         if surfaces[0].restitution < 1.0:
             until = min(until, 50.0 * trial)
         else:
             until *= 1.1
         impacts = checked(scene, particles, method, until, name)
-    told(name, began, capsys)
+    report(name, began, capsys)
     assert impacts >= (wanted if surfaces[0].restitution == 1.0 else 1e4)
     assert math.isfinite(COUNTED[name][2])
 
 
-def test_they_are_a_billion(capsys):
-    """The last one: the sum over the others."""
+def test_the_sum_is_a_billion(capsys):
+    """Runs last: the sum over the other tests."""
     with capsys.disabled():
         print(f"\n{sum(impacts for impacts, _outside, _lost in COUNTED.values()):,} impacts, no escape", end="")
     assert sum(wanted for surfaces, _gravity, wanted in SCENES.values() if surfaces[0].restitution == 1.0) >= BILLION

@@ -21,77 +21,44 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from roots import EARLY, EXACT, MISSED, TOUCHED, Course, Exact, Terms, exact_course, judge, judge_all
+from conftest import TURN, WALLS
+from exact import EARLY, EXACT, MISSED, NEAR, TOUCH, TOUCHED, Course, Terms, exact_course, judge, levels
+from roots import Courses, judge_all
 
 import swarm
+from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import column, square, vec
 from swarm.surfaces import contract
 from swarm.surfaces.flights import first_hit
 from swarm.surfaces.fold import chain_of
-from swarm.surfaces.formulas.march import OwnNumbers
-from swarm.surfaces.rotation import Rotated
-from swarm.surfaces.shapes.capsule import CapsuleNumbers
-from swarm.surfaces.shapes.rotated import own
-from swarm.surfaces.shapes.solid import SolidNumbers
-from swarm.surfaces.shapes.torus import TorusNumbers
 
 pytestmark = pytest.mark.long
 
 FLIGHTS = 100_000
 EXACTLY = 1000  # straight, and as many falling
 SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
-# Of the time or the crossing time; of the size of the level's terms.
-NEAR, TOUCH = 1e-12, 1e-14
 # Legs of a flight at most, and sizes from the surface within which it is followed.
 LEGS, FAR = 100, 30.0
 
-TURN = {"axis": (1.0, -2.0, 3.0), "angle": 1.2}
 CENTER = np.array([0.2, -0.3, 0.1])
 AXIS = (1.0, 0.5, -1.0)
-
-
-def quadric(diagonal, linear=(0.0, 0.0, 0.0), constant=0.0, turn=TURN):
-    return lambda s, **more: swarm.Quadric(
-        np.diag(diagonal) / s**2, np.array(linear) / s, constant, CENTER * s, rotation=turn, **more
-    )
-
-
-def formula(turn):
-    return lambda s, **more: swarm.Formula(
+# Those of the table that differ in more than their side, and what has several walls or stands along an axis.
+BODIES = {
+    **{name: WALLS[name] for name in ("sphere", "ellipsoid", "rotated ellipsoid", "slab", "pipe", "cylinder", "bowl")},
+    **{name: WALLS[name] for name in ("shifted egg", "one sheet", "two sheets", "saddle", "torus", "rotated torus")},
+    **{name: WALLS[name] for name in ("capsule", "rod", "formula")},
+    "box": lambda s: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s),
+    "rotated box": lambda s: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s, rotation=TURN),
+    "can": lambda s: swarm.Cylinder(0.4 * s, AXIS, 0.9 * s, CENTER * s),
+    "cone": lambda s: swarm.Cone(0.6, AXIS, CENTER * s),
+    "rotated formula": lambda s: swarm.Formula(
         "(x/a)**2 + (y/b)**2 + (z/c)**4 - 1",
         parameters={"a": 0.5 * s, "b": 0.7 * s, "c": 0.6 * s},
-        center=tuple(CENTER * s),
-        rotation=turn,
-        **more,
-    )
-
-
-BODIES = {
-    "sphere": lambda s, **more: swarm.Sphere(0.7 * s, CENTER * s, **more),
-    "ellipsoid": lambda s, **more: swarm.Ellipsoid((0.4 * s, 0.5 * s, 0.8 * s), CENTER * s, **more),
-    "rotated ellipsoid": lambda s, **more: swarm.Ellipsoid(
-        (0.4 * s, 0.5 * s, 0.8 * s), CENTER * s, rotation=TURN, **more
+        center=CENTER * s,
+        rotation=TURN,
     ),
-    "slab": lambda s, **more: swarm.Slab((1.0, 2.0, -2.0), 0.4 * s, CENTER * s, rotation=TURN, **more),
-    "box": lambda s, **more: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s, **more),
-    "rotated box": lambda s, **more: swarm.Box((0.5 * s, 0.4 * s, 0.3 * s), CENTER * s, rotation=TURN, **more),
-    "pipe": lambda s, **more: swarm.Cylinder(0.6 * s, center=CENTER * s, **more),
-    "oblique pipe": lambda s, **more: swarm.Cylinder(0.6 * s, AXIS, None, CENTER * s, **more),
-    "can": lambda s, **more: swarm.Cylinder(0.4 * s, AXIS, 0.9 * s, CENTER * s, **more),
-    "cone": lambda s, **more: swarm.Cone(0.6, AXIS, CENTER * s, **more),
-    "bowl": lambda s, **more: swarm.Paraboloid(0.3 * s, (0.0, 1.0, -1.0), CENTER * s, **more),
-    "egg": quadric((1.0, 2.0, 3.0), (0.5, -0.3, 0.7), -0.5),
-    "one sheet": quadric((1.0, 2.0, -1.5), constant=-0.5),
-    "two sheets": quadric((1.0, 2.0, -1.5), constant=0.5),
-    "saddle": quadric((1.0, -2.0, 0.0), (0.0, 0.0, -1.0), turn=None),
-    "torus": lambda s, **more: swarm.Torus(0.7 * s, 0.3 * s, CENTER * s, **more),
-    "rotated torus": lambda s, **more: swarm.Torus(0.7 * s, 0.3 * s, CENTER * s, rotation=TURN, **more),
-    "capsule": lambda s, **more: swarm.Capsule(0.5 * s, 0.6 * s, center=CENTER * s, **more),
-    "oblique capsule": lambda s, **more: swarm.Capsule(0.5 * s, 0.6 * s, AXIS, CENTER * s, **more),
-    "formula": formula(None),
-    "rotated formula": formula(TURN),
 }
 CASES = [("plane", "inside"), *itertools.product(BODIES, ("inside", "outside"))]
 
@@ -99,8 +66,9 @@ CASES = [("plane", "inside"), *itertools.product(BODIES, ("inside", "outside"))]
 def surface_of(name, side, scale):
     """One surface of the table, of this size."""
     if name == "plane":
-        return swarm.Plane((1.0, -2.0, 0.5), 0.3 * scale)
-    return BODIES[name](scale, side=side)
+        return WALLS[name](scale)
+    table = {**tables.table_of(BODIES[name](scale)), "side": side}
+    return tables.scene_of([table], None).surfaces[0]
 
 
 # --- Flights ---------------------------------------------------------------------------------------------
@@ -180,39 +148,7 @@ def falling_hits(chain, position, velocity, pull, times, index):
         times[i], index[i] = first_hit(chain, gravity, column(position, 0, i), column(velocity, 0, i))
 
 
-# --- The level along a flight ----------------------------------------------------------------------------
-
-
-def levels(surface, kind, position, velocity, half_pull):
-    """How the polynomials of a surface make its level, and these, as courses of `kind`."""
-    rows = [position, velocity] if half_pull is None else [position, velocity, half_pull]
-    path = vec(kind([kind.number(row[i]) for row in rows]) for i in range(3))
-    found = surface.walls()
-    body = found[0].body if isinstance(found[0], Rotated) else found[0]
-    if isinstance(body, SolidNumbers):
-        parts, rest = [], body.parts
-        while rest is not None:
-            parts, rest = [*parts, contract.level_of(rest.first, contract.inner(rest.first, path))], rest.rest
-        return 1, parts
-    if isinstance(body, (TorusNumbers, CapsuleNumbers, OwnNumbers)):
-        path = own(found[0], path) if isinstance(found[0], Rotated) else path
-        return _by_hand(surface, body, *(path - body.center))
-    return 0, [contract.level_of(wall, contract.inner(wall, path)) for wall in found]
-
-
-def _by_hand(surface, body, x, y, z):
-    """The same for what is no quadric."""
-    if isinstance(body, TorusNumbers):
-        # (|r|^2 + R^2 - a^2)^2 - 4 R^2 rho^2
-        major, minor = Fraction(body.major), Fraction(body.radius)
-        both = x * x + y * y + z * z + (major**2 - minor**2)
-        return 0, [body.side * (both * both - 4 * major**2 * (x * x + y * y))]
-    if isinstance(body, CapsuleNumbers):
-        radius2, up, down = Fraction(body.radius) ** 2, z - body.half, z + body.half
-        across = x * x + y * y - radius2
-        return 2, [body.side * across, body.side * (across + up * up), body.side * (across + down * down), up, -down]
-    a, b, c = (1 / Fraction(surface.parameters[name]) for name in "abc")
-    return 0, [body.side * (a**2 * (x * x) + b**2 * (y * y) + c**4 * (z * z * z * z) - 1.0)]
+# --- Judgement -------------------------------------------------------------------------------------------
 
 
 def units(scale, velocity, pull):
@@ -255,10 +191,11 @@ def judged(surface, scale, position, velocity, pull, times, found, tally, seed):
     """Verdicts of the answers to these flights; some of them once more in exact arithmetic."""
     unit = units(scale, velocity, pull)
     moved, half_pull = velocity * unit, 0.5 * pull * unit**2 if pull.any() else None
-    kind, courses = levels(surface, Course, position, moved, half_pull)
-    _, sizes = levels(surface, Terms, *(None if row is None else np.abs(row) for row in (position, moved, half_pull)))
-    high = _table(courses, lambda one: Course.number(one).high)
-    low = _table(courses, lambda one: Course.number(one).low)
+    walls = surface.walls()
+    kind, courses = levels(walls, Courses, position, moved, half_pull)
+    _, sizes = levels(walls, Terms, *(None if row is None else np.abs(row) for row in (position, moved, half_pull)))
+    high = _table(courses, lambda one: Courses.number(one).high)
+    low = _table(courses, lambda one: Courses.number(one).low)
     terms, scaled = _table(sizes, lambda one: one), times / unit
     verdicts, errors, residuals = np.zeros(times.size, np.int64), np.zeros(times.size), np.zeros(times.size)
 
@@ -286,7 +223,7 @@ def judged(surface, scale, position, velocity, pull, times, found, tally, seed):
 
 def _judge_exactly(surface, position, velocity, half_pull, time, terms, tally):
     rows = [None if row is None else [Fraction(float(one)) for one in row] for row in (position, velocity, half_pull)]
-    kind, courses = levels(surface, Exact, *rows)
+    kind, courses = levels(surface.walls(), Course, *rows)
     course = exact_course(kind, [course.parts for course in courses], terms, float(time))
     verdict, _error, _residual = judge(*course, float(time), True, NEAR, TOUCH)
     tally.exactly += 1

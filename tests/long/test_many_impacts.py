@@ -1,4 +1,4 @@
-"""1e5 impacts a particle: energy, the ellipsoid's integral, the walls."""
+"""1e5 impacts per particle: energy, Joachimsthal's integral, penetration."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_energy_over_1e5_impacts(name):
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid", "cut sphere", "ball in ellipsoid"])
 @pytest.mark.parametrize("part", [1e-9, 1e-6, 1e-3, 1e-1])
 def test_chords_over_1e5_impacts(name, part):
-    """The chord step reflects too: the same bar for every contact step, from 1e-9 to 0.1 of the crossing time."""
+    """The chord step reflects too: the same bounds for every contact step, from 1e-9 to 0.1 of the crossing time."""
     scene = scene_of(name)
     start = swarm.fill(scene, 100, speed=0.5, seed=21)
     result = run(scene, start, swarm.Impact(contact_step=part * scene.size() / 0.5), 160_000.0, 1000.0)
@@ -57,7 +57,7 @@ def test_penalty_over_1e5_steps(name, exponent):
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid", "cut sphere"])
 @pytest.mark.parametrize("contact_step", [0.0, 1e-4])
 def test_a_tangential_launch_slides_for_1e6_steps(name, contact_step):
-    """Along the wall, chord by chord: energy and walls as after impacts."""
+    """Along the wall, chord by chord: the same bounds of energy and penetration as after impacts."""
     scene = scene_of(name)
     wall = {"sphere": (0.5, 0.0, 0.0), "cut sphere": (0.5, 0.0, 0.0), "ellipsoid": (0.3, 0.0, 0.0)}[name]
     start = swarm.Particles([[part, part] for part in wall], [[0.0, 0.0], [0.5, 0.3], [0.0, 0.4]])

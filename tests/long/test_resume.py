@@ -1,4 +1,4 @@
-"""A run in several sessions is the run in one: every method, in scenes of every kind."""
+"""A run in several sessions equals the run in one, for every method in scenes of every kind."""
 
 import pytest
 from conftest import METHODS, SURFACES
@@ -21,13 +21,13 @@ SCENES = {
     "sphere, gravity": swarm.Scene([SURFACES["sphere"]()], DOWN),
     "box and ball, gravity": swarm.Scene([BOX, swarm.Sphere(0.1, side="outside")], DOWN),
 }
-# With springs a contact takes many passes; else it takes one.
+# A contact with springs takes many passes, a reflection one.
 EVERY = {"impact": 16.0, "impact, chord": 16.0}
 
 
 @pytest.mark.parametrize(
     ("scene", "method"),
-    # Steps that are cut at the impact know no gravity.
+    # Steps that are cut at the impact refuse gravity.
     [(s, m) for s in SCENES for m in METHODS if not ("gravity" in s and m == "augmented Lagrangian")],
 )
 def test_every_method_in_every_scene(tmp_path, scene, method):
@@ -36,6 +36,6 @@ def test_every_method_in_every_scene(tmp_path, scene, method):
 
 @pytest.mark.parametrize("gravity", [None, DOWN], ids=["no gravity", "gravity"])
 def test_losses(tmp_path, gravity):
-    """Each particle knows its energy; what it lost is in the checkpoint too."""
+    """The energy of each particle, without what it has lost, is in the checkpoint too."""
     scene = swarm.Scene([swarm.Sphere(0.5, restitution=0.98), swarm.Plane((0.0, 0.0, -1.0), 0.3)], gravity)
     require_resumed_is_whole(tmp_path, scene, swarm.Impact(shortest_flight=1e-2), n=300)

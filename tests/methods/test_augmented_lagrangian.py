@@ -152,7 +152,7 @@ def test_raise_names_the_contact(particles, keywords, parts):
 
 
 def test_count_goes_on():
-    """The contact is taken as it is, and counted."""
+    """The contact is accepted as it is, and counted."""
     result = simulate(SPHERE, STATE_TWO, method_of(on_unconverged="count"), 0.5, 0.025)
     assert result.observables["unconverged"].tolist() == [0] * 20 + [1]
     assert result.multipliers.unconverged.tolist() == [1]
@@ -268,7 +268,7 @@ def test_along_a_wall(name, position, velocity):
     assert result.observables["max_penetration"].max() <= 1e-14
 
 
-# --- What is told ----------------------------------------------------------------------------------------
+# --- Reports ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("adaptive", [False, True])

@@ -97,7 +97,7 @@ def test_a_corner_is_pushed_by_both_walls(rule):
 
 @every_rule
 def test_a_contact_changes_the_energy_and_penalty_does_not(rule):
-    """What they are here for: at dt sqrt(alpha/m) = 0.7 one bounce changes the energy by more than round-off."""
+    """Why they are here: at dt sqrt(alpha/m) = 0.7 one bounce changes the energy by more than round-off."""
     scene = swarm.Scene([swarm.Plane((1.0, 0.0, 0.0), 0.0)])
     changes = []
     for cls in (RULES[rule], swarm.Penalty):

@@ -1,4 +1,4 @@
-"""Frames written by a thread of their own: all of them, in order, as they were; what went wrong is raised."""
+"""Frames written by a background thread: all of them, in order, unchanged; its errors are raised."""
 
 import threading
 
@@ -11,7 +11,7 @@ from swarm.particles import State
 
 
 class Writer:
-    """Keeps what it is told to write, each frame when `waits` returns; fails at frame `fails`."""
+    """Keeps the frames, each when `waits` returns; fails at frame `fails`."""
 
     def __init__(self, fails=None, waits=lambda: None):
         self.fails, self.waits = fails, waits
@@ -37,12 +37,13 @@ def state_of(n=5):
     return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, nothing, nothing, nothing, None)
 
 
-@pytest.mark.parametrize("n", [5, 2_000_000])
-def test_every_frame_is_written_as_it_was(n):
+@pytest.mark.parametrize("memory", [beside._BYTES, 1], ids=["many copies", "one copy"])
+def test_every_frame_is_written_as_it_was(monkeypatch, memory):
     """The state goes on changing while a slow writer is behind: it writes no frame before the next has begun."""
-    changed, state = threading.Semaphore(0), state_of(n)
+    monkeypatch.setattr(beside, "_BYTES", memory)
+    changed, state = threading.Semaphore(0), state_of()
     writer = Writer(waits=changed.acquire)
-    with Beside(writer, n) as write:
+    with Beside(writer, 5) as write:
         for number in range(6):
             state.position[:], state.velocity[:] = number, -number
             if number > 0:

@@ -57,8 +57,8 @@ def everything(path):
     return [*told, *seen, *(part.shape for part in parts)]
 
 
-def require_right_or_said(path, expected):
-    """Whether it is said that the file is damaged, in one line that begins with it."""
+def require_right_or_reported(path, expected):
+    """Whether the file is reported as damaged, in one line that begins with its path."""
     try:
         assert everything(path) == expected
     except swarm.SceneError as error:
@@ -71,18 +71,18 @@ def require_right_or_said(path, expected):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_byte_that_was_flipped_is_harmless_or_said(files, tmp_path, kind):
+def test_a_flipped_byte_is_harmless_or_reported(files, tmp_path, kind):
     path, data, chosen = tmp_path / "run.h5", files[kind], random.Random(kind)
     path.write_bytes(data)
     expected, said = everything(path), 0
     first, later = chosen.sample(range(3000), 30), chosen.sample(range(3000, len(data)), 10)
     for place in (0, 9, *first, *later, data.index(b'kind = "sphere"'), data.index(b"EAIB") + 9):
         path.write_bytes(data[:place] + bytes([data[place] ^ chosen.choice((255, 1, 32))]) + data[place + 1 :])
-        said += require_right_or_said(path, expected)
+        said += require_right_or_reported(path, expected)
     assert said > 10
 
 
-def test_a_heap_in_which_hdf5_would_go_round_for_ever(files, tmp_path):
+def test_a_heap_in_which_hdf5_would_loop_forever(files, tmp_path):
     """The size of a text there, such that the next one seems to begin where there are zeros."""
     path, data = tmp_path / "run.h5", files["no frames"]
     place = data.index(b'kind = "impact"') - 8
@@ -106,17 +106,17 @@ def test_a_marked_file_is_read_and_a_damaged_one_waits_for_no_writer(files, whol
     assert everything(whole) == expected
     place = data.index(b"EAIB") + 9
     whole.write_bytes(data[:place] + b"?" + data[place + 1 :])
-    assert require_right_or_said(whole, expected)
+    assert require_right_or_reported(whole, expected)
 
 
 def test_what_was_cut_off_or_zeroed(files, whole):
     expected, data = everything(whole), files["none"]
     for size in (1, 7, 8, 47, 48, 500, 2000, 10_000, len(data) // 2, len(data) - 1):
         whole.write_bytes(data[:size])
-        assert require_right_or_said(whole, expected)
+        assert require_right_or_reported(whole, expected)
     for place in (0, 512, 1024, 2048, 2048 + 512):
         whole.write_bytes(data[:place] + bytes(512) + data[place + 512 :])
-        require_right_or_said(whole, expected)
+        require_right_or_reported(whole, expected)
 
 
 def replaced(name, value, **keywords):
@@ -170,7 +170,7 @@ STRANGE = {
 
 
 @pytest.mark.parametrize("name", STRANGE)
-def test_what_cannot_have_been_written_is_said(whole, name):
+def test_values_that_no_run_writes_are_reported(whole, name):
     change, message = STRANGE[name]
     with h5py.File(whole, "r+") as file:
         change(file)
@@ -284,7 +284,7 @@ def test_of_a_damaged_trajectory_there_is_no_half_recording(whole):
 
 @pytest.mark.parametrize("options", [{}, {"locking": False}, {"locking": True}, {"locking": "best-effort"}])
 def test_another_reader_in_the_same_process(whole, options):
-    """HDF5 wants the same flags of locking of all who open a file by the same driver."""
+    """HDF5 needs the same locking flags from everything that opens a file by the same driver."""
     with h5py.File(whole, "r", **options) as other, swarm.load(whole) as trajectory:
         assert len(trajectory) == len(other["parameters/time"]) == FRAMES
     with swarm.load(whole) as trajectory, h5py.File(whole, "r", **options) as other, swarm.load(whole) as again:
@@ -368,7 +368,7 @@ def test_a_checkpoint_that_was_cut_off_is_damaged(saved, tmp_path, size):
         {"following": []}, {"more": 1}, {"particles": None}, {"wall_time": float("inf")}, None, [], "job", 3,
     ],
 )  # fmt: skip
-def test_a_checkpoint_whose_job_is_none_is_damaged(saved, tmp_path, change):
+def test_a_checkpoint_without_a_job_is_damaged(saved, tmp_path, change):
     job, arrays, _data = saved
     path, table = tmp_path / "run.h5.checkpoint", vars(job)
     savez(path, job=json.dumps({**table, **change} if isinstance(change, dict) else change), **arrays)
@@ -426,7 +426,7 @@ def test_arrays_of_another_shape_are_damage(stopped, name):
 
 
 def test_a_run_does_not_go_on_in_a_damaged_file(stopped):
-    """The writer of HDF5 waits for ever where the index of chunks is damaged."""
+    """HDF5 hangs when it writes a file whose index of chunks is damaged."""
     data, place = stopped.read_bytes(), 0
     while (place := data.find(b"EAIB", place + 1)) > 0:
         stopped.write_bytes(data[: place + 9] + bytes([data[place + 9] ^ 255]) + data[place + 10 :])

@@ -141,7 +141,7 @@ def test_energy_errors_as_colours(tmp_path):
 
 
 @pytest.mark.parametrize("lost", [20_000, 10])
-def test_a_recording_that_was_cut_off_is_mended(run, tmp_path, lost):
+def test_a_truncated_recording_is_repaired(run, tmp_path, lost):
     whole = (run[0] / "run.rrd").read_bytes()
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(whole[:-lost])
@@ -150,17 +150,17 @@ def test_a_recording_that_was_cut_off_is_mended(run, tmp_path, lost):
             playback.Playback(cut)
     held, is_whole = playback.described(cut)
     assert not is_whole
-    mended = playback.repair(cut)
+    repaired = playback.repair(cut)
     assert playback.is_whole(cut)
-    assert mended.numbers == held.numbers == list(range(len(held.numbers)))
-    assert len(mended.numbers) > 5
-    for mine, theirs in zip(mended.frame(3), playback.Playback(run[0] / "run.rrd").frame(3), strict=True):
+    assert repaired.numbers == held.numbers == list(range(len(held.numbers)))
+    assert len(repaired.numbers) > 5
+    for mine, theirs in zip(repaired.frame(3), playback.Playback(run[0] / "run.rrd").frame(3), strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
 
 @pytest.mark.physics
 def test_kill_9_while_recording(tmp_path, request):
-    """What is left is mended, and holds frames as they were. After frame 400 the run waits for the kill."""
+    """What is left is repaired, and its frames are unchanged. After frame 400 the run waits for the kill."""
     code = (
         "import signal, swarm\n"
         "def tell(frame):\n"
@@ -180,14 +180,14 @@ def test_kill_9_while_recording(tmp_path, request):
     process.kill()
     process.communicate()
     assert not playback.is_whole(tmp_path / "run.rrd")
-    mended = playback.repair(tmp_path / "run.rrd")
+    repaired = playback.repair(tmp_path / "run.rrd")
     assert playback.is_whole(tmp_path / "run.rrd")
-    assert mended.numbers == list(range(len(mended.numbers)))
-    assert len(mended.numbers) > 100
+    assert repaired.numbers == list(range(len(repaired.numbers)))
+    assert len(repaired.numbers) > 100
     with swarm.load(tmp_path / "run.h5") as trajectory:
         for number in (0, 50, 100):
             kept = trajectory.frame(number).position[:, ::20].T.astype(np.float32)
-            np.testing.assert_array_equal(mended.frame(number)[0], kept)
+            np.testing.assert_array_equal(repaired.frame(number)[0], kept)
 
 
 def test_other_files_are_refused(tmp_path):
@@ -218,7 +218,7 @@ def test_refused_before_anything_is_touched(tmp_path):
 
 @pytest.mark.physics
 def test_a_full_disk_ends_the_run(tmp_path):
-    """A limit of the size of files stands in for the disk."""
+    """A limit on the size of files replaces a full disk."""
     code = (
         "import resource, signal, swarm\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"

@@ -76,16 +76,19 @@ def wait_for(path, frames):
 def test_a_file_being_written_can_be_read(tmp_path):
     """Every frame is flushed, so another process sees all frames so far."""
     path = tmp_path / "run.h5"
-    seen = []
+    code = "import swarm, sys\nfor line in sys.stdin: print(len(swarm.load(line.strip())), flush=True)"
+    with subprocess.Popen([sys.executable, "-c", code], stdin=-1, stdout=-1, text=True, bufsize=1) as reader:
+        seen = []
 
-    def look(frame):
-        if frame.number in (0, 3):
-            wait_for(path, frame.number + 1)
-            code = f"import swarm; print(len(swarm.load({str(path)!r})))"
-            seen.append(int(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
+        def look(frame):
+            if frame.number in (0, 3):
+                wait_for(path, frame.number + 1)
+                reader.stdin.write(f"{path}\n")
+                seen.append(int(reader.stdout.readline()))
 
-    particles = swarm.fill(SCENE, 5, speed=0.3)
-    swarm.simulate(SCENE, particles, METHOD, until=0.04, every=0.01, trajectory=path, progress=look)
+        particles = swarm.fill(SCENE, 5, speed=0.3)
+        swarm.simulate(SCENE, particles, METHOD, until=0.04, every=0.01, trajectory=path, progress=look)
+        reader.stdin.close()
     assert seen == [1, 4]
 
 

@@ -1,10 +1,10 @@
-"""What a kill, a full disk or a stranger's hand leaves of a trajectory: every frame that was reported as written."""
+"""After a kill, on a full disk or beside another process a trajectory keeps every frame that was reported written."""
 
+import contextlib
 import os
+import resource
 import shutil
-import subprocess
-import sys
-import textwrap
+import signal
 
 import h5py
 import numpy as np
@@ -135,7 +135,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
     assert cases > 100
 
 
-def test_frames_are_rows_whoever_writes_them(tmp_path):
+def test_sessions_write_the_same_rows(tmp_path):
     """A session that goes on from an older frame writes the same rows again: no gap, no duplicate."""
     path = tmp_path / "run.h5"
     for first, last in ((0, 12), (7, 20), (19, 25)):
@@ -169,41 +169,33 @@ def test_a_file_that_is_harmed_ends_the_run(tmp_path, harm, message):
         write([frame(1)])
 
 
-FULL = """
-    import resource, signal, sys
-    sys.path[:0] = {path!r}
-    from test_writer import frame, writer_of
-    from pathlib import Path
-    import swarm
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
-    number = 0
+@contextlib.contextmanager
+def files_limited_to(size):
+    """A write beyond this size of a file fails as on a full disk, in the middle of others."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
-        with writer_of(Path({file!r})) as write:
-            while number < 5000:
-                write([frame(number)])
-                number += 1
-                print(number, flush=True)
-    except swarm.FileError as error:
-        print("error:", error)
-"""
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
 
 
 @pytest.mark.parametrize("size", [20_000, *range(66_000, 74_000, 800), 100_001])
 def test_a_full_disk_loses_no_frame(tmp_path, size):
-    """The limit of a file's size does what a full disk does: a write in the middle of others fails."""
-    path = tmp_path / "run.h5"
-    code = textwrap.dedent(FULL).format(path=sys.path, file=str(path), size=size)
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
-    *numbers, error = told.stdout.split("\n")[:-1]
-    assert (told.returncode, told.stderr) == (0, "")
-    assert error == f"error: cannot write frame {len(numbers)} to {path}: File too large"
-    if not numbers:
+    path, count = tmp_path / "run.h5", 0
+    with pytest.raises(swarm.FileError) as told, files_limited_to(size), writer_of(path) as write:  # noqa: PT012
+        while count < 5000:
+            write([frame(count)])
+            count += 1
+    assert str(told.value) == f"cannot write frame {count} to {path}: File too large"
+    if not count:
         assert list(tmp_path.iterdir()) == []
         return
-    assert require_frames(path, len(numbers)) == len(numbers)
+    assert require_frames(path, count) == count
     with h5py.File(path) as file:
         assert file["particles/all/position/value"].shape[1:] == (N, 3)
     with writer_of(path, True) as write:
-        write([frame(number) for number in range(len(numbers), len(numbers) + 100)])
-    require_frames(path, len(numbers) + 100)
+        write([frame(number) for number in range(count, count + 100)])
+    require_frames(path, count + 100)

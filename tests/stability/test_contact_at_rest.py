@@ -20,7 +20,7 @@ def floor(restitution=1.0):
 
 @pytest.mark.parametrize("cls", [swarm.Penalty, swarm.Verlet, swarm.Midpoint, swarm.Trapezoidal])
 def test_springs_never_rest(cls):
-    """Laid on the floor it falls into it, twice as deep as its weight needs, and swings about that depth for ever."""
+    """Laid on the floor it sinks in, twice as deep as its weight needs, and oscillates about that depth without end."""
     passes = run(cls(DT, ALPHA), floor(), *FLOOR, 512.0)
     depths = np.array([-one.position[2] for one in passes])
     assert depths.max() == pytest.approx(2.0 * G / ALPHA, rel=0.02)

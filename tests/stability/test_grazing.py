@@ -1,4 +1,4 @@
-"""Grazing down to 1e-12 rad: reflections alone take for ever, steps leave the wall or fail; Impact slides along it."""
+"""Grazing down to 1e-12 rad: reflections alone never end, steps leave the wall or fail; Impact slides along it."""
 
 import math
 
@@ -34,7 +34,7 @@ def test_reflections_alone_cost_one_over_the_angle(angle):
     assert result.observables["impacts"][-1] / 5 == pytest.approx(number, rel=1e-3, abs=1.0)
 
 
-def test_soft_walls_let_it_go_round_outside():
+def test_with_soft_walls_it_circles_outside():
     """The spring must carry m v^2/R: Penalty keeps its energy, and stays outside by about m v^2/(alpha R)."""
     alpha = 1e4
     start = launch(1e-12)

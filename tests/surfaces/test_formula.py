@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import swarm
 from swarm import tables
 from swarm.surfaces import contract
-from swarm.surfaces.formulas import derivatives, march
+from swarm.surfaces.formulas import derivatives, numbers
 from swarm.surfaces.formulas.interval import Interval, bounds_of
 from swarm.surfaces.surface import UNBOUNDED
 
@@ -80,7 +80,7 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
         compared += 1
         (time, found), (expected, _) = (call(contract.first_hit, one, point, velocity) for one in (formula, other))
         assert found
-        # A flight that all but touches may hit for one and miss for the other.
+        # A flight that nearly touches may hit one and miss the other.
         if math.isfinite(time) and math.isfinite(expected):
             assert time == pytest.approx(expected, rel=1e-9, abs=1e-12)
         else:
@@ -373,4 +373,4 @@ def test_a_scene_file_names_its_key(table, said):
 def test_other_values_of_parameters_are_the_same_code():
     kinds = {swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": r})._form.kind for r in (0.1, 2.0)}
     assert len(kinds) == 1
-    assert issubclass(kinds.pop(), march.OwnNumbers)
+    assert issubclass(kinds.pop(), numbers.OwnNumbers)

@@ -20,7 +20,7 @@ from swarm.kernel import cache, frozen
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
 from swarm.surfaces import contract
-from swarm.surfaces.formulas import code, march
+from swarm.surfaces.formulas import code, numbers
 from swarm.surfaces.surface import UNBOUNDED
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
@@ -370,7 +370,7 @@ def test_the_class_of_another_process_is_found_by_its_name():
     kind = getattr(code, name)
     assert kind is getattr(code, name)
     assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.formulas.code", name)
-    assert issubclass(kind, march.OwnNumbers)
+    assert issubclass(kind, numbers.OwnNumbers)
     for wrong in ("Own_0123", "Own_0123456789abcdeg", "Own", "Own_0123456789abcdef0"):
         with pytest.raises(AttributeError):
             getattr(code, wrong)

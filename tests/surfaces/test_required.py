@@ -1,4 +1,4 @@
-"""What a surface must give: said in one sentence before anything compiles, and no default that means "never"."""
+"""What a surface must provide: one error sentence before anything compiles, and no default that means "never"."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -147,7 +147,7 @@ PARTICLES = swarm.Particles([[0.1], [0.2], [0.3]], [[0.5], [0.0], [0.1]])
 
 def refused(surface, method, gravity=None):
     """The sentence, after which nothing has been compiled."""
-    kernels = (blocks.advance_block, observables.observe, observables.start_energies)
+    kernels = (blocks.advance_block, observables.observe)
     before = [] if numba.config.DISABLE_JIT else [len(kernel.signatures) for kernel in kernels]
     scene = swarm.Scene([swarm.Box((2.0, 2.0, 2.0)), surface], gravity)
     with pytest.raises(swarm.SceneError) as caught:
@@ -191,7 +191,7 @@ def test_without_gravity_it_is_not_asked():
     methods.check_surfaces(swarm.Verlet(dt=0.1, penalty=1.0), scene)
 
 
-def test_steps_that_know_no_safe_time_are_all_taken():
+def test_without_a_safe_time_every_step_is_taken():
     """A lower bound that says nothing is 0, never infinity."""
     wall = ball_like(*LEVEL)().numbers()
     assert call(contract.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
@@ -232,7 +232,7 @@ def test_what_is_given_is_not_replaced():
     assert shipped.__module__ == "swarm.surfaces.shapes.capsule"
     numbers = type(ball_like(*LEVEL, contract.first_hit, contract.bend)().numbers())
     assert contract.first_hit.dispatch(numbers).__module__ == __name__
-    assert contract.falling_hit.dispatch(numbers).__module__ == "swarm.surfaces.contract"
+    assert contract.falling_hit.dispatch(numbers).__module__ == "swarm.surfaces.march"
     assert contract.falling_hit.dispatch(numbers) is not contract.falling_hit.dispatch(object)
 
 

@@ -1,16 +1,16 @@
-"""The march to the first hit of what is no quadric, and the capsule, whose level is a polynomial in pieces."""
+"""Surfaces whose first hit is found by a march, the torus and the capsule among them."""
 
 import math
 
-import mpmath as mp
 import numpy as np
 import pytest
 from conftest import EPSILON, ITERATED, TURN, body_of, call, numbers_of
-from exact import level_along, noise
-from test_surfaces import check_hit, start
+from exact import TOUCH, Flight
+from walls import hit_of, start
 
 import swarm
 from swarm.surfaces import contract
+from swarm.surfaces import march as marches
 from swarm.surfaces import rotation as rotations
 
 every_march = pytest.mark.parametrize("name", ITERATED)
@@ -29,22 +29,14 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
         depth, lean = starts[k]
         surface, position, velocity = start(name, rng.uniform(-1, 1, 3), rng.normal(size=3), depth, lean, scale, 1.0)
         pull = heavy * scale * rng.uniform(-1.0, 1.0, 3)
-        left = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
-        for _ask in range(100):
-            time, found = call(contract.march, body_of(surface), *in_own_frame(surface, position, velocity, pull))
-            check_hit(surface, position, velocity, pull, time, found, left)
-            left -= time
-            if found or left < 0.0:
-                break
-            position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
-        else:
-            raise AssertionError("not found")
+        until = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
+        hit_of(march, surface, position, velocity, pull, until, 100)
 
 
-def in_own_frame(surface, *vectors):
-    """Vectors as the surface's body sees them."""
+def march(surface, *flight):
+    """Ask the march itself, in the surface's own frame."""
     turn = np.array(surface[1:]) if surface is not body_of(surface) else np.eye(3)
-    return [turn.T @ vector for vector in vectors]
+    return call(marches.march, body_of(surface), *(turn.T @ vector for vector in flight))
 
 
 @pytest.mark.parametrize("name", ["ring", "rod"])
@@ -56,14 +48,30 @@ def test_a_long_fall_does_not_outrun_its_clearance(name, speed):
     velocity, total = np.array([0.0, 0.0, -speed]), 0.0
     for _ask in range(50):
         time, found = call(contract.falling_hit, surface, position, velocity, pull)
-        level = level_along(surface, position, velocity, pull)
-        assert level.highest(time) <= noise(surface, level, position, velocity, time, pull)
+        assert Flight([surface], position, velocity, pull).highest(time) <= TOUCH
         total += time
         position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
         if found:
             break
     assert found
     assert abs(call(contract.phi, surface, position)) <= 1e-14
+
+
+# --- The torus -------------------------------------------------------------------------------------------
+
+
+def test_a_point_on_the_axis_is_admissible_outside_the_ring():
+    ring = swarm.Torus(1.0, 0.25, side="outside")
+    assert ring.phi([0.0, 0.0, 0.0]) == pytest.approx(0.75)
+    scene = swarm.Scene([swarm.Sphere(2.0), ring])
+    assert (scene.gaps(swarm.fill(scene, 1000, speed=1.0).position) <= 0.0).all()
+    # Straight through the hole, and against the inner side of the tube.
+    numbers = ring.numbers()
+    through = call(contract.first_hit, numbers, np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
+    assert through == (math.inf, True)
+    across, found = call(contract.first_hit, numbers, np.array([-0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    assert found
+    assert across == pytest.approx(1.25, rel=1e-14)
 
 
 # --- The capsule -----------------------------------------------------------------------------------------
@@ -78,7 +86,7 @@ def test_the_closed_form_of_the_capsule_is_the_march(side):
         if capsule.side * call(contract.phi, capsule, position) > 0.0:
             continue
         time, found = call(contract.first_hit, capsule, position, velocity)
-        marched, _found = call(contract.march, capsule, position, velocity, np.zeros(3))
+        marched, _found = call(march.march, capsule, position, velocity, np.zeros(3))
         assert found
         if time == math.inf:
             assert marched > 1e9
@@ -95,9 +103,9 @@ def test_along_the_axis_of_a_capsule(scale):
     for off in (0.0, 0.25, 0.5 - 1e-9):
         for sign in (1.0, -1.0):
             way = np.array([0.0, 0.0, sign])
-            exact = mp.mpf(1) + mp.sqrt(mp.mpf(0.5 * scale) ** 2 - mp.mpf(off * scale) ** 2) / mp.mpf(scale)
+            exact = 1.0 + math.sqrt((0.5 - off) * (0.5 + off))
             time, _found = call(contract.first_hit, cavity, scale * np.array([off, 0.0, 0.0]), way)
-            assert time == pytest.approx(float(exact) * scale, rel=1e-14, abs=1e-7 * scale * (off > 0.4))
+            assert time == pytest.approx(exact * scale, rel=1e-14, abs=1e-7 * scale * (off > 0.4))
     rod = cavity._replace(side=-1.0)
     time, _found = call(contract.first_hit, rod, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
     assert time == pytest.approx(4.0 - 0.4, rel=1e-14)
@@ -142,19 +150,3 @@ def test_the_discrete_gradient_is_exact_across_the_end_of_the_cylinder():
         rise = call(contract.difference, capsule, first, second)
         assert discrete @ (second - first) == pytest.approx(rise, abs=4 * EPSILON * step)
         assert discrete == pytest.approx([0.6, 0.8, 0.0], abs=2.0 * step + 1e-15)
-
-
-@pytest.mark.parametrize(
-    ("build", "parts"),
-    [
-        (lambda: swarm.Capsule(0.0, 1.0), ["radius", "above 0", "got 0"]),
-        (lambda: swarm.Capsule(1.0, -1.0), ["length", "0 or more", "got -1"]),
-        (lambda: swarm.Capsule(1.0, math.nan), ["length", "finite", "nan"]),
-        (lambda: swarm.Capsule(1.0, 1.0, axis=(0, 0, 0)), ["axis", "length 0"]),
-        (lambda: swarm.Capsule(1.0, 1.0, side="in"), ["side", "did you mean 'inside'?"]),
-    ],
-)
-def test_errors_name_the_argument(build, parts):
-    with pytest.raises(swarm.SceneError) as caught:
-        build()
-    assert all(part in str(caught.value) for part in parts), str(caught.value)

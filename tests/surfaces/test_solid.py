@@ -1,13 +1,12 @@
 """Solid bodies with edges, against the exact times at which a flight enters the last of their parts."""
 
-import itertools
 import math
 
-import mpmath as mp
 import numpy as np
 import pytest
 from conftest import EPSILON, TURN, call, wall_point
-from exact import level_along, noise, real_roots
+from exact import TOUCH, Flight
+from walls import falling, hit_of, straight
 
 import swarm
 from swarm.kernel.vector import vec
@@ -42,51 +41,12 @@ SCALES = [1e-6, 1.0, 1e6]
 every_body = pytest.mark.parametrize("name", BODIES)
 
 
-def levels_of(parts, position, velocity, pull):
-    """Each part's level along the flight, above 0 inside of it, and its round-off."""
-    for part in parts:
-        level = level_along(part, position, velocity, pull)
-        yield level.pieces[0], level.unit, noise(part, level, position, velocity, 0.0, pull)
-
-
-def entry(levels, off, horizon, begin=0.0):
-    """When all levels are above `off` times their round-off for the first time from `begin` on, or infinity."""
-    shifted = [(level - off * slack, unit) for level, unit, slack in levels]
-    stops = sorted(root for level, unit in shifted for root in real_roots(level, unit) if begin < root < horizon)
-    for low, high in itertools.pairwise([mp.mpf(begin), *stops, mp.mpf(horizon)]):
-        if all(level((low + high) / 2) > 0 for level, _unit in shifted):
-            return low
-    return mp.inf
-
-
-def asked(solid, position, velocity, pull, horizon):
-    """Time of the first hit, asked again from where the last answer ended until it is found."""
-    total, found = 0.0, False
-    for _ask in range(200):
-        if any(pull):
-            time, found = call(contract.falling_hit, solid, position, velocity, pull)
-        else:
-            time, found = call(contract.first_hit, solid, position, velocity)
-        total += time
-        if found or total > horizon:
-            return total if total <= horizon else math.inf
-        position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
-    raise AssertionError("not found")
-
-
-def check(parts, position, velocity, pull, size, begin=0.0):
-    """The hit of the body lies between those of one that is larger, and of one that is smaller, by the round-off."""
-    speed = np.linalg.norm(velocity)
-    horizon = 10.0 * (size + np.linalg.norm(position)) / speed
+def check(parts, position, velocity, pull, size):
+    """The time of the hit, or infinity if there is none up to a horizon."""
+    horizon = 10.0 * (size + np.linalg.norm(position)) / np.linalg.norm(velocity)
     if any(pull):
         horizon = min(horizon, math.sqrt(20.0 * size / np.linalg.norm(pull)))
-    levels = list(levels_of(parts, position, velocity, pull))
-    early, late = entry(levels, -8, horizon, begin), entry(levels, 8, horizon, begin)
-    time = asked(body(parts), position, velocity, pull, horizon)
-    slack = 1e-12 * horizon
-    assert early - slack <= time, (float(early), time, float(late))
-    assert time <= late + slack, (float(early), time, float(late))
-    return time
+    return hit_of(falling if any(pull) else straight, body(parts), position, velocity, pull, horizon, 200)[0]
 
 
 def near_an_edge(parts, rng, count):
@@ -183,7 +143,7 @@ def test_flights_aimed_at_edges_and_corners(name, scale, off):
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("lean", [0.5, 1e-3, 1e-7])
 def test_from_a_face_the_direction_decides(name, scale, lean):
-    """Inward: now. Outward from a convex body: never again, and under gravity not at once."""
+    """Inward: now. Outward from a convex body: never, and under gravity not immediately."""
     rng, parts = np.random.default_rng(5), BODIES[name](scale)
     solid = body(parts)
     for _ in range(40):
@@ -259,8 +219,7 @@ def test_safe_time_is_never_past_the_entry(name, heavy):
             assert time == 0.0
             continue
         assert time > 0.0
-        levels = list(levels_of(parts, position, velocity, pull))
-        assert entry(levels, 8, min(time, 100.0)) == mp.inf
+        assert Flight([solid], position, velocity, pull).highest(min(time, 100.0)) <= TOUCH
 
 
 # --- Contact ---------------------------------------------------------------------------------------------

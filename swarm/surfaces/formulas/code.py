@@ -19,7 +19,7 @@ from ...kernel.frozen import Frozen
 from ...kernel.jit import _INLINE, inlined
 from ...kernel.vector import Symmetric, Vec
 from .. import contract
-from .march import OwnNumbers
+from .numbers import OwnNumbers
 
 Function = Callable[..., Any]
 

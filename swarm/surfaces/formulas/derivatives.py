@@ -13,7 +13,7 @@ from ..surface import Box, side_sign
 from .expression import COORDINATES, Piece, parse
 from .form import Form
 from .interval import Cells, check_constants, check_smooth
-from .march import Bend
+from .numbers import Bend
 
 # Operations of the derivatives: beyond, deriving and compiling them would take minutes.
 _MOST_OPERATIONS = 4000

@@ -14,7 +14,7 @@ from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from .. import contract
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
-from .march import Bend
+from .numbers import Bend
 
 _EPSILON = 2.220446049250313e-16
 # Central differences lose least at the cube root of round-off, relative to the length.

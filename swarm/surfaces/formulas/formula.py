@@ -17,7 +17,7 @@ from .code import class_of
 from .derivatives import derived
 from .expression import COORDINATES, FUNCTIONS
 from .form import Form, FormSurface
-from .march import Bend
+from .numbers import Bend
 
 
 @dataclass(frozen=True, repr=False, init=False)

@@ -17,7 +17,7 @@ from .. import contract
 from ..surface import Box, Surface
 from .code import class_of
 from .form import Form, FormSurface
-from .march import Bend
+from .numbers import Bend
 
 
 @dataclass(frozen=True, repr=False, init=False)

@@ -79,15 +79,8 @@ def _from_segment(surface, r):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.inner.register(CapsuleNumbers)
-def _(surface, r):
-    return square(_from_segment(surface, r))
-
-
-@contract.slope.register(CapsuleNumbers)
-def _(surface, r):
-    return 2.0 * _from_segment(surface, r)
+contract.inner.register(CapsuleNumbers, lambda surface, r: square(_from_segment(surface, r)))
+contract.slope.register(CapsuleNumbers, lambda surface, r: 2.0 * _from_segment(surface, r))
 
 
 @contract.hessian.register(CapsuleNumbers)
@@ -120,7 +113,5 @@ def _(surface, r, v):
     return select(abs(height) > half, cap, tube), True
 
 
-@contract.bend.register(CapsuleNumbers)
-def _(surface, r):
-    # 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
-    return select(surface.side > 0.0, 1.0, 0.0), 1.0, surface.radius
+# 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
+contract.bend.register(CapsuleNumbers, lambda surface, r: (select(surface.side > 0.0, 1.0, 0.0), 1.0, surface.radius))

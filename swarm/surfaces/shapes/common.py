@@ -17,39 +17,20 @@ def root_gap(kind: Numbers) -> Numbers:
 
     The shape registers `inner`, and `slope` or its own `gradient`.
     """
-    contract.phi.register(kind, _phi)
+    contract.phi.register(kind, lambda surface, r: np.sqrt(contract.inner(surface, r)) - surface.radius)
     contract.gradient.register(kind, _gradient)
-    contract.gap_of.register(kind, _gap_of)
-    contract.level_of.register(kind, _level_of)
+    contract.gap_of.register(kind, lambda surface, q: surface.side * (math.sqrt(q) - surface.radius))
+    contract.level_of.register(kind, lambda surface, q: surface.side * (q - surface.radius2))
     contract.gap_slope.register(kind, _gap_slope)
-    contract.clearance.register(kind, _clearance)
-    contract.farthest_push.register(kind, _farthest_push)
+    contract.clearance.register(kind, lambda surface, r: -contract.gap_of(surface, contract.inner(surface, r)))
+    # The pole of 1/(1 + kappa H), where no eigenvalue of H is above 1
+    contract.farthest_push.register(kind, lambda surface: select(surface.side > 0.0, math.inf, -1.0))
     return kind
-
-
-def exact_chord(kind: Numbers) -> Numbers:
-    """Numbers whose `chord_guess` is exact, and whose gap is a distance up to round-off."""
-    contract.chord_improve.register(kind, _no_improvement)
-    contract.chord_sweeps.register(kind, _no_sweeps)
-    contract.distance.register(kind, _distance)
-    return kind
-
-
-def _phi(surface, r):
-    return np.sqrt(contract.inner(surface, r)) - surface.radius
 
 
 def _gradient(surface, r):
     # Where q = 0 the distance has no gradient, and the answer is 0.
     return contract.slope(surface, r) * (0.5 / np.maximum(np.sqrt(contract.inner(surface, r)), _TINY))
-
-
-def _gap_of(surface, q):
-    return surface.side * (math.sqrt(q) - surface.radius)
-
-
-def _level_of(surface, q):
-    return surface.side * (q - surface.radius2)
 
 
 def _gap_slope(surface, q0, q1):
@@ -59,22 +40,9 @@ def _gap_slope(surface, q0, q1):
     return surface.side * slope, -0.5 * surface.side * slope * slope / root1
 
 
-def _clearance(surface, r):
-    return -contract.gap_of(surface, contract.inner(surface, r))
-
-
-def _farthest_push(surface):
-    # The pole of 1/(1 + kappa H), where no eigenvalue of H is above 1
-    return select(surface.side > 0.0, math.inf, -1.0)
-
-
-def _no_improvement(surface, r, p, kappa):
-    return 0.0
-
-
-def _no_sweeps(surface):
-    return 0
-
-
-def _distance(surface, r):
-    return contract.gap_of(surface, contract.inner(surface, r))
+def exact_chord(kind: Numbers) -> Numbers:
+    """Numbers whose `chord_guess` is exact, and whose gap is a distance up to round-off."""
+    contract.chord_improve.register(kind, lambda surface, r, p, kappa: 0.0)
+    contract.chord_sweeps.register(kind, lambda surface: 0)
+    contract.distance.register(kind, lambda surface, r: contract.gap_of(surface, contract.inner(surface, r)))
+    return kind

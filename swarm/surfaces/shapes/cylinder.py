@@ -7,8 +7,7 @@ from typing import Any
 from ...checks import Vector
 from ...checks import length as checked_length
 from .. import rotation as rotations
-from ..surface import Box, HalfSpace, box_around, farthest, side_sign
-from .principal import extents
+from ..surface import Box, HalfSpace, box_around, extents, farthest, side_sign
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 from .slab import SlabNumbers, slab_numbers

@@ -66,15 +66,9 @@ class EllipsoidCavity(EllipsoidNumbers):
     """A cavity: every flight in it meets the wall."""
 
 
-@quadratic.linear.register(EllipsoidNumbers)
-def _(surface, u):
-    # Unlike 0.0, which changes -0.0, the compiler removes its addition.
-    return -0.0
-
-
-@quadratic.tilted.register(EllipsoidNumbers)
-def _(surface, u, k):
-    return u
+# Unlike 0.0, which changes -0.0, the compiler removes its addition.
+quadratic.linear.register(EllipsoidNumbers, lambda surface, u: -0.0)
+quadratic.tilted.register(EllipsoidNumbers, lambda surface, u, k: u)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -99,9 +93,7 @@ def _(surface, c, d, v, pull):
     return level_and_window(c, 1.0, size, form(surface.a, v, v), form(surface.a, pull, pull))
 
 
-@contract.may_be_far.register(EllipsoidCavity)
-def _(surface):
-    return False
+contract.may_be_far.register(EllipsoidCavity, lambda surface: False)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------

@@ -67,32 +67,13 @@ class PlaneNumbers(NamedTuple):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.phi.register(PlaneNumbers)
-def _(surface, r):
-    return contract.inner(surface, r) - surface.offset
-
-
-@contract.gradient.register(PlaneNumbers)
-@contract.slope.register(PlaneNumbers)
-@contract.unit_normal.register(PlaneNumbers)
-def _(surface, r):
-    return surface.normal
-
-
-@contract.inner.register(PlaneNumbers)
-def _(surface, r):
-    return dot(surface.normal, r)
-
-
-@contract.gap_of.register(PlaneNumbers)
-def _(surface, q):
-    return q - surface.offset
-
-
-@contract.gap_slope.register(PlaneNumbers)
-def _(surface, q0, q1):
-    return 1.0, 0.0
+contract.phi.register(PlaneNumbers, lambda surface, r: contract.inner(surface, r) - surface.offset)
+contract.gradient.register(PlaneNumbers, lambda surface, r: surface.normal)
+contract.slope.register(PlaneNumbers, lambda surface, r: surface.normal)
+contract.unit_normal.register(PlaneNumbers, lambda surface, r: surface.normal)
+contract.inner.register(PlaneNumbers, lambda surface, r: dot(surface.normal, r))
+contract.gap_of.register(PlaneNumbers, lambda surface, q: q - surface.offset)
+contract.gap_slope.register(PlaneNumbers, lambda surface, q0, q1: (1.0, 0.0))
 
 
 @contract.settle.register(PlaneNumbers)
@@ -100,9 +81,7 @@ def _(surface, r):
     return r - (contract.inner(surface, r) - surface.offset) * surface.normal
 
 
-@contract.flat.register(PlaneNumbers)
-def _(surface):
-    return True
+contract.flat.register(PlaneNumbers, lambda surface: True)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -129,37 +108,10 @@ def _(surface, r, v, pull):
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
-
-@contract.inner_gradient.register(PlaneNumbers)
-def _(surface, r0, r1):
-    return surface.normal
-
-
-@contract.push.register(PlaneNumbers)
-def _(surface, r0, p, kappa):
-    return r0 + (p - kappa * surface.normal)
-
-
-@contract.rise.register(PlaneNumbers)
-def _(surface, r0, p, kappa):
-    return dot(surface.normal, p) - kappa, -1.0
-
-
-@contract.resolve.register(PlaneNumbers)
-def _(surface, r, strength):
-    return r - strength * surface.normal
-
-
-@contract.farthest_push.register(PlaneNumbers)
-def _(surface):
-    return math.inf
-
-
-@contract.chord_guess.register(PlaneNumbers)
-def _(surface, r, p):
-    return dot(surface.normal, p)
-
-
-@contract.chord_normal.register(PlaneNumbers)
-def _(surface, r, p, kappa):
-    return surface.normal
+contract.inner_gradient.register(PlaneNumbers, lambda surface, r0, r1: surface.normal)
+contract.push.register(PlaneNumbers, lambda surface, r0, p, kappa: r0 + (p - kappa * surface.normal))
+contract.rise.register(PlaneNumbers, lambda surface, r0, p, kappa: (dot(surface.normal, p) - kappa, -1.0))
+contract.resolve.register(PlaneNumbers, lambda surface, r, strength: r - strength * surface.normal)
+contract.farthest_push.register(PlaneNumbers, lambda surface: math.inf)
+contract.chord_guess.register(PlaneNumbers, lambda surface, r, p: dot(surface.normal, p))
+contract.chord_normal.register(PlaneNumbers, lambda surface, r, p, kappa: surface.normal)

@@ -80,10 +80,7 @@ def _unit(surface, n):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.phi.register(QuadricNumbers)
-def _(surface, r):
-    return contract.inner(surface, r) - surface.level
+contract.phi.register(QuadricNumbers, lambda surface, r: contract.inner(surface, r) - surface.level)
 
 
 @contract.gradient.register(QuadricNumbers)
@@ -98,9 +95,7 @@ def _(surface, r):
     return form(surface.a, d, d) + linear(surface, d)
 
 
-@contract.gap_of.register(QuadricNumbers)
-def _(surface, q):
-    return surface.side * (q - surface.level)
+contract.gap_of.register(QuadricNumbers, lambda surface, q: surface.side * (q - surface.level))
 
 
 @contract.distance.register(QuadricNumbers)
@@ -109,9 +104,7 @@ def _(surface, r):
     return contract.gap_of(surface, contract.inner(surface, r)) / math.sqrt(select(g2 > _TINY, g2, _TINY))
 
 
-@contract.unit_normal.register(QuadricNumbers)
-def _(surface, r):
-    return _unit(surface, contract.gradient(surface, r))
+contract.unit_normal.register(QuadricNumbers, lambda surface, r: _unit(surface, contract.gradient(surface, r)))
 
 
 @contract.settle.register(QuadricNumbers)
@@ -195,17 +188,9 @@ def level_window(surface, c, d, v, pull):
     return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
 
-@contract.is_quartic.register(QuadricNumbers)
-def _(surface):
-    return True
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
 
-
-@contract.gap_slope.register(QuadricNumbers)
-def _(surface, q0, q1):
-    return surface.side, 0.0
+contract.gap_slope.register(QuadricNumbers, lambda surface, q0, q1: (surface.side, 0.0))
 
 
 @contract.inner_gradient.register(QuadricNumbers)
@@ -259,9 +244,7 @@ def _(surface):
     return side * select(steepest > 0.0, 1.0 / select(steepest > 0.0, steepest, 1.0), math.inf)
 
 
-@contract.chord_sweeps.register(QuadricNumbers)
-def _(surface):
-    return _CHORD_SWEEPS
+contract.chord_sweeps.register(QuadricNumbers, lambda surface: _CHORD_SWEEPS)
 
 
 @contract.chord_normal.register(QuadricNumbers)

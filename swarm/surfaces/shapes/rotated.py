@@ -29,7 +29,7 @@ def _turned(made: Callable[[Any], Any], *functions: Any) -> None:
         function.register(Rotated, made(function))
 
 
-# Named arguments only, as Numba compiles no others: one line for each list of arguments and kind of result.
+# Numba and `by_type` compare the names of arguments: one definition for each list of them and kind of result.
 _turned(
     lambda f: lambda surface: f(surface.body),
     contract.flat, contract.is_quartic, contract.may_be_far, contract.chord_sweeps, contract.farthest_push,

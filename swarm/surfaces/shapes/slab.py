@@ -1,23 +1,20 @@
 """Slab: phi = |n.(r - c)| - h, the distance; inner function q = (n.(r - c))^2: the sphere of one dimension."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...checks import Vector, length
-from ...kernel.jit import inlined, select
-from ...kernel.vector import vec
+from ...kernel.jit import by_type, inlined, select
+from ...kernel.vector import Vec, dot, vec
 from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
-from ..surface import Box, HalfSpace, Surface, box_around, farthest, side_sign
+from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, side_sign
 from .common import exact_chord, root_gap
-from .normal import Normal, along, normal_of, scaled
-
-# A normal as near as this to an axis is that axis, but for the round-off of a rotation.
-_TILT = 1e-15
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,7 +57,7 @@ class Slab(Surface):
         # Along its normal it reaches h, along any other direction to infinity.
         nx, ny, nz = turned(self.rotation, self.normal)
         tilts = math.hypot(ny, nz), math.hypot(nz, nx), math.hypot(nx, ny)
-        hx, hy, hz = (self.half_width if tilt <= _TILT else math.inf for tilt in tilts)
+        hx, hy, hz = (self.half_width if tilt <= TILT else math.inf for tilt in tilts)
         return box_around(self.center, (hx, hy, hz), self.side)
 
     def half_spaces(self) -> list[HalfSpace]:
@@ -72,6 +69,67 @@ class Slab(Surface):
 
     def extent(self) -> float:
         return farthest(self.center) + self.half_width
+
+
+# --- The normal: along an axis it costs no multiplication ------------------------------------------------
+
+
+class AlongX(NamedTuple):
+    """The x axis."""
+
+    x: float
+
+
+class AlongY(NamedTuple):
+    """The y axis."""
+
+    y: float
+
+
+class AlongZ(NamedTuple):
+    """The z axis."""
+
+    z: float
+
+
+Normal = Vec | AlongX | AlongY | AlongZ
+
+
+def normal_of(vector: Sequence[float]) -> Normal:
+    """What kernels take for a unit vector, or for the opposite one where that is an axis."""
+    x, y, z = vector
+    if y == 0.0 and z == 0.0:
+        return AlongX(1.0)
+    if z == 0.0 and x == 0.0:
+        return AlongY(1.0)
+    if x == 0.0 and y == 0.0:
+        return AlongZ(1.0)
+    return vec(vector)
+
+
+@by_type
+def along(normal, r):
+    """n.r"""
+    raise NotImplementedError
+
+
+@by_type
+def scaled(normal, k):
+    """k n"""
+    raise NotImplementedError
+
+
+along.register(Vec, lambda normal, r: dot(normal, r))
+scaled.register(Vec, lambda normal, k: k * normal)
+along.register(AlongX, lambda normal, r: r.x)
+scaled.register(AlongX, lambda normal, k: Vec(k, 0.0, 0.0))
+along.register(AlongY, lambda normal, r: r.y)
+scaled.register(AlongY, lambda normal, k: Vec(0.0, k, 0.0))
+along.register(AlongZ, lambda normal, r: r.z)
+scaled.register(AlongZ, lambda normal, k: Vec(0.0, 0.0, k))
+
+
+# --- The numbers -----------------------------------------------------------------------------------------
 
 
 @root_gap
@@ -100,10 +158,7 @@ def _off(surface, r):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.gradient.register(SlabNumbers)
-def _(surface, r):
-    return scaled(surface.normal, np.copysign(1.0, _off(surface, r)))
+contract.gradient.register(SlabNumbers, lambda surface, r: scaled(surface.normal, np.copysign(1.0, _off(surface, r))))
 
 
 @contract.inner.register(SlabNumbers)
@@ -112,9 +167,7 @@ def _(surface, r):
     return d * d
 
 
-@contract.slope.register(SlabNumbers)
-def _(surface, r):
-    return scaled(surface.normal, 2.0 * _off(surface, r))
+contract.slope.register(SlabNumbers, lambda surface, r: scaled(surface.normal, 2.0 * _off(surface, r)))
 
 
 @contract.unit_normal.register(SlabNumbers)
@@ -128,9 +181,7 @@ def _(surface, r):
     return r - scaled(surface.normal, d - math.copysign(surface.radius, d))
 
 
-@contract.flat.register(SlabNumbers)
-def _(surface):
-    return True
+contract.flat.register(SlabNumbers, lambda surface: True)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -194,10 +245,8 @@ def _(surface, r, strength):
     return r - scaled(surface.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, r))
 
 
-@contract.chord_guess.register(SlabNumbers)
-def _(surface, r, p):
-    # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-    return 0.5 * along(surface.normal, p) / _off(surface, r)
+# q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
+contract.chord_guess.register(SlabNumbers, lambda surface, r, p: 0.5 * along(surface.normal, p) / _off(surface, r))
 
 
 @contract.chord_normal.register(SlabNumbers)

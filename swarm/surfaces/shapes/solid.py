@@ -54,27 +54,14 @@ def _sign(part):
     return 1.0
 
 
-@_sign.register(PlaneNumbers)
-def _(part):
-    return -1.0
-
-
-@_sign.register(Rotated)
-def _(part):
-    return _sign(part.body)
+_sign.register(PlaneNumbers, lambda part: -1.0)
+_sign.register(Rotated, lambda part: _sign(part.body))
 
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.phi.register(SolidNumbers)
-def _(surface, r):
-    return _largest(surface.parts, r)[0]
-
-
-@contract.gradient.register(SolidNumbers)
-def _(surface, r):
-    return _largest(surface.parts, r)[1]
+contract.phi.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r)[0])
+contract.gradient.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r)[1])
 
 
 @by_type
@@ -92,9 +79,7 @@ def _(parts, r):
     return np.maximum(here, other), (use * sign) * contract.gradient(parts.first, r) + (1.0 - use) * gradient
 
 
-@_largest.register(Nothing)
-def _(parts, r):
-    return -math.inf, ZERO
+_largest.register(Nothing, lambda parts, r: (-math.inf, ZERO))
 
 
 @contract.hessian.register(SolidNumbers)
@@ -127,17 +112,12 @@ def _turn(part, r, step, f):
     return f * (contract.gradient(part, r + step) - contract.gradient(part, r - step))
 
 
-@_bend_of_largest.register(Nothing)
-def _(parts, r, h):
-    return -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_bend_of_largest.register(Nothing, lambda parts, r, h: (-math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
-
-@contract.first_hit.register(SolidNumbers)
-def _(surface, r, v):
-    return _entry(surface, None, r, v)
+contract.first_hit.register(SolidNumbers, lambda surface, r, v: _entry(surface, None, r, v))
 
 
 @contract.falling_hit.register(SolidNumbers)
@@ -183,9 +163,7 @@ def _(parts, gravity, extent, r, v):
     return time, found
 
 
-@_last_entry.register(Nothing)
-def _(parts, gravity, extent, r, v):
-    return 0.0, True
+_last_entry.register(Nothing, lambda parts, gravity, extent, r, v: (0.0, True))
 
 
 @inlined
@@ -196,9 +174,7 @@ def _noise(part, extent, r):
     return _ULPS * _EPSILON * terms
 
 
-@contract.safe_time.register(SolidNumbers)
-def _(surface, r, v, pull):
-    return _longest_safe_time(surface.parts, r, v, pull)
+contract.safe_time.register(SolidNumbers, lambda surface, r, v, pull: _longest_safe_time(surface.parts, r, v, pull))
 
 
 @by_type
@@ -212,17 +188,12 @@ def _(parts, r, v, pull):
     return max(contract.safe_time(parts.first, r, v, pull), _longest_safe_time(parts.rest, r, v, pull))
 
 
-@_longest_safe_time.register(Nothing)
-def _(parts, r, v, pull):
-    return 0.0
+_longest_safe_time.register(Nothing, lambda parts, r, v, pull: 0.0)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
-
-@contract.unit_normal.register(SolidNumbers)
-def _(surface, r):
-    return _outermost(surface.parts, r)[1]
+contract.unit_normal.register(SolidNumbers, lambda surface, r: _outermost(surface.parts, r)[1])
 
 
 @by_type
@@ -240,12 +211,6 @@ def _(parts, r):
     return depth, contract.unit_normal(parts.first, r)
 
 
-@_outermost.register(Nothing)
-def _(parts, r):
-    return math.inf, ZERO
-
-
-@contract.farthest_push.register(SolidNumbers)
-def _(surface):
-    # phi is about the distance, whose faces are flat or wide: no pole within a push.
-    return -math.inf
+_outermost.register(Nothing, lambda parts, r: (math.inf, ZERO))
+# phi is about the distance, whose faces are flat or wide: no pole within a push.
+contract.farthest_push.register(SolidNumbers, lambda surface: -math.inf)

@@ -72,26 +72,11 @@ class SphereCavity(SphereNumbers):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-
-@contract.inner.register(SphereNumbers)
-def _(surface, r):
-    return square(r - surface.center)
-
-
-@contract.slope.register(SphereNumbers)
-def _(surface, r):
-    return 2.0 * (r - surface.center)
-
-
-@contract.unit_normal.register(SphereNumbers)
-def _(surface, r):
-    return (r - surface.center) * surface.curvature
-
-
-@contract.gap_scale.register(SphereNumbers)
-def _(surface, r):
-    # |grad g| = 1
-    return total(absolute(r))
+contract.inner.register(SphereNumbers, lambda surface, r: square(r - surface.center))
+contract.slope.register(SphereNumbers, lambda surface, r: 2.0 * (r - surface.center))
+contract.unit_normal.register(SphereNumbers, lambda surface, r: (r - surface.center) * surface.curvature)
+# |grad g| = 1
+contract.gap_scale.register(SphereNumbers, lambda surface, r: total(absolute(r)))
 
 
 @contract.settle.register(SphereNumbers)
@@ -129,23 +114,13 @@ def _(surface, r, v, pull):
     return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
 
 
-@contract.is_quartic.register(SphereNumbers)
-def _(surface):
-    return True
-
-
-@contract.may_be_far.register(SphereCavity)
-def _(surface):
-    return False
+contract.may_be_far.register(SphereCavity, lambda surface: False)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
-
-@contract.inner_gradient.register(SphereNumbers)
-def _(surface, r0, r1):
-    # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    return r0 + r1 - 2.0 * surface.center
+# q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
+contract.inner_gradient.register(SphereNumbers, lambda surface, r0, r1: r0 + r1 - 2.0 * surface.center)
 
 
 @inlined

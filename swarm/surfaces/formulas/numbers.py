@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernel.jit import inlined, outlined, select
-from ...kernel.vector import Symmetric, Vec, absolute, dot, largest, square, total
+from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..course import rise_time
+from ..march import bisected
 
 _EPSILON = 2.220446049250313e-16
 # Safe steps of one march; what is not found by then goes on in the next pass.
@@ -148,7 +149,7 @@ def _straight(surface, r, v):
         half = 0.5 * surface.side * dot(contract.gradient(surface, p), v)
         if level > 0.0 and half > 0.0 and i > 0:
             # Past the wall by round-off, or because the surface bends more than was said.
-            return contract.bisected(surface, r, v, Vec(0.0, 0.0, 0.0), before, t), True
+            return bisected(surface, r, v, ZERO, before, t), True
         step = rise_time(level, half, most)
         if not t + step <= end or not step < math.inf:
             return math.inf, True

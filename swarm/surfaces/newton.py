@@ -1,0 +1,79 @@
+"""What follows from `hessian`: steps in contact by Newton's method."""
+
+import math
+
+from ..kernel.jit import inlined, outlined
+from ..kernel.vector import Vec, dot, largest
+from . import contract
+
+_EPSILON = 2.220446049250313e-16
+# Newton steps; changes below this part of a step may be noise.
+_ITERATIONS = 50
+_NOISE = 1e-12
+
+
+@contract.hessian.implies(contract.push)
+def _(surface, r0, p, kappa):
+    return r0 + _moved(surface, r0, p, kappa)
+
+
+@contract.hessian.implies(contract.rise)
+def _(surface, r0, p, kappa):
+    d = _moved(surface, r0, p, kappa)
+    r1 = r0 + d
+    g = contract.inner_gradient(surface, r0, r1)
+    # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
+    f = _unpushed(surface, r0 + 0.5 * d, kappa, g)
+    return dot(g, d), -dot(f, contract.slope(surface, r1))
+
+
+@outlined
+def _moved(surface, r0, p, kappa):
+    """r1 - r0 = p - kappa D(r0, r1) with the H of the midpoint; NaN where it does not converge."""
+    d = _unpushed(surface, r0, kappa, p)
+    size, previous = largest(p), math.inf
+    for _i in range(_ITERATIONS):
+        g = contract.inner_gradient(surface, r0, r0 + d)
+        f = _unpushed(surface, r0 + 0.5 * d, kappa, d - p + kappa * g)
+        d, change = d - f, largest(f)
+        if _converged(change, previous, max(size, abs(kappa) * largest(g))):
+            return d
+        previous = change
+    return Vec(math.nan, math.nan, math.nan)
+
+
+@contract.hessian.implies(contract.resolve)
+def _(surface, r, strength):
+    return _resolved(surface, r, strength)
+
+
+@outlined
+def _resolved(surface, r, strength):
+    """The s of `resolve`; NaN where it does not converge."""
+    s, size, previous = r, largest(r), math.inf
+    for _i in range(_ITERATIONS):
+        g = contract.slope(surface, s)
+        f = _unpushed(surface, s, 2.0 * strength, s - r + strength * g)
+        s, change = s - f, largest(f)
+        if _converged(change, previous, max(size, abs(strength) * largest(g))):
+            return s
+        previous = change
+    return Vec(math.nan, math.nan, math.nan)
+
+
+@inlined
+def _unpushed(surface, r, strength, f):
+    """(I + strength H)^-1 f, H at a point, by the adjugate."""
+    h = contract.hessian(surface, r)
+    a, b, c = 1.0 + strength * h.xx, 1.0 + strength * h.yy, 1.0 + strength * h.zz
+    d, e, g = strength * h.xy, strength * h.yz, strength * h.zx
+    aa, ab, ac = b * c - e * e, g * e - d * c, d * e - g * b
+    bb, bc, cc = a * c - g * g, d * g - a * e, a * b - d * d
+    inverse = 1.0 / (a * aa + d * ab + g * ac)
+    return inverse * Vec(dot(Vec(aa, ab, ac), f), dot(Vec(ab, bb, bc), f), dot(Vec(ac, bc, cc), f))
+
+
+@inlined
+def _converged(change, previous, size):
+    """Whether an iteration has reached round-off: its change is below it, or is near it and shrinks no more."""
+    return change <= _EPSILON * size or (change >= previous and change <= _NOISE * size)
