@@ -17,6 +17,7 @@ import numba
 import numpy as np
 import pytest
 from conftest import LAWS, METHODS, call, every_surface, numbers_of, scene_of
+from numba.core.codegen import JITCodeLibrary
 
 import swarm
 from swarm.contact import regularisation
@@ -233,6 +234,50 @@ assert not re.search(r"call[^\\n]*NRT_", kernel)
 assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 """
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+
+
+@_jit.outlined
+def halved(x):
+    return x / 2.0
+
+
+@_jit.inlined
+def quartered(x):
+    return halved(halved(x))
+
+
+@compiled_only
+def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
+    made = []
+    for step in ("_optimize_final_module", "_finalize_specific"):
+        numbas = getattr(JITCodeLibrary, step)
+        monkeypatch.setattr(JITCodeLibrary, step, lambda self, numbas=numbas: made.append(self.name) or numbas(self))
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    assert _jit.kernel(one_more_quarter)(1.0) == 1.25
+    assert made == ["one_more_quarter"] * 2
+
+
+def one_more_quarter(x):
+    return x + quartered(x)
+
+
+@_jit.outlined
+def in_object_mode(x):
+    with numba.objmode(y="float64"):
+        y = sum([x])
+    return y + 1.0
+
+
+def calls_python(x):
+    return in_object_mode(x)
+
+
+@compiled_only
+@pytest.mark.filterwarnings("ignore:Code running in object mode:numba.core.errors.NumbaWarning")
+def test_a_helper_may_call_python(monkeypatch, tmp_path):
+    """Numba looks for the objects of a helper beside its machine code, which it has in the kernel only."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    assert _jit.kernel(calls_python)(1.0) == 2.0
 
 
 # --- The cache -------------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
+from .parts import PartCompiler
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -35,8 +36,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 # instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
 # through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
-# Kernels call each other, Python never calls their compiled form: no wrappers saves a fifth of the compile time.
-_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_FLAGS}
+# Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
+_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
 
 
