@@ -12,6 +12,7 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -219,6 +220,41 @@ def test_scratch_is_zero_each_time():
     """Far more of it than a stack holds, if it were not given back."""
     assert used_up_often(10)
     assert compiled(used_up_often)(1_000_000 if not numba.config.DISABLE_JIT else 10)
+
+
+class Tables(NamedTuple):
+    """As `lanes.arrays.Lanes`: two tables, and an array of one row."""
+
+    first: np.ndarray
+    second: np.ndarray
+    row: np.ndarray
+
+
+def summed(tables):
+    for i in range(tables.row.size):
+        tables.second[1, i] = tables.first[2, i] + tables.row[i]
+
+
+SPACED = _jit.spaced(24)
+
+
+def summed_with_distances(tables):
+    tables = SPACED(tables)
+    for i in range(tables.row.size):
+        tables.second[1, i] = tables.first[2, i] + tables.row[i]
+
+
+@compiled_only
+@pytest.mark.parametrize(("function", "known"), [(summed, False), (summed_with_distances, True)])
+def test_distances_of_rows_are_known_to_the_compiler(function, known):
+    """The distance of two rows of 24 numbers, 384 bytes, is in the text of the kernel, and what it does is the same."""
+    tables = Tables(np.arange(72.0).reshape(3, 24), np.zeros((2, 24)), np.arange(5.0))
+    kernel = compiled(function)
+    kernel(tables)
+    assert tables.second[1, :5].tolist() == [48.0, 50.0, 52.0, 54.0, 56.0]
+    assert tables.second.sum() == 260.0
+    (text,) = kernel.inspect_llvm().values()
+    assert ("i64 384" in text) == known
 
 
 @compiled_only
