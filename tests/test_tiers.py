@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import METHODS, SURFACES, scene_of
+from conftest import METHODS, SURFACES
 
 import swarm
 from swarm.kernel import cache
@@ -57,15 +57,9 @@ def test_every_surface_is_of_a_kind():
 @compiled_only
 @pytest.mark.parametrize("names", KINDS, ids=lambda names: names[0])
 def test_both_tiers_have_the_same_bits_in_every_surface(monkeypatch, names):
+    """With every method: physics/test_methods.py."""
     for name in names:
         assert_same_bits(monkeypatch, scene_with(name), METHODS["impact"])
-
-
-@pytest.mark.physics
-@compiled_only
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "impact"])
-def test_both_tiers_have_the_same_bits_with_every_method(monkeypatch, method):
-    assert_same_bits(monkeypatch, scene_of("ellipsoid"), METHODS[method])
 
 
 @compiled_only

@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from physics.billiards import AXES, FACES, launched, scene_of, ulps_outside, wall_frames, worst_energy
+from physics.billiards import AXES, FACES, launched, run, scene_of, ulps_outside, wall_frames, worst_energy
 
 import swarm
 from swarm.run.engine import Run
@@ -31,7 +31,7 @@ def _cheaply(run, *arguments):
 
 def _facts(scene, start, until, every=0.25):
     with mock.patch.object(Run, "advance", _cheaply):
-        result = swarm.simulate(scene, start, swarm.Impact(), until=until, every=every, threads=1)
+        result = run(scene, start, swarm.Impact(), until, every, "always")
     return {
         "impacts": int(result.observables["impacts"][-1]) / len(start),
         "energy": max(float(result.observables["energy_error"].max()), worst_energy(start, result.particles)),

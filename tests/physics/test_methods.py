@@ -1,22 +1,30 @@
 """What holds for every method of the table."""
 
+import numba
 import numpy as np
 import pytest
 from conftest import METHODS
+from test_tiers import assert_same_bits
 
 import swarm
 
 pytestmark = pytest.mark.physics
+FIXED = swarm.AugmentedLagrangian(dt=1.0 / 64.0, penalty=1e4, on_unconverged="count", max_sweeps=50)
+CASES = {**METHODS, "augmented Lagrangian, fixed steps": FIXED}
 
-SCENE = swarm.Scene([swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Sphere(0.1, side="outside")])
+# A cavity and a solid that meet in an edge.
+SCENE = swarm.Scene([swarm.Ellipsoid((0.5, 0.5, 0.6)), swarm.Sphere(0.3, (0.0, 0.0, -0.5), side="outside")])
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_threads_and_block_sizes_change_no_bit(name):
-    """With edges, a solid, blocks that end in the middle of a chunk of particles, and one thread too many."""
+@pytest.mark.parametrize("name", CASES)
+def test_threads_blocks_and_tiers_change_no_bit(name, monkeypatch):
+    """With an edge, a solid, blocks that end in the middle of a chunk of particles, and one thread too many.
+
+    All in one test: its kernels are compiled once.
+    """
     particles = swarm.fill(SCENE, 3001, speed=0.5, seed=8)
     runs = [
-        swarm.simulate(SCENE, particles, METHODS[name], until=3.0, every=1.0, threads=threads, block_size=size)
+        swarm.simulate(SCENE, particles, CASES[name], until=3.0, every=1.0, threads=threads, block_size=size)
         for threads, size in ((1, None), (2, None), (3, 700), (2, 10_000))
     ]
     first = runs[0]
@@ -26,3 +34,7 @@ def test_threads_and_block_sizes_change_no_bit(name):
         assert np.array_equal(first.particles.velocity, other.particles.velocity)
         for key, seen in first.observables.items():
             assert np.array_equal(seen, other.observables[key]), key
+        for column, same in zip(first.multipliers or (), other.multipliers or (), strict=True):
+            assert np.array_equal(column, same)
+    if not numba.config.DISABLE_JIT:
+        assert_same_bits(monkeypatch, SCENE, CASES[name])

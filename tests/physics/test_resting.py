@@ -45,7 +45,7 @@ def test_an_inclined_plane():
     """s = g sin(a) t^2/2, exactly: a flat wall's sliding step is a parabola, whatever its length."""
     for angle in (0.1, 0.5, 1.0):
         slope = planes((-math.sin(angle), 0.0, -math.cos(angle)))
-        result = run(slope, swarm.Particles([0.0] * 3, [0.0] * 3), swarm.Impact(), 2.0)
+        result = run(slope, swarm.Particles([0.0] * 3, [0.0] * 3), swarm.Impact(), 2.0, compile="always")
         x, _y, z = result.particles.position[:, 0]
         way = 0.5 * G * math.sin(angle) * 4.0
         assert (x, z) == pytest.approx((way * math.cos(angle), -way * math.sin(angle)), rel=1e-9)
@@ -112,7 +112,7 @@ def test_leaving_a_ball():
     c = (2.0 + push**2 / (G * radius)) / 3.0
     errors = []
     for h in (4e-3, 1e-3, 2.5e-4):
-        end = run(scene, start, swarm.Impact(shortest_flight=h), 2.8)
+        end = run(scene, start, swarm.Impact(shortest_flight=h), 2.8, compile="always")
         x, _y, z = end.particles.position[:, 0]
         assert -5.0 < z < 0.0, "it flies: neither on the ball nor on the floor"
         assert math.hypot(x, z) > 1.1 * radius
