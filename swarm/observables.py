@@ -15,7 +15,6 @@ from .kernel.vector import Vec, column, cross, dot, square
 from .particles import State
 from .surfaces import contract as surfaces
 from .surfaces import flights
-from .surfaces import fold as walls
 
 # Particles a partial sum: a constant of the results, unlike the block size.
 CHUNK = 256
@@ -30,11 +29,6 @@ Floats = NDArray[np.float64]
 @by_type
 def penetration(chain, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
-    raise NotImplementedError
-
-
-@penetration.register(walls.Chain)
-def _(chain, r):
     distance = surfaces.distance(chain.first, r)
     other = penetration(chain.rest, r)
     return select(distance > other, distance, other)
