@@ -57,7 +57,7 @@ class AugmentedLagrangian(base.Method):
         max_sweeps: the most sweeps of a loop, 1 or more.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
-            time, and contact steps are dt long. A step on whose way another wall stands gives way to the exact
+            time, and contact steps are dt long. A step on whose way another wall stands is replaced by the exact
             reflection. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. The fixed point is the same; where there is none, so is the loop.
