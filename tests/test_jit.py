@@ -13,11 +13,13 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
 from conftest import LAWS, METHODS, call, every_surface, numbers_of, scene_of
+from numba.core.codegen import JITCodeLibrary
 
 import swarm
 from swarm.contact import regularisation
@@ -221,6 +223,41 @@ def test_scratch_is_zero_each_time():
     assert compiled(used_up_often)(1_000_000 if not numba.config.DISABLE_JIT else 10)
 
 
+class Tables(NamedTuple):
+    """As `lanes.arrays.Lanes`: two tables, and an array of one row."""
+
+    first: np.ndarray
+    second: np.ndarray
+    row: np.ndarray
+
+
+def summed(tables):
+    for i in range(tables.row.size):
+        tables.second[1, i] = tables.first[2, i] + tables.row[i]
+
+
+SPACED = _jit.spaced(24)
+
+
+def summed_with_distances(tables):
+    tables = SPACED(tables)
+    for i in range(tables.row.size):
+        tables.second[1, i] = tables.first[2, i] + tables.row[i]
+
+
+@compiled_only
+@pytest.mark.parametrize(("function", "known"), [(summed, False), (summed_with_distances, True)])
+def test_distances_of_rows_are_known_to_the_compiler(function, known):
+    """The distance of two rows of 24 numbers, 384 bytes, is in the text of the kernel, and what it does is the same."""
+    tables = Tables(np.arange(72.0).reshape(3, 24), np.zeros((2, 24)), np.arange(5.0))
+    kernel = compiled(function)
+    kernel(tables)
+    assert tables.second[1, :5].tolist() == [48.0, 50.0, 52.0, 54.0, 56.0]
+    assert tables.second.sum() == 260.0
+    (text,) = kernel.inspect_llvm().values()
+    assert ("i64 384" in text) == known
+
+
 @compiled_only
 def test_kernels_count_no_references_and_are_vectors(tmp_path):
     """The compiled text of a sphere's kernel: no call that counts, and the square root of a hit for several lanes."""
@@ -234,6 +271,50 @@ assert not re.search(r"call[^\\n]*NRT_", kernel)
 assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 """
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+
+
+@_jit.outlined
+def halved(x):
+    return x / 2.0
+
+
+@_jit.inlined
+def quartered(x):
+    return halved(halved(x))
+
+
+@compiled_only
+def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
+    made = []
+    for step in ("_optimize_final_module", "_finalize_specific"):
+        numbas = getattr(JITCodeLibrary, step)
+        monkeypatch.setattr(JITCodeLibrary, step, lambda self, numbas=numbas: made.append(self.name) or numbas(self))
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    assert _jit.kernel(one_more_quarter)(1.0) == 1.25
+    assert made == ["one_more_quarter"] * 2
+
+
+def one_more_quarter(x):
+    return x + quartered(x)
+
+
+@_jit.outlined
+def in_object_mode(x):
+    with numba.objmode(y="float64"):
+        y = sum([x])
+    return y + 1.0
+
+
+def calls_python(x):
+    return in_object_mode(x)
+
+
+@compiled_only
+@pytest.mark.filterwarnings("ignore:Code running in object mode:numba.core.errors.NumbaWarning")
+def test_a_helper_may_call_python(monkeypatch, tmp_path):
+    """Numba looks for the objects of a helper beside its machine code, which it has in the kernel only."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    assert _jit.kernel(calls_python)(1.0) == 2.0
 
 
 # --- The cache -------------------------------------------------------------------------------------------

@@ -111,6 +111,12 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     def _index_key(self, kinds: Any, codegen: Any) -> Any:
         return (*super()._index_key(kinds, codegen), *_digests(kinds))
 
+    def save_overload(self, kinds: Any, made: Any) -> None:
+        # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
+        for environment in made._find_referenced_environments():
+            made.library.codegen.set_env(environment.env_name, environment)
+        super().save_overload(kinds, made)
+
 
 def _digests(kinds: Any) -> Iterator[str]:
     for kind in kinds:

@@ -24,6 +24,7 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
+from .parts import PartCompiler
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -35,16 +36,16 @@ F = TypeVar("F", bound=Callable[..., Any])
 # instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
 # through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
-# Kernels call each other, Python never calls their compiled form: no wrappers saves a fifth of the compile time.
-_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_FLAGS}
+# Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
+_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
 
 
 def _find_scipy_only() -> None:
     """Let Numba look whether SciPy is there, as it does before the first kernel, without importing its linear algebra.
 
-    The import is 0.2 s of every start where SciPy is installed, for products of matrices that no kernel here has. One
-    that has them imports it as it always did.
+    The import is 0.1 of 0.8 s of every start where SciPy is installed, for products of matrices, which no kernel here
+    has. One that has them imports it as it always did.
     """
     ask: Any = blas.ensure_blas
 
@@ -176,8 +177,9 @@ def _emit_select(context, builder, signature, args):
 def spaced(stride: int) -> Callable[[Any], Any]:
     """A function that tells the compiler how far apart rows of the 2-D arrays in a NamedTuple are: `stride` numbers.
 
-    It gives the tuple back. With distances that are known when the kernel is run only, a lane loop spends a third of
-    its instructions on addresses, and before it checks every row against every other for an overlap.
+    It gives the tuple back. Where distances are known at run time only, a lane loop computes addresses, and before it
+    checks every row against every other for an overlap: 5.9 instead of 5.4 ns an impact in a sphere, 13.7 instead of
+    6.5 ns with a contact step.
     """
 
     def known(tables: Any) -> Any:
@@ -205,7 +207,9 @@ def spaced(stride: int) -> Callable[[Any], Any]:
 def scratch(shape: Any, dtype: Any) -> Any:
     """An array of zeros for the function of a kernel that asks for it: it is gone when that returns.
 
-    On the stack: kernels count no references, so they cannot make arrays that would have to be freed.
+    On the stack: kernels count no references, so they cannot make arrays that would have to be freed. With arrays of
+    Numba's, and references counted, an impact in a sphere costs 67 instead of 5.4 ns, and kernels a quarter more to
+    compile.
     """
     return np.zeros(shape, dtype)
 
