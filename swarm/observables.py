@@ -15,7 +15,6 @@ from .particles import Floats, State
 from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
-from .surfaces import fold as walls
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
@@ -28,11 +27,6 @@ _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PE
 @by_type
 def penetration(chain, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
-    raise NotImplementedError
-
-
-@penetration.register(walls.Chain)
-def _(chain, r):
     distance = surfaces.distance(chain.first, r)
     other = penetration(chain.rest, r)
     return select(distance > other, distance, other)

@@ -9,7 +9,6 @@ from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
 from ..kernel.vector import ZERO, Vec, largest, norm
 from ..surfaces import contract
-from ..surfaces.fold import Chain
 from . import impulse as contact_impulse
 from . import regularisation as law_of
 from .discrete_gradient import reaction
@@ -62,11 +61,6 @@ def total(reactions):
 @by_type_outlined
 def _sweep(chain, form, law, multipliers, k, step, reactions):
     """Solve every wall once; whether all were solved."""
-    raise NotImplementedError
-
-
-@_sweep.register(Chain)
-def _(chain, form, law, multipliers, k, step, reactions):
     reactions[k] = 0.0
     remaining = Step(step.r, step.p - total(reactions), step.c)
     found = reaction(form, law, multiplier_of(multipliers, k), chain.first, remaining)
@@ -101,11 +95,6 @@ def add_impulses(reactions, h, impulse, lane):
 @by_type_outlined
 def constraints(chain, law, k, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
-    raise NotImplementedError
-
-
-@constraints.register(Chain)
-def _(chain, law, k, r, into):
     start = contact_impulse.start_gap(0.0, chain.first, r, contract.inner(chain.first, r))
     into[k] = law_of.constraint(law, start.gap)
     constraints(chain.rest, law, k + 1, r, into)

@@ -51,11 +51,6 @@ def reaction_needs(gradient: str) -> tuple[Any, ...]:
 @by_type
 def nested(form):
     """Whether a step takes nested solves, which are too long for lanes."""
-    raise NotImplementedError
-
-
-@nested.register(Composite)
-def _(form):
     return False
 
 

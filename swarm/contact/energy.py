@@ -6,7 +6,6 @@ from ..kernel.gravity import Nothing, potential, weight
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import Vec, absolute, dot, square, total
 from ..surfaces import contract
-from ..surfaces.fold import Chain
 from . import regularisation as law_of
 
 # Units of round-off by which a contact that is solved may miss its energy.
@@ -33,7 +32,7 @@ class Ends(NamedTuple):
 @by_type
 def contact_energy(law, chain, over_mass, r):
     """Energy per mass that one particle stores in the walls, by 1/mass; rigid walls (None) store none."""
-    raise NotImplementedError
+    return _stored(chain, law, r) * over_mass
 
 
 @contact_energy.register(Nothing)
@@ -43,11 +42,6 @@ def _(law, chain, over_mass, r):
 
 @by_type
 def _stored(chain, law, r):
-    raise NotImplementedError
-
-
-@_stored.register(Chain)
-def _(chain, law, r):
     g = contract.gap_of(chain.first, contract.inner(chain.first, r))
     return law_of.stored_energy(law, g) + _stored(chain.rest, law, r)
 
@@ -57,24 +51,12 @@ def _(chain, law, r):
     return 0.0
 
 
-@contact_energy.register(law_of.Linear)
-@contact_energy.register(law_of.Hertz)
-@contact_energy.register(law_of.Power)
-def _(law, chain, over_mass, r):
-    return _stored(chain, law, r) * over_mass
-
-
 @by_type
 def energy_uncertainty(chain, law, over_mass, r, s):
     """How far the stored energy per mass moves when each coordinate of r moves by that of s, to first order.
 
     With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
     """
-    raise NotImplementedError
-
-
-@energy_uncertainty.register(Chain)
-def _(chain, law, over_mass, r, s):
     surface = chain.first
     g = contract.gap_of(surface, contract.inner(surface, r))
     # 2 V/g, which is the force up to the factor (a + 1)/2

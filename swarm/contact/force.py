@@ -4,7 +4,6 @@ from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, select
 from ..kernel.vector import ZERO, norm
 from ..surfaces import contract
-from ..surfaces.fold import Chain
 from . import regularisation as law_of
 
 # What the force needs of every wall.
@@ -24,11 +23,6 @@ def strength(law, surface, q):
 @by_type
 def force(chain, law, r):
     """The force of all walls [N]."""
-    raise NotImplementedError
-
-
-@force.register(Chain)
-def _(chain, law, r):
     surface = chain.first
     f = strength(law, surface, contract.inner(surface, r))
     d = contract.inner_gradient(surface, r, r)
@@ -45,11 +39,6 @@ def _(chain, law, r):
 @by_type_outlined
 def add_impulses(chain, law, factor, k, r, impulse, lane):
     """Add `factor` times the magnitude of the force of each wall to impulse[wall, lane]."""
-    raise NotImplementedError
-
-
-@add_impulses.register(Chain)
-def _(chain, law, factor, k, r, impulse, lane):
     surface = chain.first
     f = strength(law, surface, contract.inner(surface, r))
     if f != 0.0:

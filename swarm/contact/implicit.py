@@ -13,7 +13,7 @@ from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, square
 from ..surfaces import contract
-from ..surfaces.fold import Chain, of_wall
+from ..surfaces.fold import of_wall
 from . import regularisation as law_of
 from .discrete_gradient import Reaction, illinois, narrowed, reaction
 from .force import NEEDS as FORCE_NEEDS
@@ -73,11 +73,6 @@ improve = of_wall(_improve, (0.0, False))
 @by_type
 def reached(chain, wall, r, kappa):
     """s; r where there is no such wall."""
-    raise NotImplementedError
-
-
-@reached.register(Chain)
-def _(chain, wall, r, kappa):
     other = reached(chain.rest, wall - 1.0, r, kappa)
     return select(wall == 0.0, contract.resolve(chain.first, r, kappa), other)
 

@@ -89,20 +89,15 @@ def _residual(law, multiplier, surface, step, start, kappa):
 @by_type
 def start_gap(multiplier, surface, r, q0):
     """The start of a step from r, where q = q0; only multipliers need a gap of round-off to count as 0."""
-    raise NotImplementedError
+    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
+    g0 = contract.gap_of(surface, q0)
+    round_off = _ON_SURFACE * contract.gap_scale(surface, r)
+    return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
 
 
 @start_gap.register(Nothing)
 def _(multiplier, surface, r, q0):
     return Start(q0, contract.gap_of(surface, q0), 0.0, _NEWTON_TOLERANCE)
-
-
-@start_gap.register(float)
-def _(multiplier, surface, r, q0):
-    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
-    g0 = contract.gap_of(surface, q0)
-    round_off = _ON_SURFACE * contract.gap_scale(surface, r)
-    return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
 
 
 @by_type
@@ -111,19 +106,14 @@ def loop_record(multiplier, law, g0, g1, g, factor):
 
     dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
     """
-    raise NotImplementedError
+    slope, _curvature = law_of.constraint_slope(law, g0, g1)
+    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
+    return LoopRecord(mean, law_of.stored_energy(law, g), factor * slope)
 
 
 @loop_record.register(Nothing)
 def _(multiplier, law, g0, g1, g, factor):
     return LoopRecord(0.0, 0.0, 0.0)
-
-
-@loop_record.register(float)
-def _(multiplier, law, g0, g1, g, factor):
-    slope, _curvature = law_of.constraint_slope(law, g0, g1)
-    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
-    return LoopRecord(mean, law_of.stored_energy(law, g), factor * slope)
 
 
 @inlined
@@ -221,7 +211,8 @@ def careful(law, multiplier, surface, step):
 @by_type
 def _first_push(multiplier, size, df):
     """Where to look for the root first, from |F(0)| and F'(0)."""
-    raise NotImplementedError
+    # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to that.
+    return size
 
 
 @_first_push.register(Nothing)
@@ -230,12 +221,6 @@ def _(multiplier, size, df):
     # past the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from
     # there held the largest of three roots.
     return size / df if 1.0 < df < math.inf else size
-
-
-@_first_push.register(float)
-def _(multiplier, size, df):
-    # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to that.
-    return size
 
 
 @outlined

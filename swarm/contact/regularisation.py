@@ -42,81 +42,6 @@ def regularisation(penalty: float, exponent: float) -> Any:
     return Power(penalty, exponent)
 
 
-@by_type
-def stiffened(law, factor):
-    """The same law with `factor` times the penalty."""
-    raise NotImplementedError
-
-
-@stiffened.register(Linear)
-def _(law, factor):
-    return Linear(factor * law.alpha)
-
-
-@stiffened.register(Hertz)
-def _(law, factor):
-    return Hertz(factor * law.alpha)
-
-
-@stiffened.register(Power)
-def _(law, factor):
-    return Power(factor * law.alpha, law.a)
-
-
-@by_type
-def stored_energy(law, g):
-    """V(g)"""
-    raise NotImplementedError
-
-
-@by_type
-def stiffness(law, g):
-    """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
-    raise NotImplementedError
-
-
-@by_type
-def energy_slope(law, g0, g1):
-    """V[g0, g1] and its derivative by g1."""
-    raise NotImplementedError
-
-
-@by_type
-def constraint(law, g):
-    """Phi(g)"""
-    raise NotImplementedError
-
-
-@by_type
-def constraint_gradient(law, g):
-    """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
-    raise NotImplementedError
-
-
-@by_type
-def constraint_slope(law, g0, g1):
-    """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
-    raise NotImplementedError
-
-
-@by_type
-def force(multiplier, law, g0, g1):
-    """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
-    raise NotImplementedError
-
-
-@force.register(type(None))
-def _(multiplier, law, g0, g1):
-    return energy_slope(law, g0, g1)
-
-
-@force.register(float)
-def _(multiplier, law, g0, g1):
-    spring, dspring = energy_slope(law, g0, g1)
-    slope, dslope = constraint_slope(law, g0, g1)
-    return spring + multiplier * slope, dspring + multiplier * dslope
-
-
 @inlined
 def _positive(g):
     return select(g > 0.0, g, 0.0)
@@ -130,7 +55,101 @@ def _quotient(v0, v1, force1, d):
     return slope, (force1 - slope) * inverse
 
 
+# --- Any a -----------------------------------------------------------------------------------------------
+
+# Nodes and weights of the three-point Gauss rule on [0, 1].
+_NODE = 0.5 * math.sqrt(0.6)
+_THETA = (0.5 - _NODE, 0.5, 0.5 + _NODE)
+_WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+# Its error is of the sixth order in (b + 2)|g1 - g0|/g; below this ratio it is under round-off.
+_CLOSE = 1.0 / 16.0
+
+
+@inlined
+def _power_slope(b, g0, g1):
+    """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
+    d = g1 - g0
+    p0, p1 = _positive(g0), _positive(g1)
+    if g0 > 0.0 and g1 > 0.0 and abs(d) * (b + 2.0) < _CLOSE * g0:
+        # It is the mean of the derivative b g^(b-1) between the two gaps.
+        slope, curvature = 0.0, 0.0
+        for i in range(3):
+            g = g0 + _THETA[i] * d
+            part = _WEIGHT[i] * b * g ** (b - 1.0)
+            slope += part
+            curvature += _THETA[i] * (b - 1.0) * part / g
+        return slope, curvature
+    slope, curvature = _quotient(p0**b, p1**b, select(g1 >= 0.0, b * p1 ** (b - 1.0), 0.0), d)
+    # b = 1 has a corner at 0, where Phi' from the outside is 1.
+    corner = (d == 0.0) & (g0 == 0.0) & (b == 1.0)
+    return select(corner, 1.0, slope), select(corner, 0.0, curvature)
+
+
+@by_type
+def stiffened(law, factor):
+    """The same law with `factor` times the penalty."""
+    return Power(factor * law.alpha, law.a)
+
+
+@by_type
+def stored_energy(law, g):
+    """V(g)"""
+    return law.alpha / (law.a + 1.0) * _positive(g) ** (law.a + 1.0)
+
+
+@by_type
+def stiffness(law, g):
+    """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
+    return 2.0 * law.alpha / (law.a + 1.0) * _positive(g) ** (law.a - 1.0)
+
+
+@by_type
+def energy_slope(law, g0, g1):
+    """V[g0, g1] and its derivative by g1."""
+    slope, curvature = _power_slope(law.a + 1.0, g0, g1)
+    k = law.alpha / (law.a + 1.0)
+    return k * slope, k * curvature
+
+
+@by_type
+def constraint(law, g):
+    """Phi(g)"""
+    return math.sqrt(2.0 / (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a + 1.0))
+
+
+@by_type
+def constraint_gradient(law, g):
+    """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+    return select(g >= 0.0, math.sqrt(0.5 * (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a - 1.0)), 0.0)
+
+
+@by_type
+def constraint_slope(law, g0, g1):
+    """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+    slope, curvature = _power_slope(0.5 * (law.a + 1.0), g0, g1)
+    k = math.sqrt(2.0 / (law.a + 1.0))
+    return k * slope, k * curvature
+
+
+@by_type
+def force(multiplier, law, g0, g1):
+    """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
+    spring, dspring = energy_slope(law, g0, g1)
+    slope, dslope = constraint_slope(law, g0, g1)
+    return spring + multiplier * slope, dspring + multiplier * dslope
+
+
+@force.register(type(None))
+def _(multiplier, law, g0, g1):
+    return energy_slope(law, g0, g1)
+
+
 # --- a = 1 -----------------------------------------------------------------------------------------------
+
+
+@stiffened.register(Linear)
+def _(law, factor):
+    return Linear(factor * law.alpha)
 
 
 @stored_energy.register(Linear)
@@ -172,6 +191,11 @@ def _(law, g0, g1):
 
 
 # --- a = 1.5 ---------------------------------------------------------------------------------------------
+
+
+@stiffened.register(Hertz)
+def _(law, factor):
+    return Hertz(factor * law.alpha)
 
 
 @stored_energy.register(Hertz)
@@ -232,67 +256,3 @@ def _(law, g0, g1):
     s = n / total
     ds = (dn - s * dtotal) / total * (0.25 / select(both, w1 * u1, 1.0))
     return _HERTZ * select(both, s, slope), _HERTZ * select(both, ds, curvature)
-
-
-# --- any a -----------------------------------------------------------------------------------------------
-
-# Nodes and weights of the three-point Gauss rule on [0, 1].
-_NODE = 0.5 * math.sqrt(0.6)
-_THETA = (0.5 - _NODE, 0.5, 0.5 + _NODE)
-_WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-# Its error is of the sixth order in (b + 2)|g1 - g0|/g; below this ratio it is under round-off.
-_CLOSE = 1.0 / 16.0
-
-
-@stored_energy.register(Power)
-def _(law, g):
-    return law.alpha / (law.a + 1.0) * _positive(g) ** (law.a + 1.0)
-
-
-@stiffness.register(Power)
-def _(law, g):
-    return 2.0 * law.alpha / (law.a + 1.0) * _positive(g) ** (law.a - 1.0)
-
-
-@energy_slope.register(Power)
-def _(law, g0, g1):
-    slope, curvature = _power_slope(law.a + 1.0, g0, g1)
-    k = law.alpha / (law.a + 1.0)
-    return k * slope, k * curvature
-
-
-@constraint.register(Power)
-def _(law, g):
-    return math.sqrt(2.0 / (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a + 1.0))
-
-
-@constraint_gradient.register(Power)
-def _(law, g):
-    return select(g >= 0.0, math.sqrt(0.5 * (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a - 1.0)), 0.0)
-
-
-@constraint_slope.register(Power)
-def _(law, g0, g1):
-    slope, curvature = _power_slope(0.5 * (law.a + 1.0), g0, g1)
-    k = math.sqrt(2.0 / (law.a + 1.0))
-    return k * slope, k * curvature
-
-
-@inlined
-def _power_slope(b, g0, g1):
-    """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
-    d = g1 - g0
-    p0, p1 = _positive(g0), _positive(g1)
-    if g0 > 0.0 and g1 > 0.0 and abs(d) * (b + 2.0) < _CLOSE * g0:
-        # It is the mean of the derivative b g^(b-1) between the two gaps.
-        slope, curvature = 0.0, 0.0
-        for i in range(3):
-            g = g0 + _THETA[i] * d
-            part = _WEIGHT[i] * b * g ** (b - 1.0)
-            slope += part
-            curvature += _THETA[i] * (b - 1.0) * part / g
-        return slope, curvature
-    slope, curvature = _quotient(p0**b, p1**b, select(g1 >= 0.0, b * p1 ** (b - 1.0), 0.0), d)
-    # b = 1 has a corner at 0, where Phi' from the outside is 1.
-    corner = (d == 0.0) & (g0 == 0.0) & (b == 1.0)
-    return select(corner, 1.0, slope), select(corner, 0.0, curvature)

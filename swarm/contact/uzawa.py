@@ -84,11 +84,6 @@ def reflection(chain, wall, law, step):
 @by_type
 def meets_later(chain, wall, law, r, p):
     """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
-    raise NotImplementedError
-
-
-@meets_later.register(walls.Chain)
-def _(chain, wall, law, r, p):
     surface = chain.first
     leaves = contract.level_of(surface, contract.inner(surface, r + p)) > 0.0
     here = leaves & (wall != 0.0) & (not has_limit(chain, 0.0, law, r))

@@ -1,6 +1,6 @@
 """Helpers of kernels are compiled to LLVM's text only, and a kernel optimises all that it calls as one module.
 
-By itself Numba optimises each function, with all that it calls, and makes machine code of it, which nobody runs: a
+By itself Numba optimises each function, with all that it calls, and makes machine code of it, which never runs: a
 kernel links the text. For the 180 functions of `Impact` in an ellipsoid around a ball, under gravity, that was 3.9 of
 11.2 s. A kernel is no slower this way: 11.3 instead of 13.3 ns an impact of a fall in a sphere, 20.5 instead of 22.0 ns
 with Uzawa's loop, 5.4 and 5.4 ns in a sphere.

@@ -57,7 +57,7 @@ class AugmentedLagrangian(base.Method):
         max_sweeps: the most sweeps of a loop, 1 or more.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
-            time, and contact steps are dt long. A step on whose way another wall stands gives way to the exact
+            time, and contact steps are dt long. A step on whose way another wall stands is replaced by the exact
             reflection. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. The fixed point is the same; where there is none, so is the loop.
@@ -163,7 +163,7 @@ def _(method, mass, energy, v):
 
 @contract.own.register(steps.Numbers)
 def _(method, first, second, third):
-    return steps.Own(first, second, third)
+    return fixed_step.Own(first, second, third)
 
 
 @contract.most_sweeps.register(steps.Numbers)
@@ -174,7 +174,7 @@ def _(method, chain):
 @inlined
 def _free_step(gravity, lane, h):
     """The step without walls: r0, p and c = h^2/(2m)."""
-    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_2m * h * h)
+    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
 
 @contract.guess.register(steps.Numbers)
@@ -228,7 +228,7 @@ def _(method, chain, gravity, lane, wall, solution):
     solved = alone & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
     touching = wall >= 0.0
     step = (lane.left > 0.0) & touching & solved
-    budget = energies.Budget(2.0 * lane.own.over_2m, lane.own.energy, 1.0 / h * given)
+    budget = energies.Budget(2.0 * lane.own.over_mass, lane.own.energy, 1.0 / h * given)
     factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, r1, v1, h))
     new = step & steps.is_new(method, chain, lane.r)
     # A step without contact: only fixed steps end here that way, just before one.
@@ -269,7 +269,7 @@ def _(method, chain, gravity, lane, wall, lanes, i):
     reaction = corner.total(reactions)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
     corner.add_impulses(reactions, h, lanes.impulse, i)
-    budget = energies.Budget(2.0 * lane.own.over_2m, lane.own.energy, 1.0 / h * (2.0 / h * norm(reaction)))
+    budget = energies.Budget(2.0 * lane.own.over_mass, lane.own.energy, 1.0 / h * (2.0 / h * norm(reaction)))
     factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
     left = lane.left - cut.used
     return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, 0.0), Status.DONE.value

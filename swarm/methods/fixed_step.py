@@ -6,14 +6,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
+from ..contact.discrete_gradient import nested
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import by_type, inlined, kept, select
+from ..kernel.jit import by_type, by_type_outlined, inlined, kept, select
 from ..kernel.vector import Vec, square
 from ..particles import Particles
 from ..scene import Scene
+from ..status import Status
 from ..surfaces import flights
+from ..surfaces import fold as walls
 from . import base, contract
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
@@ -118,7 +121,38 @@ def of_steps(scene: Scene) -> tuple[Any, ...]:
     return asked
 
 
-# --- Kernels ---------------------------------------------------------------------------------------------
+# --- What kernels know -----------------------------------------------------------------------------------
+
+
+class Numbers(NamedTuple):
+    """What kernels know of a method with soft walls; each method has its own subclass."""
+
+    dt: float
+    law: Any
+    longest: Any  # step that jumps over no solid [m], None where there is none
+    factor: float  # of 1/mass in what a lane keeps
+    form: Any  # of the discrete gradient, or an implicit rule, or None
+
+
+class Own(NamedTuple):
+    """What a lane keeps."""
+
+    over_mass: float  # the method's factor over the mass
+    energy: float  # per mass, at the start
+    unused: float
+
+
+@contract.constants.register(Numbers)
+def _(method, mass, energy, v):
+    return method.factor / mass, energy, 0.0
+
+
+@contract.own.register(Numbers)
+def _(method, first, second, third):
+    return Own(first, second, third)
+
+
+# --- The way to a contact --------------------------------------------------------------------------------
 
 
 @by_type
@@ -132,56 +166,78 @@ def _(longest, p):
     return square(p) > longest * longest
 
 
-@inlined
-def free_steps(chain, gravity, dt, lane):
-    """The `Flight` over the steps that surely stay free."""
+@by_type
+def reach(form, h, law, chain, gravity, lane):
+    """From r0 to the point whose force an implicit rule takes, as if there were none; to r1 for any other method."""
+    return displacement(gravity, lane.v, h)
+
+
+@contract.flight.register(Numbers)
+def flight(method, chain, gravity, lane):
+    """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
+    dt = method.dt
     # One too many by round-off starts a contact 1e-16 deep: harmless.
     steps = np.floor(flights.free_time(gravity, chain, lane.r, lane.v) * (1.0 / dt))
     steps = select(steps < lane.left, steps, lane.left)
     t = steps * dt
-    r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
-    return contract.Flight(r, v, lane.left - steps, -1.0)
-
-
-@inlined
-def before_step(method, start, touched, alone, p):
-    """A flight over free steps, with the wall of the step that follows: HARD where one lane cannot take it alone."""
+    start = contract.Lane(
+        lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
+        lane.own,
+    )  # fmt: skip
+    touched = walls.touched(chain, start.r, reach(method.form, dt, method.law, chain, gravity, start))
+    # Several walls at once, or nested solves: the careful way.
+    alone = (touched.number <= 1.0) & (not nested(method.form))
     wall = select(alone, touched.wall, contract.HARD - touched.wall)
-    wall = select(too_fast(method.longest, p), contract.HARD, wall)
+    wall = select(too_fast(method.longest, displacement(gravity, start.v, dt)), contract.HARD, wall)
     return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
 
 
+# --- The contact -----------------------------------------------------------------------------------------
+
+
 class Taken(NamedTuple):
-    """Where a step ends, how it changes the wall's number, its impulse per mass, and whether it starts an impact."""
+    """A step of a lane: its end, whether it is the solution, its impulse per mass, and whether it starts an impact."""
 
     r: Vec
     v: Vec
-    wall: float
+    solved: bool
     impulse: float
     new: bool
 
 
 @inlined
-def contact(lane, step, taken):
-    """The `Contact` of a lane that takes its step, or does not."""
+def contact(lane, wall, taken):
+    """The `Contact` of a lane that takes its step, or leaves it to the careful way, or is at the end of its frame."""
+    touching = wall >= 0.0
+    step = (lane.left > 0.0) & select(touching, taken.solved, wall > contract.HARD)
     return contract.Contact(
         select(step, taken.r, kept(lane.r)),
         select(step, taken.v, kept(lane.v)),
         lane.left - select(step, 1.0, 0.0),
-        taken.wall,
+        select(touching & (not taken.solved), contract.HARD - wall, wall),
         select(step, taken.impulse, 0.0),
         select(step & taken.new, 1.0, 0.0),
         0.0,
     )
 
 
+@by_type_outlined
+def careful_step(method, chain, gravity, lane, impulse, i):
+    """(r1, v1, whether that is the solution) of a step against any number of walls. Adds to impulse[wall, i]."""
+    raise NotImplementedError
+
+
+@contract.hard_pass.register(Numbers)
+def _(method, chain, gravity, lane, wall, lanes, i):
+    if too_fast(method.longest, displacement(gravity, lane.v, method.dt)):
+        return refused(lane, Status.TOO_FAST.value)
+    r, v, solved = careful_step(method, chain, gravity, lane, lanes.impulse, i)
+    new = select(walls.outside(chain, -1.0, lane.r), 0.0, 1.0)
+    status = Status.DONE.value if solved else Status.UNSOLVED.value
+    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, new, 0.0), status
+
+
 @inlined
 def refused(lane, status):
     """A hard step that is not taken, for this reason."""
     return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0), status
-
-
-@inlined
-def done(lane, r, v, new, status):
-    """A hard step that is."""
-    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, select(new, 1.0, 0.0), 0.0), status

@@ -38,15 +38,15 @@ class Midpoint(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *implicit.NEEDS
 
     def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.RuleNumbers(self.dt, self.law(), fixed_step.longest_step(scene), MidpointRule())
+        return implicit_rule.numbers(self, scene, MidpointRule())
 
 
 class MidpointRule(NamedTuple):
     """Chooses this rule."""
 
 
-@implicit_rule.reach.register(MidpointRule)
-def _(rule, h, law, chain, gravity, lane):
+@fixed_step.reach.register(MidpointRule)
+def _(form, h, law, chain, gravity, lane):
     # rm = r0 + h/2 v0 + h^2/4 a(rm)
     return 0.5 * h * accelerated(gravity, lane.v, 0.5 * h)
 

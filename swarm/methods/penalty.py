@@ -1,20 +1,19 @@
 """Penalty: fixed steps with soft walls, conserving kinetic + potential + stored energy."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
-from ..contact.discrete_gradient import form_of, nested, reaction_needs
+from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.records import Step
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import inlined, scratch, select
 from ..kernel.vector import norm
 from ..scene import Scene
-from ..status import Status
 from ..surfaces import fold as walls
 from . import contract, fixed_step
 
@@ -58,53 +57,22 @@ class Penalty(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *reaction_needs(self.gradient)
 
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
-        return PenaltyNumbers(self.dt, self.law(), form_of(self.gradient), fixed_step.longest_step(scene))
+        # h^2/(2m) of equation (K) in contact/impulse.py
+        factor, form = 0.5 * self.dt * self.dt, form_of(self.gradient)
+        return PenaltyNumbers(self.dt, self.law(), fixed_step.longest_step(scene), factor, form)
 
 
-class PenaltyNumbers(NamedTuple):
+class PenaltyNumbers(fixed_step.Numbers):
     """What kernels know of the method."""
-
-    dt: float
-    law: Any
-    form: Any  # of the discrete gradient
-    longest: Any  # step that jumps over no solid [m], None where there is none
-
-
-class PenaltyOwn(NamedTuple):
-    """What a lane keeps."""
-
-    c: float  # h^2/(2m) of equation (K) in contact/impulse.py
-    energy: float  # per mass, at the start
-    unused: float
 
 
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@contract.constants.register(PenaltyNumbers)
-def _(method, mass, energy, v):
-    return 0.5 * method.dt * method.dt / mass, energy, 0.0
-
-
-@contract.own.register(PenaltyNumbers)
-def _(method, first, second, third):
-    return PenaltyOwn(first, second, third)
-
-
 @inlined
 def _step(method, gravity, lane):
     """The step without walls: r0, p and c."""
-    return Step(lane.r, displacement(gravity, lane.v, method.dt), lane.own.c)
-
-
-@contract.flight.register(PenaltyNumbers)
-def _(method, chain, gravity, lane):
-    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
-    p = displacement(gravity, start.v, method.dt)
-    touched = walls.touched(chain, start.r, p)
-    # Several walls at once, or nested solves: the careful way.
-    alone = (touched.number <= 1.0) & (not nested(method.form))
-    return fixed_step.before_step(method, start, touched, alone, p)
+    return Step(lane.r, displacement(gravity, lane.v, method.dt), lane.own.over_mass)
 
 
 @contract.most_sweeps.register(PenaltyNumbers)
@@ -139,33 +107,25 @@ def _(method, chain, gravity, lane, wall, solution):
     v1 = accelerated(gravity, lane.v, h) - f * g
 
     # A push into another wall, or an equation that is not solved yet: the careful way.
-    budget = energies.Budget(2.0 / (h * h) * lane.own.c, lane.own.energy, 0.0)
+    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, lane.own.energy, 0.0)
     factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
     solved = balanced & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
     solved = solved & (not walls.outside(chain, wall, r1))
-    taken = fixed_step.Taken(
-        r1,
-        v1 * select(touching, factor, 1.0),
-        select(touching & (not solved), contract.HARD - wall, wall),
-        abs(f) * norm(g),
-        touching & (not walls.outside(chain, -1.0, lane.r)),
-    )
-    return fixed_step.contact(lane, (lane.left > 0.0) & select(touching, solved, wall > contract.HARD), taken)
+    new = touching & (not walls.outside(chain, -1.0, lane.r))
+    taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new)
+    return fixed_step.contact(lane, wall, taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@contract.hard_pass.register(PenaltyNumbers)
-def _(method, chain, gravity, lane, wall, lanes, i):
+@fixed_step.careful_step.register(PenaltyNumbers)
+def _(method, chain, gravity, lane, impulse, i):
     h, step = method.dt, _step(method, gravity, lane)
-    if fixed_step.too_fast(method.longest, step.p):
-        return fixed_step.refused(lane, Status.TOO_FAST.value)
     reactions = scratch((walls.length(chain), 4), np.float64)
     r1, solved = corner.hold(method.form, method.law, None, chain, step, reactions)
-    corner.add_impulses(reactions, h, lanes.impulse, i)
+    corner.add_impulses(reactions, h, impulse, i)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
-    budget = energies.Budget(2.0 / (h * h) * lane.own.c, lane.own.energy, 0.0)
+    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, lane.own.energy, 0.0)
     factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
-    status = Status.DONE.value if solved and balanced else Status.UNSOLVED.value
-    return fixed_step.done(lane, r1, v1 * factor, not walls.outside(chain, -1.0, lane.r), status)
+    return r1, v1 * factor, solved and balanced

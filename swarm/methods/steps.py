@@ -12,7 +12,6 @@ from ..contact import uzawa
 from ..contact.discrete_gradient import nested
 from ..contact.reflection import Energy, chord, exact
 from ..contact.sliding import Contacts, Moving, impact
-from ..kernel.gravity import displacement
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
 from ..kernel.vector import square
 from ..status import Status
@@ -48,14 +47,6 @@ class FixedSteps(Numbers):
 
 class CutSteps(Numbers):
     """The method with steps that begin at the impact, without gravity."""
-
-
-class Own(NamedTuple):
-    """What a lane keeps."""
-
-    over_2m: float  # 1/(2m)
-    energy: float  # per mass, at the start
-    unused: float
 
 
 class Cut(NamedTuple):
@@ -107,16 +98,7 @@ def _first_energy(lane):
 # --- Steps of fixed length -------------------------------------------------------------------------------
 
 
-@contract.flight.register(FixedSteps)
-def _(method, chain, gravity, lane):
-    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
-    p = displacement(gravity, start.v, method.dt)
-    touched = walls.touched(chain, start.r, p)
-    alone = (touched.number <= 1.0) & (not nested(method.form))
-    end = fixed_step.before_step(method, start, touched, alone, p)
-    # A step that touches nothing is no contact.
-    jumps = fixed_step.too_fast(method.longest, p)
-    return contract.Flight(end.r, end.v, end.left, select((touched.number > 0.0) | jumps, end.wall, -1.0))
+contract.flight.register(FixedSteps, fixed_step.flight)
 
 
 @step_of.register(FixedSteps)

@@ -39,23 +39,23 @@ class Trapezoidal(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *implicit.NEEDS
 
     def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.RuleNumbers(self.dt, self.law(), fixed_step.longest_step(scene), TrapezoidalRule())
+        return implicit_rule.numbers(self, scene, TrapezoidalRule())
 
 
 class TrapezoidalRule(NamedTuple):
     """Chooses this rule."""
 
 
-@implicit_rule.reach.register(TrapezoidalRule)
-def _(rule, h, law, chain, gravity, lane):
+@fixed_step.reach.register(TrapezoidalRule)
+def _(form, h, law, chain, gravity, lane):
     # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
-    return displacement(gravity, lane.v, h) + lane.own.c * force(chain, law, lane.r)
+    return displacement(gravity, lane.v, h) + lane.own.over_mass * force(chain, law, lane.r)
 
 
 @implicit_rule.end.register(TrapezoidalRule)
 def _(rule, h, law, chain, gravity, lane, point, push):
     # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
-    kick = 2.0 / h * (push - lane.own.c * force(chain, law, lane.r))
+    kick = 2.0 / h * (push - lane.own.over_mass * force(chain, law, lane.r))
     return implicit_rule.RuleStep(point, accelerated(gravity, lane.v, h) - kick, kick)
 
 
@@ -63,4 +63,4 @@ def _(rule, h, law, chain, gravity, lane, point, push):
 def _(rule, method, chain, lane, reactions, impulse, i):
     corner.add_impulses(reactions, method.dt, impulse, i)
     # h/(2m) |F0|
-    add_impulses(chain, method.law, 2.0 * lane.own.c / method.dt, 0, lane.r, impulse, i)
+    add_impulses(chain, method.law, 2.0 * lane.own.over_mass / method.dt, 0, lane.r, impulse, i)

@@ -9,7 +9,6 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import inlined
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
-from ..status import Status
 from ..surfaces import fold as walls
 from . import contract, fixed_step
 
@@ -44,45 +43,14 @@ class Verlet(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *FORCE_NEEDS
 
     def numbers(self, scene: Scene) -> "VerletNumbers":
-        return VerletNumbers(self.dt, self.law(), fixed_step.longest_step(scene))
+        return VerletNumbers(self.dt, self.law(), fixed_step.longest_step(scene), 0.5 * self.dt, None)
 
 
-class VerletNumbers(NamedTuple):
+class VerletNumbers(fixed_step.Numbers):
     """What kernels know of the method."""
-
-    dt: float
-    law: Any
-    longest: Any  # step that jumps over no solid [m], None where there is none
-
-
-class VerletOwn(NamedTuple):
-    """What a lane keeps."""
-
-    over_mass: float  # h/(2m)
-    unused: float
-    also_unused: float
 
 
 # --- One pass --------------------------------------------------------------------------------------------
-
-
-@contract.constants.register(VerletNumbers)
-def _(method, mass, energy, v):
-    return 0.5 * method.dt / mass, 0.0, 0.0
-
-
-@contract.own.register(VerletNumbers)
-def _(method, first, second, third):
-    return VerletOwn(first, second, third)
-
-
-@contract.flight.register(VerletNumbers)
-def _(method, chain, gravity, lane):
-    start = fixed_step.free_steps(chain, gravity, method.dt, lane)
-    p = displacement(gravity, start.v, method.dt)
-    touched = walls.touched(chain, start.r, p)
-    # Impulses of several walls at once: one by one.
-    return fixed_step.before_step(method, start, touched, touched.number <= 1.0, p)
 
 
 class VerletStep(NamedTuple):
@@ -108,18 +76,15 @@ def _step(method, chain, gravity, lane):
 def _(method, chain, gravity, lane, wall, solution):
     step = _step(method, chain, gravity, lane)
     new = (wall >= 0.0) & (not walls.outside(chain, -1.0, lane.r))
-    taken = fixed_step.Taken(step.r, step.v, wall, norm(step.kick), new)
-    return fixed_step.contact(lane, (lane.left > 0.0) & (wall > contract.HARD), taken)
+    return fixed_step.contact(lane, wall, fixed_step.Taken(step.r, step.v, True, norm(step.kick), new))
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
 
 
-@contract.hard_pass.register(VerletNumbers)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    if fixed_step.too_fast(method.longest, displacement(gravity, lane.v, method.dt)):
-        return fixed_step.refused(lane, Status.TOO_FAST.value)
+@fixed_step.careful_step.register(VerletNumbers)
+def _(method, chain, gravity, lane, impulse, i):
     step = _step(method, chain, gravity, lane)
-    add_impulses(chain, method.law, lane.own.over_mass, 0, lane.r, lanes.impulse, i)
-    add_impulses(chain, method.law, lane.own.over_mass, 0, step.r, lanes.impulse, i)
-    return fixed_step.done(lane, step.r, step.v, not walls.outside(chain, -1.0, lane.r), Status.DONE.value)
+    add_impulses(chain, method.law, lane.own.over_mass, 0, lane.r, impulse, i)
+    add_impulses(chain, method.law, lane.own.over_mass, 0, step.r, impulse, i)
+    return step.r, step.v, True
