@@ -231,6 +231,8 @@ def _closed_bounds(
         is_flat = is_flat or bool(((flat <= flattest) & (flat > _PARALLEL)).any())
         index = index[flat > flattest]
         vertices = np.linalg.solve(normals[index], offsets[index][:, :, None])[:, :, 0]
+        # Also those that are not finite: planes that are parallel but for a component of 1e-300.
+        vertices = vertices[np.abs(vertices).max(axis=1, initial=0.0) <= 2.0 * far]
         room = tolerance * (np.abs(offsets) + np.abs(vertices).max(axis=1, initial=0.0)[:, None])
         vertices = vertices[(vertices @ normals.T <= offsets + room).all(axis=1)]
         found_low = np.minimum(found_low, vertices.min(axis=0, initial=math.inf))

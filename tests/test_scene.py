@@ -193,3 +193,10 @@ def test_many_planes_have_the_bounds_of_their_corners(monkeypatch):
     corners = np.array([corner for corner in corners if (normals @ corner <= 1.0 + 1e-9).all()])
     bounds = Scene([Plane(tuple(normal), 1.0) for normal in normals]).bounds()
     assert bounds == (pytest.approx(corners.min(axis=0)), pytest.approx(corners.max(axis=0)))
+
+
+def test_planes_that_are_parallel_but_for_a_subnormal_number_have_bounds():
+    """Where they meet has no finite coordinates; filterwarnings makes a warning an error."""
+    walls = [Plane((1.0, 2.2250738585072014e-308, 0.0), 0.3), Plane((-1.0, 0.0, 0.0), 0.3)]
+    bounds = Scene(walls).bounds()
+    assert bounds == ((-0.3, -math.inf, -math.inf), (0.3, math.inf, math.inf))

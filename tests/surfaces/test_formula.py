@@ -1,5 +1,6 @@
 """Formulas against the surfaces they describe, and the bounds that make their first hits sure."""
 
+import dataclasses
 import math
 import types
 
@@ -339,6 +340,12 @@ def test_a_formula_with_parameters_has_a_hash():
     assert one == same != other
     assert hash(one) == hash(same)
     assert len({one, same, other}) == 2
+
+
+def test_one_argument_is_replaced():
+    one = swarm.Formula("x**2 + y**2 + z**2 - r**2", parameters={"r": 0.5}, bounds=((-1, -1, -1), (1, 1, 1)))
+    other = dataclasses.replace(one, side="outside")
+    assert (other.side, other.formula, other.parameters, other.box) == ("outside", one.formula, one.parameters, one.box)
 
 
 def test_its_table_and_back():

@@ -48,9 +48,9 @@ class FormSurface(Surface):
 
     def _set(self, common: dict[str, Any], **given: Any) -> None:
         """Set the fields from the arguments of `__init__`."""
+        # `dataclasses.replace` gives every field by its own name.
         for one in fields(self):  # type: ignore[arg-type]
-            if one.name not in given:
-                given[one.name] = common.pop(one.name, one.default)
+            given[one.name] = common.pop(one.name, given.get(one.name, one.default))
         for name in common:
             raise SceneError(f"{type(self).__name__} has no argument {name!r}{checks.closest(name, given)}")
         for name, value in given.items():
