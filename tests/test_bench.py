@@ -21,6 +21,7 @@ def printed(name):
     return done.stdout
 
 
+@pytest.mark.long
 def test_throughput_quick():
     told = printed("throughput")
     for row in (

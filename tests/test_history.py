@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import rarely
 
 import swarm
 
@@ -156,14 +155,13 @@ def test_reflection_start_for_an_exponent_above_one(exponent):
 # --- Methods that take one sweep -------------------------------------------------------------------------
 
 
-# Each compiles kernels of its own: every law, form and field, but not their product.
 @pytest.mark.parametrize(
     ("exponent", "gradient", "pull"),
     [
         (1.0, "composite", None),
         (4.0, "mean-value", (0.1, -0.2, -1.0)),
-        rarely(1.5, "composite", (0.1, -0.2, -1.0)),
-        rarely(1.5, "mean-value", None),
+        (1.5, "composite", (0.1, -0.2, -1.0)),
+        (1.5, "mean-value", None),
     ],
 )
 def test_penalty_is_one_sweep(exponent, gradient, pull):
@@ -203,7 +201,7 @@ def test_impact_is_one_step_of_simulate():
     _is_one_step_of_simulate(history, SPHERE, *STATE_ONE, 2.0, method, 0.025)
 
 
-@pytest.mark.parametrize("adaptive", [rarely(False), True])
+@pytest.mark.parametrize("adaptive", [False, True])
 def test_a_converged_loop_is_one_step_of_simulate(adaptive):
     method = swarm.AugmentedLagrangian(0.025, 1e4, tolerance=1e-24, adaptive=adaptive)
     history = swarm.contact_history(SPHERE, *STATE_ONE, 2.0, method)
@@ -211,7 +209,7 @@ def test_a_converged_loop_is_one_step_of_simulate(adaptive):
 
 
 def _is_one_step_of_simulate(history, scene, position, velocity, mass, method, h):
-    end = swarm.simulate(scene, swarm.Particles(position, velocity, mass), method, until=h, threads=1).particles
+    end = swarm.simulate(scene, swarm.Particles(position, velocity, mass), method, until=h, compile="never").particles
     assert history.position[-1] == pytest.approx(end.position[:, 0], rel=0.0, abs=1e-15)
     assert history.velocity[-1] == pytest.approx(end.velocity[:, 0], rel=0.0, abs=1e-13)
 

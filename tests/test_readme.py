@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from test_cli import command
 
 from swarm import scene_file
 from swarm.run.options import RunOptions
@@ -114,7 +115,7 @@ def test_the_commands_run_in_their_order(tmp_path):
             outputs.append(Path(words[1]).stem + ".h5")
         for output in outputs:
             (tmp_path / output).unlink(missing_ok=True)
-        done = subprocess.run([sys.executable, "-m", "swarm", *words], cwd=tmp_path, capture_output=True, text=True)
+        done = command(*words, cwd=tmp_path)
         assert done.returncode == 0, (words, done.stderr)
         assert all((tmp_path / output).stat().st_size for output in outputs)
 

@@ -37,7 +37,7 @@ def end_of(run, span):
 
 def assert_same_bits(monkeypatch, scene, method):
     """In plain Python, compiled, and wherever a run changes from one to the other: after one pass, or after seven."""
-    start, span = swarm.fill(scene, 6, speed=1.0, seed=1), method.span("until", 4.0)
+    start, span = swarm.fill(scene, 3, speed=1.0, seed=1), method.span("until", 2.0)
     plain = end_of(Run(scene, start.copy(), method, 1, None, "never"), span)
     assert end_of(Run(scene, start.copy(), method, 1, None, "always"), span) == plain
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)

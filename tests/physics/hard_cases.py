@@ -1,15 +1,9 @@
-"""Launches that graze, hit corners and enter cusps, run by `python hard_cases.py NAME` so that a hang can be ended."""
+"""Launches that graze, hit corners and enter cusps, and what is known of each run: `CASES[name]()`."""
 
-import json
 import math
-import sys
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from physics.billiards import AXES, FACES, launched, run, scene_of, ulps_outside, wall_frames, worst_energy
 
 import swarm
@@ -178,6 +172,3 @@ CASES = {
     "thin_cap": thin_cap,
     "thinner_cap": thinner_cap,
 }
-
-if __name__ == "__main__":
-    print(json.dumps(CASES[sys.argv[1]]()))

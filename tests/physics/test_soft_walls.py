@@ -68,9 +68,7 @@ def test_half_period_of_the_linear_spring():
 def test_bounce_off_the_soft_wall(exponent):
     """After the bounce the time spent inside shows in the position: order 2; the speed is exact whatever the step."""
     until = 2.0
-    errors = _errors(
-        (1000, 2000, 4000, 8000), until, exponent, lambda d: wall_bounce(d, SPEED, until, STIFFNESS, exponent)
-    )
+    errors = _errors((1000, 2000, 4000), until, exponent, lambda d: wall_bounce(d, SPEED, until, STIFFNESS, exponent))
     slopes = _slopes(errors[:, 0])
     assert (slopes >= 1.8).all(), slopes
     assert (slopes <= 2.2).all(), slopes
@@ -117,7 +115,7 @@ _SLOPES = {"sphere": 1.0, "hemisphere": 1.0, "ellipsoid": 5.0, "ball in ellipsoi
 
 def _worst_energy_error(name, gravity, exponent, omegas, steps):
     # In plain Python a thousand steps of a few particles take as long as the compiler.
-    n, compile = (40, "always") if steps == _MANY else (3, "never")
+    n, compile = (10, "always") if steps == _MANY else (3, "never")
     scene, worst = scene_of(name, gravity), {}
     for omega in omegas:
         for dt in (1e-3, 0.025):
@@ -139,9 +137,9 @@ _EXPONENTS = (1.0, 1.5, 2.3, 4.0)
 @pytest.mark.parametrize(
     ("name", "gravity", "exponent", "steps"),
     [
-        *(("sphere", _PULL, exponent, _MANY) for exponent in _EXPONENTS),
-        *((*shape, exponent, _FEW) for shape in (("sphere", None), *_FALLING[1:]) for exponent in _EXPONENTS),
-        *(rarely(*shape, exponent, _MANY) for shape in (("sphere", None), *_FALLING[1:]) for exponent in _EXPONENTS),
+        *(("sphere", _PULL, exponent, _MANY) for exponent in (1.0, 2.3)),
+        *((*shape, exponent, _FEW) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS),
+        *(rarely(*shape, exponent, _MANY) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS),
     ],
 )
 class TestPenaltyKeepsEnergy:
