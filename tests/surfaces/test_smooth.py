@@ -86,7 +86,7 @@ def test_the_closed_form_of_the_capsule_is_the_march(side):
         if capsule.side * call(contract.phi, capsule, position) > 0.0:
             continue
         time, found = call(contract.first_hit, capsule, position, velocity)
-        marched, _found = call(march.march, capsule, position, velocity, np.zeros(3))
+        marched, _found = call(marches.march, capsule, position, velocity, np.zeros(3))
         assert found
         if time == math.inf:
             assert marched > 1e9
