@@ -108,7 +108,7 @@ def joachimsthal(particles, axes=AXES):
     return (a * r * v).sum(axis=0) ** 2 - (a * v * v).sum(axis=0) * ((a * r * r).sum(axis=0) - 1.0)
 
 
-def ellipsoid_area(axes=AXES, n=400):
+def ellipsoid_area(axes=AXES, n=60):
     """Surface by the trapezoidal rule in the angle and Gauss's rule in the height, both spectral."""
     a, b, c = axes
     u, weights = np.polynomial.legendre.leggauss(n)
