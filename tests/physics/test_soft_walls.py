@@ -137,9 +137,10 @@ _EXPONENTS = (1.0, 1.5, 2.3, 4.0)
 @pytest.mark.parametrize(
     ("name", "gravity", "exponent", "steps"),
     [
-        *(("sphere", _PULL, exponent, _MANY) for exponent in (1.0, 2.3)),
+        ("sphere", _PULL, 1.0, _MANY),
         *((*shape, exponent, _FEW) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS),
-        *(rarely(*shape, exponent, _MANY) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS),
+        *(rarely(*shape, exponent, _MANY) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS[1:]),
+        *(rarely(*shape, 1.0, _MANY) for shape in (("sphere", None), *_FALLING[1:])),
     ],
 )
 class TestPenaltyKeepsEnergy:
