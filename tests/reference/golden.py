@@ -11,6 +11,7 @@ compilations. Still each step costs a thousand times its compiled time, so the r
 every branch: some ten impacts of 30 particles with `Impact`, one or two of four particles with a fixed step.
 """
 
+import functools
 import hashlib
 import json
 import multiprocessing
@@ -90,6 +91,7 @@ SLOW = {
 }
 
 
+@functools.cache
 def runs():
     """Name -> (surfaces, gravity, method, particles, until)."""
     made = {}

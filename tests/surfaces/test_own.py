@@ -55,7 +55,7 @@ def test_the_trajectory_is_that_of_the_ellipsoid(keywords):
     center = keywords.get("center", (0.0, 0.0, 0.0))
     scenes = [swarm.Scene([ellipsoid(**keywords)]), swarm.Scene([swarm.Ellipsoid((0.3, 0.4, 0.5), center)])]
     particles = swarm.fill(scenes[1], 5, speed=1.0, seed=1)
-    ends = [swarm.simulate(scene, particles, swarm.Impact(), until=12.0) for scene in scenes]
+    ends = [swarm.simulate(scene, particles, swarm.Impact(), until=12.0, compile="never") for scene in scenes]
     assert ends[0].observables["impacts"][-1] == ends[1].observables["impacts"][-1] > 20 * 5
     assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-10
 
@@ -121,7 +121,7 @@ def test_bounds_and_table():
 
 def test_a_trajectory_is_written(tmp_path):
     scene = swarm.Scene([ellipsoid()])
-    swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0), swarm.Impact(), until=0.1, trajectory=tmp_path / "own.h5")
+    swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0), swarm.Impact(), until=0.1, trajectory=tmp_path / "own.h5", compile="never")
     with swarm.load(tmp_path / "own.h5") as trajectory:
         assert trajectory.frame(-1).position.shape == (3, 3)
 
