@@ -41,8 +41,8 @@ def test_the_error_of_verlet_falls_with_the_step():
     """It is no mistake of the baseline: at a fixed wall, a quarter of the step is a smaller error."""
     particles, errors = swarm.fill(SPHERE, 60, speed=0.5, seed=2), []
     for dt in (2.0**-8, 2.0**-10, 2.0**-12):
-        seen = swarm.simulate(SPHERE, particles, swarm.Verlet(dt, 1e4), until=16.0, every=1.0, compile="always").observables
-        errors.append(float(seen["energy_error"].max()))
+        end = swarm.simulate(SPHERE, particles, swarm.Verlet(dt, 1e4), until=16.0, every=1.0, compile="always")
+        errors.append(float(end.observables["energy_error"].max()))
     assert errors[1] < 0.5 * errors[0]
     assert errors[2] < 0.5 * errors[1]
     assert np.isfinite(errors).all()

@@ -120,9 +120,10 @@ def test_bounds_and_table():
 
 
 def test_a_trajectory_is_written(tmp_path):
-    scene = swarm.Scene([ellipsoid()])
-    swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0), swarm.Impact(), until=0.1, trajectory=tmp_path / "own.h5", compile="never")
-    with swarm.load(tmp_path / "own.h5") as trajectory:
+    scene, file = swarm.Scene([ellipsoid()]), tmp_path / "own.h5"
+    start = swarm.fill(scene, 3, speed=1.0)
+    swarm.simulate(scene, start, swarm.Impact(), until=0.1, trajectory=file, compile="never")
+    with swarm.load(file) as trajectory:
         assert trajectory.frame(-1).position.shape == (3, 3)
 
 
