@@ -7,7 +7,7 @@ from .options import Task
 from .session import Session
 
 if TYPE_CHECKING:
-    from ..output.beside import Beside, Writer
+    from ..output.background import Background, Writer
 
 
 def recorder_of(task: Task) -> "Writer | None":
@@ -31,16 +31,16 @@ def recorder_of(task: Task) -> "Writer | None":
     )
 
 
-def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Beside | None":
+def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Background | None":
     """A context that gives the function which writes a frame, in a background thread."""
     outputs = [(_trajectory(task, session), task.options.storage.kept()), (recorder, slice(None))]
     used = [(one, kept) for one, kept in outputs if one is not None]
     if not used:
         return None
-    from ..output.beside import Beside, Several
+    from ..output.background import Background, Several
 
     n = len(task.particles)
-    return Beside(Several(used), n) if len(used) > 1 else Beside(used[0][0], n, used[0][1])
+    return Background(Several(used), n) if len(used) > 1 else Background(used[0][0], n, used[0][1])
 
 
 def _trajectory(task: Task, session: Session) -> "Writer | None":

@@ -16,7 +16,7 @@ from .engine import Run
 from .options import RunOptions, Task
 
 if TYPE_CHECKING:
-    from ..output.beside import Beside
+    from ..output.background import Background
     from ..output.checkpoint import Arrays, Job
 
 
@@ -165,7 +165,7 @@ class Session:
         """Seconds of all sessions of the run."""
         return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
 
-    def look(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+    def look(self, run: Run, writer: "Background | None", frame: int, moment: float, following: float | None) -> None:
         """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
 
         Raises:
@@ -183,7 +183,7 @@ class Session:
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
-    def _save(self, run: Run, writer: "Beside | None", frame: int, moment: float, following: float | None) -> None:
+    def _save(self, run: Run, writer: "Background | None", frame: int, moment: float, following: float | None) -> None:
         from ..output import checkpoint
 
         assert self._job is not None

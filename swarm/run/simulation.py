@@ -25,7 +25,7 @@ from .outputs import recorder_of, writer_of
 from .session import Session
 
 if TYPE_CHECKING:
-    from ..output.beside import Beside
+    from ..output.background import Background
     from .progress import Display
 
 _LOG = logging.getLogger("swarm")
@@ -83,7 +83,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
             observe; fail if a number is not finite, or a particle outside rigid walls
-            copy the frame; a thread beside writes and flushes it
+            copy the frame; a background thread writes and flushes it
             update the progress display
             save a checkpoint if one is due (within a long frame too)
 
@@ -172,7 +172,9 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
         )
 
 
-def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", show: "Display") -> list[dict[str, Any]]:
+def _frames(
+    task: Task, session: Session, run: Run, writer: "Background | None", show: "Display"
+) -> list[dict[str, Any]]:
     """All frames of this session: their observables, if no trajectory holds them."""
     history: list[dict[str, Any]] = []
     until, span_of = task.options.until, task.method.span
@@ -199,7 +201,7 @@ def _frames(task: Task, session: Session, run: Run, writer: "Beside | None", sho
     return history
 
 
-def _meanwhile(session: Session, writer: "Beside | None", show: "Display") -> tuple[float, float]:
+def _meanwhile(session: Session, writer: "Background | None", show: "Display") -> tuple[float, float]:
     """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
     return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
 

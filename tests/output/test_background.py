@@ -5,8 +5,8 @@ import threading
 import numpy as np
 import pytest
 
-from swarm.output import beside
-from swarm.output.beside import Beside
+from swarm.output import background
+from swarm.output.background import Background
 from swarm.particles import State
 
 
@@ -37,13 +37,13 @@ def state_of(n=5):
     return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, nothing, nothing, nothing, None)
 
 
-@pytest.mark.parametrize("memory", [beside._BYTES, 1], ids=["many copies", "one copy"])
+@pytest.mark.parametrize("memory", [background._BYTES, 1], ids=["many copies", "one copy"])
 def test_every_frame_is_written_as_it_was(monkeypatch, memory):
     """The state goes on changing while a slow writer is behind: it writes no frame before the next has begun."""
-    monkeypatch.setattr(beside, "_BYTES", memory)
+    monkeypatch.setattr(background, "_BYTES", memory)
     changed, state = threading.Semaphore(0), state_of()
     writer = Writer(waits=changed.acquire)
-    with Beside(writer, 5) as write:
+    with Background(writer, 5) as write:
         for number in range(6):
             state.position[:], state.velocity[:] = number, -number
             if number > 0:
@@ -64,7 +64,7 @@ def test_the_run_does_not_wait_for_a_frame():
     writer, went_on = Writer(), threading.Event()
     write_now = writer.write
     writer.write = lambda frames: went_on.wait(600.0) and write_now(frames)
-    with Beside(writer, 5) as write:
+    with Background(writer, 5) as write:
         write(0, 0.0, state_of(), {})
         went_on.set()
     assert len(writer.frames) == 1
@@ -72,7 +72,7 @@ def test_the_run_does_not_wait_for_a_frame():
 
 def run(writer, frames, then=None):
     """A run of so many frames; `then` is raised at its end."""
-    with Beside(writer, 5) as write:
+    with Background(writer, 5) as write:
         for number in range(frames):
             writer.given = number
             write(number, 0.0, state_of(), {})
@@ -86,7 +86,7 @@ def test_a_frame_that_fails_ends_the_run_and_none_follows():
         run(writer, 1000)
     assert [frame[0] for frame in writer.frames] == [0, 1]
     # No more than are on their way when it fails.
-    assert writer.given <= 2 + beside._COPIES
+    assert writer.given <= 2 + background._COPIES
     assert isinstance(writer.left_with, OSError)
 
 

@@ -70,7 +70,7 @@ def _some(state: State, kept: slice) -> State:
     return state._replace(position=state.position[:, kept], velocity=state.velocity[:, kept])
 
 
-class Beside:
+class Background:
     """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
 
     When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end. Of
