@@ -53,9 +53,9 @@ def test_ci_runs_the_readme_test_command():
     """.ci/run calls what README tells a newcomer."""
     ci = (ROOT / ".ci" / "run").read_text()
     assert 'pip install -e ".[test]"' in README
-    assert "python -m pytest -n auto --dist loadfile\n" in README
+    assert "python -m pytest -n auto --dist worksteal\n" in README
     assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
-    assert "python -m pytest -q -n auto --dist loadfile\n" in ci
+    assert "python -m pytest -q -n auto --dist worksteal\n" in ci
 
 
 @pytest.mark.physics
