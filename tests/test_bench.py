@@ -36,6 +36,7 @@ def test_throughput_quick():
         assert row in told
 
 
+@pytest.mark.long
 def test_peers_quick():
     """None of them is installed where the tests run: a sentence says so, and how to get it."""
     told = printed("peers")

@@ -35,7 +35,7 @@ from own_surface import Superellipsoid
 
 np.seterr(all="ignore")
 axes = (0.3, 0.4, 0.5)
-start = swarm.fill(swarm.Scene([swarm.Ellipsoid(axes)]), 3, speed=1.0, seed=1)
+start = swarm.fill(swarm.Scene([swarm.Ellipsoid(axes)]), 2, speed=1.0, seed=1)
 for case, pull in {gravity!r}.items():
     for name, method in METHODS.items():
         if pull is not None and name == "augmented Lagrangian":
@@ -71,7 +71,7 @@ def runs():
 @pytest.mark.parametrize("name", METHODS)
 def test_the_superellipsoid_runs_with_every_method(runs, case, name):
     impacts, drift, outside, off = runs[case, name]
-    assert impacts >= 8
+    assert impacts >= 5
     assert outside < 2e-3
     if (case, name) == ("gravity", "augmented Lagrangian"):
         # Not every step of a fixed length converges, which is counted.

@@ -11,6 +11,8 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from swarm.run import tiers
+
 ROOT = Path(__file__).parents[2]
 # `python -m pytest` has the root on the path, a bare `pytest` has not.
 sys.path.append(str(ROOT))
@@ -28,7 +30,9 @@ PARTICLES = 1_000
 
 @functools.cache
 def numbers(name):
-    with mock.patch.multiple(PARTS["beyond_swarm"], PARTICLES=PARTICLES, FEWER=PARTICLES // 10):
+    fewer = mock.patch.multiple(PARTS["beyond_swarm"], PARTICLES=PARTICLES, FEWER=PARTICLES // 10)
+    # As with ten times as many, all of them are compiled.
+    with fewer, mock.patch.object(tiers, "_FEW", PARTICLES // 100 if name == "beyond_swarm" else tiers._FEW):
         return PARTS[name].numbers()
 
 
