@@ -128,7 +128,6 @@ class Run:
             self._pace = seconds * (others + helps) / span
         return not self._cut_short
 
-    @np.errstate(all="ignore")  # as in compiled kernels: 1/0 is an infinity, which a select discards
     def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
         """Advance and observe what one thread draws: (status, particle, what a halt left in its lanes)."""
         draws, mine = self._lanes()
@@ -221,7 +220,6 @@ class Run:
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
 
-    @np.errstate(all="ignore")
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
         seen = observables.summary(self._partial, self.state, self._owners)
