@@ -4,6 +4,7 @@ Each new kind of scene costs a compilation, so the physics ring draws numbers in
 kinds, lists and gravity.
 """
 
+import dataclasses
 import functools
 import math
 
@@ -42,7 +43,7 @@ def holds(scene, particles, method, seen):
         assert seen["energy_error"].max() <= 1e-12
         assert depth <= 64.0 * np.spacing(reach)
     elif isinstance(method, swarm.AugmentedLagrangian):
-        # Phi1 <= sqrt(2 tolerance/alpha), of a gap with any slope
+        # Each contact misses lambda Phi1, with lambda = 2 m v/dt and Phi1 <= sqrt(2 tolerance/alpha).
         assert seen["energy_error"].max() <= 1e-9
         assert depth <= 1e-9 * reach
     elif isinstance(method, swarm.Penalty):
@@ -122,6 +123,12 @@ KINDS = {
     "cone": lambda s=1.0: swarm.Cone(0.6),
     "paraboloid": lambda s=1.0: swarm.Paraboloid(0.2 * s),
 }
+# With a tolerance at round-off, as one reflection does not solve two walls at one place (two equal capsules, say): at
+# 1e-10 such an impact misses 7e-5 of its energy.
+RANDOM_METHODS = {
+    **METHODS,
+    "augmented Lagrangian": dataclasses.replace(METHODS["augmented Lagrangian"], tolerance=1e-24),
+}
 # Every list has a closed cavity, so that most have an admissible volume.
 cavities = st.sampled_from(["sphere", "ellipsoid", "box", "can", "torus", "capsule", "formula", "rotated ellipsoid"])
 # The size of each relative to the first.
@@ -135,7 +142,7 @@ gravities = st.none() | st.tuples(*[st.sampled_from([-9.81, -0.3, 0.0, 1.0])] * 
     cavity=cavities,
     others=st.lists(st.tuples(st.sampled_from(sorted(KINDS)), sizes), max_size=2),
     gravity=gravities,
-    method=st.sampled_from(sorted(METHODS)),
+    method=st.sampled_from(sorted(RANDOM_METHODS)),
     restitution=st.sampled_from([1.0, 1.0, 0.8]),
     speed=st.sampled_from([0.0, 0.3, 3.0]),
     seed=st.integers(0, 1000),
@@ -145,7 +152,7 @@ def test_random_kinds(cavity, others, gravity, method, restitution, speed, seed)
         walls = [KINDS[cavity](2.0), *(KINDS[kind](size) for kind, size in others)]
         scene = swarm.Scene(walls, gravity=gravity)
         masses = np.linspace(0.5, 2.0, NUMBER)
-        return scene, swarm.fill(scene, NUMBER, speed=speed, mass=masses, seed=seed), METHODS[method]
+        return scene, swarm.fill(scene, NUMBER, speed=speed, mass=masses, seed=seed), RANDOM_METHODS[method]
 
     sentence = outcome(make)
     event(sentence[:60] or "ends")
