@@ -67,12 +67,14 @@ def test_scenes_quick():
     assert "formula of the ellipsoid" in told
 
 
+@pytest.mark.long
 def test_accuracy_quick():
     told = printed("accuracy")
     assert "sphere: Choose Impact" in told
     assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in told
 
 
+@pytest.mark.long
 def test_stability_quick():
     told = printed("stability")
     assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in told

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Vector, number, vector
 from ..errors import SceneError
@@ -82,6 +82,12 @@ def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
     )
 
 
+def product(matrix: NDArray[np.float64], other: ArrayLike) -> NDArray[np.float64]:
+    """The matrix times a vector or a matrix, rounded term by term: the last bit of BLAS depends on the processor."""
+    rows = np.asarray(other)
+    return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))
+
+
 def onto(axis: Vector) -> Quaternion | None:
     """The shortest rotation of the z axis onto the unit vector `axis`."""
     x, y, z = axis
@@ -107,12 +113,12 @@ def after(second: Quaternion | None, first: Quaternion | None) -> Quaternion | N
 
 def turned(turn: Quaternion | None, point: Vector) -> Vector:
     """A vector, rotated."""
-    return point if turn is None else tuple((matrix(turn) @ np.array(point)).tolist())
+    return point if turn is None else tuple(product(matrix(turn), point).tolist())
 
 
 def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
     """A vector of the scene in the surface's own frame."""
-    return point if turn is None else tuple((matrix(turn).T @ np.array(point)).tolist())
+    return point if turn is None else tuple(product(matrix(turn).T, point).tolist())
 
 
 class Rotated(NamedTuple):

@@ -120,7 +120,7 @@ def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
         return box if rotation is None else UNBOUNDED
     matrix = rotations.matrix(rotation)
     middle, half = (np.array(box[0]) + box[1]) / 2.0, (np.array(box[1]) - box[0]) / 2.0
-    middle, half = center + matrix @ (middle - center), np.abs(matrix) @ half
+    middle, half = center + rotations.product(matrix, middle - center), rotations.product(np.abs(matrix), half)
     return tuple((middle - half).tolist()), tuple((middle + half).tolist())
 
 

@@ -37,7 +37,9 @@ def equally_busy(scene, particles, impacts, time):
     """The same particles, each as fast as makes it hit the walls about `impacts` times until `time`."""
     fast = swarm.Particles(particles.position, particles.velocity * (impacts / (20.0 * time)), particles.mass)
     columns = [swarm.Particles(r, v) for r, v in zip(fast.position.T, fast.velocity.T, strict=True)]
-    hits = np.array([run(scene, one, swarm.Impact(), 20.0 * time).observables["impacts"][-1] for one in columns])
+    hits = np.array(
+        [run(scene, one, swarm.Impact(), 20.0 * time, compile="always").observables["impacts"][-1] for one in columns]
+    )
     fast.velocity = fast.velocity * (impacts / hits * 20.0)
     return fast
 

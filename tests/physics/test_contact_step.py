@@ -12,7 +12,7 @@ pytestmark = pytest.mark.physics
 SHAPES = ["sphere", "ellipsoid", "cut sphere", "ball in ellipsoid"]
 
 
-@pytest.mark.parametrize("name", [*SHAPES[:2], *map(rarely, SHAPES[2:])])
+@pytest.mark.parametrize("name", ["ellipsoid", *(rarely(name) for name in SHAPES if name != "ellipsoid")])
 @pytest.mark.parametrize("part", [1e-9, 1e-7, 1e-5, 1e-3, 1e-2, 1e-1])
 def test_chords_keep_energy_and_walls(name, part):
     """A chord is a reflection about the discrete gradient: |v| stays, both its ends are on the wall; 1e3 impacts."""

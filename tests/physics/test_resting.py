@@ -44,15 +44,15 @@ def test_a_particle_slides_along_the_floor():
 def test_an_inclined_plane():
     """s = g sin(a) t^2/2, exactly: a flat wall's sliding step is a parabola, whatever its length."""
     for angle in (0.1, 0.5, 1.0):
-        slope = planes((-math.sin(angle), 0.0, -math.cos(angle)))
+        slope = swarm.Scene([swarm.Sphere(50.0), swarm.Plane((-math.sin(angle), 0.0, -math.cos(angle)), 0.0)], DOWN)
         result = run(slope, swarm.Particles([0.0] * 3, [0.0] * 3), swarm.Impact(), 2.0, compile="always")
         x, _y, z = result.particles.position[:, 0]
         way = 0.5 * G * math.sin(angle) * 4.0
         assert (x, z) == pytest.approx((way * math.cos(angle), -way * math.sin(angle)), rel=1e-9)
         # What the plane gave is what gravity did not keep, and round-off slowly turns a little of the speed into a
         # normal velocity: 3e-6 m/s after 5e4 steps, at exact energy.
-        normal = result.particles.velocity[:, 0] @ slope.surfaces[0].normal
-        assert result.observables["impulse"][-1][0] == pytest.approx(G * math.cos(angle) * 2.0 - normal, abs=1e-10)
+        normal = result.particles.velocity[:, 0] @ slope.surfaces[1].normal
+        assert result.observables["impulse"][-1][1] == pytest.approx(G * math.cos(angle) * 2.0 - normal, abs=1e-10)
         assert abs(normal) <= 1e-6 * G * math.sin(angle) * 2.0
 
 
@@ -112,7 +112,7 @@ def test_leaving_a_ball():
     c = (2.0 + push**2 / (G * radius)) / 3.0
     errors = []
     for h in (4e-3, 1e-3, 2.5e-4):
-        end = run(scene, start, swarm.Impact(shortest_flight=h), 2.8, compile="always")
+        end = run(scene, start, swarm.Impact(shortest_flight=h), 2.8, compile="never")
         x, _y, z = end.particles.position[:, 0]
         assert -5.0 < z < 0.0, "it flies: neither on the ball nor on the floor"
         assert math.hypot(x, z) > 1.1 * radius

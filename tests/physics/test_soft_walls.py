@@ -76,8 +76,8 @@ def test_bounce_off_the_soft_wall(exponent):
 
 
 def test_hertz_against_runge_kutta():
-    """The closed form above against x'' = -k x^1.5 in 20 000 steps of the classical fourth-order rule."""
-    n, k = 20_000, STIFFNESS
+    """The closed form above against x'' = -k x^1.5 in 10 000 steps of the classical fourth-order rule."""
+    n, k = 10_000, STIFFNESS
     depth, speed = 0.0, SPEED
     h = 0.4 / n
 
@@ -96,7 +96,7 @@ def test_hertz_against_runge_kutta():
     exact, _ = wall_bounce(0.0, SPEED, 0.4, k, 1.5)
     assert depth == pytest.approx(exact, abs=1e-9)
     start = swarm.Particles([0.0, 0.0, 0.0], [SPEED, 0.0, 0.0])
-    end = run(FLOOR, start, swarm.Penalty(1e-5, k, 1.5), 0.4, compile="never").particles
+    end = run(FLOOR, start, swarm.Penalty(2e-5, k, 1.5), 0.4, compile="never").particles
     assert end.position[0, 0] == pytest.approx(depth, abs=1e-7)
 
 
@@ -137,10 +137,11 @@ _EXPONENTS = (1.0, 1.5, 2.3, 4.0)
 @pytest.mark.parametrize(
     ("name", "gravity", "exponent", "steps"),
     [
-        ("sphere", _PULL, 1.0, _MANY),
-        *((*shape, exponent, _FEW) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS),
+        *(("sphere", None, exponent, _FEW) for exponent in _EXPONENTS),
+        *((*shape, exponent, _FEW) for shape, exponent in zip(_FALLING, _EXPONENTS, strict=True)),
         *(rarely(*shape, exponent, _MANY) for shape in (("sphere", None), *_FALLING) for exponent in _EXPONENTS[1:]),
-        *(rarely(*shape, 1.0, _MANY) for shape in (("sphere", None), *_FALLING[1:])),
+        *(rarely(*shape, 1.0, _MANY) for shape in (("sphere", None), *_FALLING)),
+        *(rarely(*_FALLING[i], _EXPONENTS[k], _FEW) for i in range(4) for k in range(4) if i != k),
     ],
 )
 class TestPenaltyKeepsEnergy:

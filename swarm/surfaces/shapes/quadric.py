@@ -69,7 +69,7 @@ def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], co
     axes = axes * np.sign(np.linalg.det(axes))
     steepest = abs(curvatures).max()
     curvatures[abs(curvatures) <= _FLAT * steepest] = 0.0
-    linear = axes.T @ linear
+    linear = rotations.product(axes.T, linear)
     linear[abs(linear) <= _FLAT * abs(linear).max()] = 0.0
     curved, near = curvatures != 0.0, abs(curvatures) > _NEAR * steepest
     # A x^2 + b x = A (x + b/2A)^2 - b^2/4A
@@ -131,13 +131,13 @@ class Quadric(Surface):
 
     def _axes(self) -> NDArray[np.float64]:
         """The principal axes in the scene, as columns."""
-        return rotations.matrix(self.rotation) @ self._frame.axes
+        return rotations.product(rotations.matrix(self.rotation), self._frame.axes)
 
     def walls(self) -> tuple[Any]:
         return (rotations.framed(self._axes(), self.numbers()),)
 
     def own_center(self) -> Vector:
-        x, y, z = (self._axes().T @ np.array(self.center) + self._frame.shift).tolist()
+        x, y, z = (rotations.product(self._axes().T, self.center) + self._frame.shift).tolist()
         return x, y, z
 
     def numbers(self) -> QuadricNumbers:
@@ -150,7 +150,7 @@ class Quadric(Surface):
     def bounds(self) -> Box:
         if not self._frame.encloses(side_sign(self.side)):
             return UNBOUNDED
-        x, y, z = (np.array(self.center) + self._axes() @ self._frame.middle).tolist()
+        x, y, z = (np.array(self.center) + rotations.product(self._axes(), self._frame.middle)).tolist()
         return box_around((x, y, z), extents(self._axes(), self._frame.semi_axes()), "inside")
 
     def extent(self) -> float:

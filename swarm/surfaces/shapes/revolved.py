@@ -43,7 +43,7 @@ def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[
     frame = rotations.matrix(rotations.onto(axis))
     found = []
     for angle in np.linspace(0.0, 2.0 * math.pi, _TANGENTS, endpoint=False):
-        normal = frame @ (math.cos(angle), math.sin(angle), lean)
+        normal = rotations.product(frame, (math.cos(angle), math.sin(angle), lean))
         x, y, z = (normal / math.hypot(1.0, lean)).tolist()
-        found.append(((x, y, z), offset / math.hypot(1.0, lean) + float(np.dot((x, y, z), through))))
+        found.append(((x, y, z), offset / math.hypot(1.0, lean) + x * through[0] + y * through[1] + z * through[2]))
     return found
