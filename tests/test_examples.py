@@ -42,7 +42,7 @@ for case, pull in {gravity!r}.items():
             # Steps that are cut at the impact know no gravity.
             method = dataclasses.replace(method, adaptive=False, on_unconverged="count")
         four, two, ellipsoid = (
-            swarm.simulate(swarm.Scene([surface], gravity=pull), start, method, until=2.0, every=0.5, threads=1)
+            swarm.simulate(swarm.Scene([surface], gravity=pull), start, method, until=1.5, every=0.5, threads=1)
             for surface in (Superellipsoid(axes), Superellipsoid(axes, n=2.0), swarm.Ellipsoid(axes))
         )
         off = np.abs(two.particles.position - ellipsoid.particles.position).max()

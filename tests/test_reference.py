@@ -37,7 +37,8 @@ def test_penalty_tends_to_the_soft_sphere():
     particles, errors = swarm.Particles(known["position"], known["velocity"]), []
     for dt in (2.0**-10, 2.0**-12, 2.0**-14):
         method = swarm.Penalty(dt=dt, penalty=reference.PENALTY)
-        end = swarm.simulate(reference.SCENES["sphere"], particles, method, until=float(known["times"][1]))
+        until = float(known["times"][1])
+        end = swarm.simulate(reference.SCENES["sphere"], particles, method, until=until, compile="always")
         errors.append(np.nanmedian(np.linalg.norm(end.particles.position.T - known["end"][:, 1], axis=1)))
     assert np.isnan(known["end"]).mean() < 0.05
     assert np.divide(errors[:-1], errors[1:]) == pytest.approx(16.0, rel=0.1)

@@ -70,7 +70,7 @@ def test_the_limit_is_impact(name):
 
 def test_replaced_contacts_keep_their_energy():
     """Every contact replaced: 2e4 exact impacts a particle."""
-    scene = scene_of("ellipsoid")
+    scene = scene_of("nested spheres")
     start = swarm.fill(scene, 5, speed=50.0, seed=7)
     method = method_of(1e-4, tolerance=1e-300, max_sweeps=1, on_unconverged="impact")
     result = run(scene, start, method, 320.0, compile="always")
