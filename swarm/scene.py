@@ -215,14 +215,14 @@ def _polyhedron_bounds(planes: list[HalfSpace], low: Any, high: Any) -> tuple[An
     return np.maximum(low, far_low - rough), np.minimum(high, far_high + rough)
 
 
-def _solutions(matrices: Any, sides: Any) -> Any:
-    """Of (n, 3, 3) linear systems, by elimination with pivots.
+def _solutions(matrices: Any, sides: Any) -> tuple[Any, Any]:
+    """Of (n, 3, 3) linear systems with these right sides (n, 3), and |det|, by elimination with pivots.
 
     `fill` scales its points by what follows from them, and the last bit of LAPACK depends on the processor. Cramer's
     rule has too few digits for a cone of half angle near pi/2.
     """
     rows, every = np.concatenate([matrices, sides[:, :, None]], axis=2), np.arange(len(sides))
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):  # where the matrix is singular there is no solution
         for k in range(2):
             pivot = k + np.abs(rows[:, k:, k]).argmax(axis=1)
             rows[every, k], rows[every, pivot] = rows[every, pivot], rows[every, k]
@@ -230,7 +230,8 @@ def _solutions(matrices: Any, sides: Any) -> Any:
                 rows[:, i] -= (rows[:, i, k] / rows[:, k, k])[:, None] * rows[:, k]
         z = rows[:, 2, 3] / rows[:, 2, 2]
         y = (rows[:, 1, 3] - rows[:, 1, 2] * z) / rows[:, 1, 1]
-        return np.stack([(rows[:, 0, 3] - rows[:, 0, 1] * y - rows[:, 0, 2] * z) / rows[:, 0, 0], y, z], axis=1)
+        x = (rows[:, 0, 3] - rows[:, 0, 1] * y - rows[:, 0, 2] * z) / rows[:, 0, 0]
+        return np.stack([x, y, z], axis=1), np.abs(rows[:, 0, 0] * rows[:, 1, 1] * rows[:, 2, 2])
 
 
 def _closed_bounds(
@@ -245,10 +246,9 @@ def _closed_bounds(
     triples = itertools.combinations(range(len(offsets)), 3)
     while some := list(itertools.islice(triples, _TRIPLES)):
         index = np.array(some)
-        flat = np.abs(np.linalg.det(normals[index]))
+        vertices, flat = _solutions(normals[index], offsets[index])
         is_flat = is_flat or bool(((flat <= flattest) & (flat > _PARALLEL)).any())
-        index = index[flat > flattest]
-        vertices = _solutions(normals[index], offsets[index])
+        vertices = vertices[flat > flattest]
         # Also those that are not finite: planes that are parallel but for a component of 1e-300.
         vertices = vertices[np.abs(vertices).max(axis=1, initial=0.0) <= 2.0 * far]
         room = tolerance * (np.abs(offsets) + np.abs(vertices).max(axis=1, initial=0.0)[:, None])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import METHODS, SURFACES, rarely
+from conftest import METHODS, SURFACES, every_surface
 
 import swarm
 from swarm.kernel import cache
@@ -17,8 +17,6 @@ from swarm.run.engine import Run
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: there is one tier")
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
-# One of each kind of flight; the others' kernels are in the long ring.
-SOON = ("sphere", "ball", "ellipsoid", "rotated egg", "torus", "capsule", "plane", "formula")
 
 
 def start_in(scene):
@@ -54,7 +52,7 @@ def assert_same_bits(monkeypatch, scene, method):
 
 @pytest.mark.physics
 @compiled_only
-@pytest.mark.parametrize("name", [name if name in SOON else rarely(name) for name in SURFACES])
+@every_surface
 def test_both_tiers_have_the_same_bits_in_every_surface(monkeypatch, name):
     """With every method: physics/test_methods.py. Function by function, every surface: test_jit.py."""
     assert_same_bits(monkeypatch, swarm.Scene([SURFACES[name]()]), METHODS["impact"])

@@ -83,7 +83,7 @@ def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
 
 
 def product(matrix: NDArray[np.float64], other: ArrayLike) -> NDArray[np.float64]:
-    """The matrix times a vector or a matrix, rounded term by term: the last bit of BLAS depends on the processor."""
+    """(3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
     rows = np.asarray(other)
     return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))
 

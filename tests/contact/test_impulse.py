@@ -169,7 +169,7 @@ def test_a_head_on_plane_by_hand(law):
 
 @every_quadric
 @some_laws
-@settings(max_examples=25)
+@settings(max_examples=60)
 @given(
     point=directions,
     direction=directions,

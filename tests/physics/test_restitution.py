@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from conftest import rarely
 from physics.billiards import EPSILON, run
 
 import swarm
@@ -73,7 +72,7 @@ def test_it_comes_to_rest_in_finite_time(e):
     assert end.observables["impulse"][-1] == pytest.approx([0.0, mass * G * until, 0.0], rel=1e-12)
 
 
-@pytest.mark.parametrize("gravity", [rarely(None), (1.0, 2.0, -9.0)], ids=["no gravity", "gravity"])
+@pytest.mark.parametrize("gravity", [None, (1.0, 2.0, -9.0)], ids=["no gravity", "gravity"])
 @pytest.mark.parametrize("e", [(0.9, 0.9, 0.9), (0.9, 0.5, 1.0), (1.0, 0.0, 0.5), (0.0, 0.0, 0.0), (1e-3, 1e-8, 0.999)])
 def test_the_account_of_energy_closes(e, gravity):
     """Total + dissipated energy: from fast impacts down to rest and sliding along edges, inside."""
@@ -93,7 +92,7 @@ def test_the_account_of_energy_closes(e, gravity):
 def test_head_on_without_restitution_it_stops(speed):
     """What is left is the round-off of what is lost; it was once restored by a step that blew it up to NaN."""
     scene = cut_sphere((0.0, 0.0, 0.0))
-    start = swarm.fill(scene, 12, speed=1.0, seed=9)
+    start = swarm.fill(scene, 500, speed=1.0, seed=9)
     radial = start.position / np.linalg.norm(start.position, axis=0)
     for velocity in (radial, np.array([[0.0], [0.0], [-1.0]]) + 0.0 * radial):
         result = run(scene, swarm.Particles(start.position, speed * velocity), swarm.Impact(), 3.0 / speed, 1.0 / speed)

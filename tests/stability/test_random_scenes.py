@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import swarm
 
 # Particles and time: some tens of impacts each.
-NUMBER, UNTIL = 4, 4.0
+NUMBER, UNTIL = 8, 4.0
 
 
 def outcome(make):
@@ -56,7 +56,7 @@ def holds(scene, particles, method, seen):
 # --- Random numbers --------------------------------------------------------------------------------------
 
 parts = st.floats(-1.0, 1.0).map(lambda part: round(part, 3))
-# No smaller cavities: 4 particles of 30 m/s fly 4 s.
+# No smaller cavities: 8 particles of 30 m/s fly 4 s.
 lengths = st.sampled_from([0.01, 0.1, 0.5, 1.0, 2.0])
 thicknesses = st.sampled_from([1e-9, 1e-4, 0.01, 0.1, 0.5])
 points = st.tuples(parts, parts, parts)

@@ -11,7 +11,7 @@ SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 DT = 2.0**-7
 
 
-def worst_energy(cls, stiffness, impacts=12.0):
+def worst_energy(cls, stiffness, impacts=30.0):
     """Largest relative energy error at 200 frames, of 8 particles with so many impacts each."""
     method = cls(dt=DT, penalty=(stiffness / DT) ** 2)
     particles = swarm.fill(SPHERE, 8, speed=0.5, seed=2)

@@ -30,7 +30,7 @@ heavies = st.sampled_from([1e-6, 1.0, 1e3])
 
 
 @every_wall
-@settings(max_examples=40)
+@settings(max_examples=100)
 @given(**flights)
 def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)

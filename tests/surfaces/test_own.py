@@ -471,13 +471,15 @@ def test_an_edited_phi_never_gives_an_old_answer(run):
     edited = {
         "phi": {"body": USUAL["body"].replace("p.r * p.r", "1.1 * p.r * p.r")},
         "a helper": {"halved": "0.6 * x"},
-    }
+        "phi and gradient": {"body": USUAL["body"].replace("z * z", "2.0 * z * z"),
+                             "slope": USUAL["slope"].replace("2.0 * z", "4.0 * z")},
+    }  # fmt: skip
     totals = {first.total}
     for what, changes in edited.items():
         answer = run(**changes)
         assert (answer.hits, answer.misses) == (0, 1), what
         totals.add(answer.total)
-    assert len(totals) == 3
+    assert len(totals) == 4
     # And the first one is still there, beside all the others.
     assert run() == first._replace(hits=1, misses=0)
 
