@@ -93,8 +93,12 @@ def test_other_threads_have_no_handler():
     assert done
 
 
-def test_a_long_frame_stops_within(monkeypatch):
-    """The first frame is one of 1e10 impacts; the signal comes when its thread is at them."""
+@pytest.mark.parametrize("wakes", [True, False])
+def test_a_long_frame_stops_within(monkeypatch, wakes):
+    """The first frame is one of 1e10 impacts; the signal comes when its thread is at them.
+
+    It does not wake a main thread that is about to wait for a lock, nor one whose signal another thread received.
+    """
     advance = Run.advance
 
     def interrupted(run, *arguments):
@@ -103,7 +107,7 @@ def test_a_long_frame_stops_within(monkeypatch):
         def interrupt():
             while not over.wait(0.001):
                 if run._ticket[0] > 0:
-                    signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+                    signal.pthread_kill((threading.main_thread() if wakes else thread).ident, signal.SIGINT)
                     return
 
         thread = threading.Thread(target=interrupt)

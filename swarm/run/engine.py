@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,12 @@ _OUTSIDE = 1e-9
 _SHORT_FRAME = 0.05
 # The caller's thread alone does frames of less work than this [s]: waking another takes some 0.1 ms.
 _LITTLE_WORK = 2e-4
+# The caller's thread looks for an interrupt so often [s].
+_GLANCE = 0.1
 # A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
+# (status, particle, what a halt left in the lanes)
+_End = tuple[int, int, lanes.Halted | None]
 
 
 class Run:
@@ -107,9 +111,7 @@ class Run:
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
         ends = [self._share(span)] if helps else []
-        if latest < math.inf and wait(shares, max(0.0, latest - time.monotonic())).not_done:
-            self.halt()
-        ends += [share.result() for share in shares]
+        ends += [self._end_of(share, latest) for share in shares]
         seconds = time.perf_counter() - began
         self._tier.left -= seconds
         status, particle, _left = max(ends, key=lambda end: end[:2])
@@ -128,8 +130,8 @@ class Run:
             self._pace = seconds * (others + helps) / span
         return not self._cut_short
 
-    def _share(self, span: float) -> tuple[int, int, lanes.Halted | None]:
-        """Advance and observe what one thread draws: (status, particle, what a halt left in its lanes)."""
+    def _share(self, span: float) -> _End:
+        """Advance and observe what one thread draws."""
         draws, mine = self._lanes()
         advance_block, observe = self._tier.kernel(blocks.advance_block), self._tier.kernel(observables.observe)
         status, particle, drawn = advance_block(*self._advancing(span, draws, mine))
@@ -139,6 +141,20 @@ class Run:
             return status, particle, None
         live = particle
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
+
+    def _end_of(self, share: "Future[_End]", latest: float) -> _End:
+        """The end of a share, which is halted at `latest`.
+
+        In many short waits: Python takes up a signal between two of them, and one that comes just before a long wait
+        (or to another thread) would be seen at its end only.
+        """
+        while True:
+            try:
+                return share.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
+            except TimeoutError:
+                if time.monotonic() >= latest:
+                    self.halt()
+                    latest = math.inf
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
