@@ -105,6 +105,22 @@ class Multipliers(NamedTuple):
     left: Floats
 
 
+class Contacts(NamedTuple):
+    """What lasts of each particle's contacts, of methods in which a particle may slide.
+
+    Attributes:
+        walls: (2, N) the walls that hold it, as numbers; -1 for none. Two are an edge.
+        step: (N,) its next sliding step [s]; 0 where the walls decide.
+        left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
+        sliding: (N,) how long it has slid, or rested, since the start [s].
+    """
+
+    walls: Floats
+    step: Floats
+    left: Floats
+    sliding: Floats
+
+
 class State(NamedTuple):
     """The arrays that kernels advance.
 
@@ -120,6 +136,8 @@ class State(NamedTuple):
     impulse: Floats  # (walls, N) normal impulse since the start [N s]
     dissipated: Floats  # (N,) energy lost since the start [J]; empty if no wall dissipates
     multipliers: Multipliers | None
+    contacts: Contacts | None = None
+    heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without
 
 
 def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:
