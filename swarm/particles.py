@@ -110,14 +110,20 @@ class Contacts(NamedTuple):
 
     Attributes:
         walls: (2, N) the walls that hold it, as numbers; -1 for none. Two are an edge.
+        met: (N,) the wall at which it is to be decided what becomes of it.
         step: (N,) its next sliding step [s]; 0 where the walls decide.
+        keep: (N,) the speed across its walls that it has again when it leaves them [m/s].
         left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
+        events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
         sliding: (N,) how long it has slid, or rested, since the start [s].
     """
 
     walls: Floats
+    met: Floats
     step: Floats
+    keep: Floats
     left: Floats
+    events: Floats
     sliding: Floats
 
 

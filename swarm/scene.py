@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .errors import SceneError
+from .contact.laws import Laws
 from .kernel.gravity import Gravity
 from .surfaces import required
 from .surfaces.fold import Chain, chain_of
@@ -99,6 +100,21 @@ class Scene:
         for i in reversed(self.owners()):
             chain = Chain(self.surfaces[i].restitution, chain)
         return chain
+
+    def laws(self) -> Laws | None:
+        """The laws of every wall of the chain as kernels take them, None where every impact is elastic and smooth."""
+
+        def of(name, none):
+            values = [getattr(self.surfaces[i], name, none) for i in self.owners()]
+            if all(v == none for v in values):
+                return None
+            chain = None
+            for v in reversed(values):
+                chain = Chain(v, chain)
+            return chain
+
+        laws = Laws(of("restitution", 1.0), of("friction", 0.0), None)
+        return laws if any(law is not None for law in laws) else None
 
     def owners(self) -> list[int]:
         """The surface that each wall of the chain belongs to."""

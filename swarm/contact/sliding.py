@@ -1,263 +1,404 @@
-"""Impacts that follow one another too quickly to be resolved: grazing, rolling along a wall, resting, corners, cusps.
+"""Sliding along one wall, or along the edge of two: the converged step of the scheme, composed to fourth order.
 
-A sliding step of length h holds the particle on every wall it touches: with w0 = v0 + h G/2 and P the projection of
-w0 on the directions that no touched wall forbids, r1 = r0 + h P and w1 = 2 P - w0. P and w0 - P are orthogonal
-(Moreau), so |w1| = |w0|, and with one wall the step is the reflection about its discrete gradient.
+With w0 = v0 + h G/2 and P the part of w0 that the walls allow, a step of length h is
+    r1 = r0 + h u,   w1 = w0 - 2 sum b n - 2 (sum mu b) u/|u|,   u = s P,   s = 1 - (sum mu b)/|P|,            (S)
+where w0 = P + sum b n and n is along the discrete gradient D(r0, r1) of each wall that holds the particle. Without
+friction |w1| = |w0| whatever the error of n; with it the particle loses 2 (sum mu b) |u| of |w|^2, the work of Coulomb's
+force along r1 - r0. The step is symmetric, so Suzuki's composition p h, p h, (1 - 4p) h, p h, p h is of fourth order.
+Sources: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 """
 
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
-from ..kernel.vector import ZERO, Vec, dot, largest, moves, norm, put, square, total
-from ..surfaces import contract, flights
+from ..kernel.jit import by_type, inlined, select
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, square, total
+from ..surfaces import contract
 from ..surfaces import fold as walls
-from . import reflection
-from .projection import ALLOWED, along, project
+from . import laws as wall_laws
 
 _EPSILON = 2.220446049250313e-16
-# A second wall nearer than this part of the shortest flight is met in the same instant.
-_SAME_INSTANT = 1e-6
-# Exact reflections within one instant: a wedge of 0.05 rad turns a particle around in its edge.
-_BLOWS = 64
+# p of Suzuki's composition of fourth order
+OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+MIDDLE = 1.0 - 4.0 * OUTER
+PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
-_SWEEPS = 60
-# Times that a step is cut because another wall is in the way.
-_CUTS = 60
-# What these need of every wall; exact reflections need no more.
-NEEDS = (contract.first_hit, contract.unit_normal, contract.inner_gradient, contract.distance, contract.settle)
+SWEEPS = 40
+# r1 moves by round-off only.
+_STILL = 2.0 * _EPSILON
+# Round-off of what `defect` compares, in units of the last place of a coordinate.
+_NOISE = 8.0 * _EPSILON
+# The error of a composed step over its defect, measured on all surfaces of the tests: at most so much.
+_ERROR = 1.0
+# Steps change by no more than these factors, and aim at this part of the tolerance.
+_SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
+# |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
+_FAST = 1e-3
+_TINY = 2.2250738585072014e-308
+# What sliding asks of every wall.
+NEEDS = (
+    contract.unit_normal, contract.step_normal, contract.outward_acceleration, contract.settle, contract.distance,
+    contract.first_hit, contract.inner, contract.level_of,
+)  # fmt: skip
 
 
-class Contacts(NamedTuple):
-    """How impacts are taken."""
+class One(NamedTuple):
+    """A particle that slides along one wall."""
 
-    contact_step: Any  # None or h
-    restitution: Any  # None or one e a wall
-    shortest: float  # flight: the particle slides instead of shorter ones [s]
-    touch: float  # distance within which walls hold a sliding particle too [m]
+    first: float
 
 
-class Moving(NamedTuple):
-    """A particle, and how much of its frame is left [s]."""
+class Two(NamedTuple):
+    """A particle that slides along the edge of two walls."""
 
-    r: Vec
-    v: Vec
-    left: float
-
-
-class Landing(NamedTuple):
-    """The particle after the impact, the time it took, and twice its energy per mass."""
-
-    r: Vec
-    v: Vec
-    used: float
-    twice_energy: float
+    first: float
+    second: float
 
 
-class Touch(NamedTuple):
-    """The walls that a sliding particle touches, one entry each."""
+class Held(NamedTuple):
+    """A vector as a part that the walls allow and multiples of their normals: P + b n + c m."""
 
-    touched: Any  # whether
-    normal: Any  # (3, walls): unit normal of the step
-    held: Any  # what the wall takes of the velocity
-    depth: Any  # signed distance outside
-
-
-@outlined
-def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
-    """One impact of one particle on `wall` after a short flight. Adds to impulse[:, lane].
-
-    If the next flight would be shorter than the shortest too, the particle slides for that time instead.
-    """
-    r, v, half_inverse = flight.r, flight.v, energy.half_inverse
-    given = scratch(walls.length(chain), np.float64)
-    w, now, at = v, energy, wall
-    for _blow in range(_BLOWS):
-        bounce = reflection.exact(method.restitution, chain, gravity, at, r, w, now)
-        w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
-        given[int(at)] += bounce.impulse
-        following = flights.first_hit(chain, gravity, r, w)
-        if following.time >= method.shortest or following.wall < 0.0:
-            end = reflection.Stepped(r, w, 0.0, given[int(wall)])
-            if at == wall:
-                end = _stepped(method.contact_step, chain, gravity, wall, flight, now, end)
-                given[int(wall)] = end.impulse
-            for i in range(given.size):
-                impulse[i, lane] += given[i]
-            return Landing(end.r, end.v, end.used, now.twice)
-        if following.wall == at or following.time > _SAME_INSTANT * method.shortest:
-            break
-        at = following.wall
-    return _slide(method, chain, gravity, wall, flight, energy, impulse, lane)
+    along: Vec
+    n: Vec
+    b: float
+    m: Vec
+    c: float
 
 
-@by_type_outlined
-def _stepped(contact_step, chain, gravity, wall, flight, energy, reflected):
-    """The impact as a contact step of that length; without one, as it was reflected."""
-    return reflected
+class Force(NamedTuple):
+    """The acceleration of a sliding particle, and how each wall presses on it, per mass; m is the second wall's."""
+
+    acceleration: Vec
+    n: float
+    m: float
 
 
-@_stepped.register(float)
-def _(contact_step, chain, gravity, wall, flight, energy, reflected):
-    return reflection.contact(contact_step, chain, gravity, wall, flight.r, flight.v, flight.left, energy)
-
-
-@outlined
-def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
-    """One sliding step: the result of `impact`."""
-    restitution, r, count = method.restitution, flight.r, walls.length(chain)
-    touch = Touch(
-        scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64),
-        scratch(count, np.float64),
-    )  # fmt: skip
-    _depths(chain, 0, r, touch.depth)
-    for i in range(count):
-        touch.touched[i] = touch.depth[i] >= -method.touch
-    touch.touched[int(wall)] = True
-    given = scratch(count, np.float64)
-    v, twice_energy = _landed(restitution, chain, touch, given, r, flight.v, energy.twice)
-    straight = _goes_straight(chain, gravity, touch, r, v)
-    h = flight.left if straight else min(method.shortest, flight.left)
-    u, h = _unhindered(chain, gravity, touch, r, v, h, method.touch)
-    w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
-    if moves(u):
-        r = _settled(chain, wall, touch, r + h * u)
-    speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
-    half_inverse = reflection.half_inverse_after(restitution, speed2, w, half_inverse)
-    w = reflection.restore(gravity, w, speed2, half_inverse)
-    for i in range(count):
-        impulse[i, lane] += given[i] + 2.0 * touch.held[i]
-    return Landing(r, w, h, twice_energy)
-
-
-@outlined
-def _unhindered(chain, gravity, touch, r, v, h, near):
-    """P of the longest step up to h that no further wall is in the way of, and its length.
-
-    A wall that is met within the distance `near` becomes one of the touched.
-    """
-    u = ZERO
-    for cut in range(_CUTS):
-        u = velocity_along(chain, touch, r, accelerated(gravity, v, 0.5 * h), h)
-        following, other = h, -1
-        for i in range(touch.touched.size):
-            if not touch.touched[i]:
-                time, _found = flights.hit_of(chain, None, float(i), r, u)
-                if time < following:
-                    following, other = time, i
-        if other < 0:
-            break
-        if following * norm(u) <= near:
-            touch.touched[other] = True
-        else:
-            # The step to that wall is another one, since its walls curve and gravity has less time.
-            h = following if cut < _CUTS // 2 else 0.5 * following
-    return u, h
-
-
-@outlined
-def _settled(chain, wall, touch, r):
-    """The end of a step on the wall that holds the particle, and on every touched one that it has left by round-off.
-
-    Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
-    where the particle is outside would lean inwards, and let it fall by the last place again and again.
-    """
-    _depths(chain, 0, r, touch.depth)
-    for i in range(touch.touched.size):
-        holds = i == int(wall) and touch.held[i] > 0.0
-        if holds or (touch.touched[i] and touch.depth[i] > 0.0):
-            r = walls.settle(chain, float(i), r)
-    return r
-
-
-@by_type_outlined
-def _depths(chain, k, r, into):
-    """Signed distance outside of every wall into `into`."""
-
-
-@_depths.register(walls.Chain)
-def _(chain, k, r, into):
-    into[k] = contract.distance(chain.first, r)
-    _depths(chain.rest, k + 1, r, into)
-
-
-@by_type_outlined
-def _landed(restitution, chain, touch, given, r, v, twice_energy):
-    """Chattering ends: walls that lose energy take what is left of the velocity towards them.
-
-    Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
-    would reflect the rest.
-    """
-    return v, twice_energy
-
-
-@_landed.register(walls.Chain)
-def _(restitution, chain, touch, given, r, v, twice_energy):
-    lossy = scratch(given.size, np.bool_)
-    for i in range(given.size):
-        lossy[i] = touch.touched[i] and reflection.bounciness(restitution, float(i)) < 2.0
-        if lossy[i]:
-            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
-    u = project(lossy, touch.normal, given, v)
-    # |v|^2 - |u|^2, because v - u is orthogonal to u
-    return u, twice_energy - square(v - u)
-
-
-@outlined
-def velocity_along(chain, touch, r, w, h):
-    """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
-    u, r1 = ZERO, r
-    for _sweep in range(_SWEEPS):
-        for i in range(touch.touched.size):
-            if touch.touched[i]:
-                put(touch.normal, 0, i, _normal(chain, float(i), r, r1))
-        u = project(touch.touched, touch.normal, touch.held, w)
-        before, r1 = r1, r + h * u
-        if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
-            break
-    return u
-
-
-@outlined
-def _normal(chain, wall, r0, r1):
-    """The unit vector along the discrete gradient of a wall, out of the admissible side."""
-    n = walls.unit_normal(chain, wall, r0)
-    d = walls.inner_gradient(chain, wall, r0, r1)
-    length = norm(d)
-    if dot(d, n) < 0.0:
-        length = -length
-    # At a singular point, such as an apex, both may be undefined: the wall then forbids nothing.
-    if length != 0.0 and math.isfinite(length):
-        n = d / length
-    return n if math.isfinite(total(n)) else ZERO
-
-
-@outlined
-def _goes_straight(chain, gravity, touch, r, v):
-    """Whether the step may have any length: rest, or uniform motion along flat walls that gravity presses against."""
-    g = accelerated(gravity, ZERO, 1.0)
-    for i in range(touch.touched.size):
-        if touch.touched[i]:
-            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
-    falling = project(touch.touched, touch.normal, touch.held, g)
-    if not moves(g) or largest(falling) > ALLOWED * largest(g):
-        return False
-    speed = largest(v)
-    for i in range(touch.touched.size):
-        if touch.touched[i] and abs(along(touch.normal, i, v)) > ALLOWED * speed:
-            return False
-    return speed == 0.0 or _flat(chain, touch.touched, 0)
+# --- Which walls -----------------------------------------------------------------------------------------
 
 
 @by_type
-def _flat(chain, touched, k):
-    """Whether every touched wall is flat."""
-    return True
+def of_lane(kind, first, second):
+    """The walls that hold a lane, of this kind."""
+    return One(first)
 
 
-@_flat.register(walls.Chain)
-def _(chain, touched, k):
-    return (contract.flat(chain.first) or not touched[k]) and _flat(chain.rest, touched, k + 1)
+@of_lane.register(Two)
+def _(kind, first, second):
+    return Two(first, second)
+
+
+@by_type
+def is_held_by(held, wall):
+    """Whether a wall is among those."""
+    return wall == held.first
+
+
+@is_held_by.register(Two)
+def _(held, wall):
+    return (wall == held.first) | (wall == held.second)
+
+
+@by_type
+def second(held):
+    """The second wall, -1 where there is none."""
+    return -1.0
+
+
+@second.register(Two)
+def _(held):
+    return held.second
+
+
+# --- What they take of a vector --------------------------------------------------------------------------
+
+
+@by_type
+def split(held, chain, r0, r1, w):
+    """`Held` of a vector, with the normals of a step from r0 to r1."""
+    n = walls.step_normal(chain, held.first, r0, r1)
+    b = dot(w, n)
+    return Held(w - b * n, n, b, ZERO, 0.0)
+
+
+@split.register(Two)
+def _(held, chain, r0, r1, w):
+    n, m = walls.step_normal(chain, held.first, r0, r1), walls.step_normal(chain, held.second, r0, r1)
+    return _on_edge(n, m, w)
+
+
+@by_type
+def split_at(held, chain, r, w):
+    """`Held` of a vector at a point."""
+    n = walls.unit_normal(chain, held.first, r)
+    b = dot(w, n)
+    return Held(w - b * n, n, b, ZERO, 0.0)
+
+
+@split_at.register(Two)
+def _(held, chain, r, w):
+    return _on_edge(walls.unit_normal(chain, held.first, r), walls.unit_normal(chain, held.second, r), w)
+
+
+@inlined
+def _on_edge(n, m, w):
+    # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
+    e, cosine, wn, wm = cross(n, m), dot(n, m), dot(w, n), dot(w, m)
+    sine2 = square(e)
+    inverse = 1.0 / select(sine2 > _TINY, sine2, _TINY)
+    return Held((dot(w, e) * inverse) * e, n, (wn - cosine * wm) * inverse, m, (wm - cosine * wn) * inverse)
+
+
+@by_type
+def inward(held, n, m):
+    """The unit vector away from the walls."""
+    return -1.0 * n
+
+
+@inward.register(Two)
+def _(held, n, m):
+    k = n + m
+    return k * (-1.0 / math.sqrt(square(k)))
+
+
+@by_type
+def settle(held, chain, r):
+    """A point within round-off of the walls, moved onto them."""
+    return walls.settle(chain, held.first, r)
+
+
+@settle.register(Two)
+def _(held, chain, r):
+    return walls.settle(chain, held.first, walls.settle(chain, held.second, r))
+
+
+# --- Friction --------------------------------------------------------------------------------------------
+
+
+@by_type
+def _grip(friction, held, b, c):
+    """sum mu b"""
+    return wall_laws.number_of(friction, held.first) * b + _second_grip(held, friction, c)
+
+
+@_grip.register(type(None))
+def _(friction, held, b, c):
+    return 0.0
+
+
+@by_type
+def _second_grip(held, friction, c):
+    return 0.0
+
+
+@_second_grip.register(Two)
+def _(held, friction, c):
+    return wall_laws.number_of(friction, held.second) * c
+
+
+@by_type
+def _dragged(friction, held, taken):
+    """u = s P, and sum mu b"""
+    grip = _grip(friction, held, taken.b, taken.c)
+    speed2 = square(taken.along)
+    moving = speed2 > 0.0
+    speed = math.sqrt(select(moving, speed2, 1.0))
+    return taken.along * select(moving, 1.0 - grip / speed, 0.0), grip
+
+
+@_dragged.register(type(None))
+def _(friction, held, taken):
+    return taken.along, 0.0
+
+
+# --- Forces ----------------------------------------------------------------------------------------------
+
+
+@by_type
+def presses(held, chain, r, v, pull):
+    """How the walls press on a particle that slides with this velocity, per mass: (first, second)."""
+    return walls.outward_acceleration(chain, held.first, r, v, pull), 0.0
+
+
+@presses.register(Two)
+def _(held, chain, r, v, pull):
+    one = walls.outward_acceleration(chain, held.first, r, v, pull)
+    other = walls.outward_acceleration(chain, held.second, r, v, pull)
+    n, m = walls.unit_normal(chain, held.first, r), walls.unit_normal(chain, held.second, r)
+    cosine, sine2 = dot(n, m), square(cross(n, m))
+    inverse = 1.0 / select(sine2 > _TINY, sine2, _TINY)
+    return (one - cosine * other) * inverse, (other - cosine * one) * inverse
+
+
+@by_type
+def lets_go(held, n, m):
+    """Whether a wall no longer presses."""
+    return n < 0.0
+
+
+@lets_go.register(Two)
+def _(held, n, m):
+    return (n < 0.0) | (m < 0.0)
+
+
+@inlined
+def force(friction, held, chain, gravity, r, v):
+    """The `Force` on a particle that slides with this velocity along the walls."""
+    pull = accelerated(gravity, ZERO, 1.0)
+    n, m = presses(held, chain, r, v, pull)
+    taken = split_at(held, chain, r, v)
+    a = pull - n * taken.n - m * taken.m
+    return Force(a - _drag(friction, held, n, m, v, a), n, m)
+
+
+@by_type
+def _drag(friction, held, n, m, v, a):
+    """Coulomb's friction against the velocity; of a particle at rest, against what would move it, and no more."""
+    grip = _grip(friction, held, n, m)
+    speed2, pulled = square(v), math.sqrt(square(a))
+    moving = speed2 > 0.0
+    against = select(moving, 1.0 / math.sqrt(select(moving, speed2, 1.0)), 0.0) * v
+    share = select(pulled > 0.0, grip / select(pulled > 0.0, pulled, 1.0), 0.0)
+    held_back = select(moving, 0.0, select(share < 1.0, share, 1.0))
+    return grip * against + held_back * a
+
+
+@_drag.register(type(None))
+def _(friction, held, n, m, v, a):
+    return ZERO
+
+
+@by_type
+def longest(friction, v, a):
+    """A time within which a particle that slides with friction surely does not stop."""
+    # At the rate of now it stops after |v|^2/(-v.a).
+    slowing = -dot(v, a)
+    return select(slowing > 0.0, _BEFORE_STOP * square(v) / select(slowing > 0.0, slowing, 1.0), math.inf)
+
+
+# Of the time to a stop: each step leaves a thousandth of the speed.
+_BEFORE_STOP = 0.999
+
+
+@longest.register(type(None))
+def _(friction, v, a):
+    return math.inf
+
+
+# --- A step ----------------------------------------------------------------------------------------------
+
+
+class Swept(NamedTuple):
+    """One sweep of a step: r1, w1, what the walls took of w, sum mu b |u|, whether r1 still moves."""
+
+    r: Vec
+    w: Vec
+    b: float
+    c: float
+    work: float
+    moves: bool
+
+
+@inlined
+def sweep(friction, held, chain, h, r0, r1, w):
+    """One sweep of (S): the step with the discrete gradients of the last r1."""
+    taken = split(held, chain, r0, r1, w)
+    u, grip = _dragged(friction, held, taken)
+    end = r0 + h * u
+    moved, size = total(absolute(end - r1)), total(absolute(r0))
+    work = grip * math.sqrt(square(u)) if wall_laws.is_given(friction) else 0.0
+    # w1 = 2 u - w0 + what friction has taken twice over: u = w0 - b n - grip t, so w1 = w0 - 2 b n - 2 grip t
+    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= _STILL * size))
+
+
+@inlined
+def part(k):
+    """The length of step k of the composition, in units of its length."""
+    return select(k == 2, MIDDLE, OUTER)
+
+
+# --- The end of a composed step --------------------------------------------------------------------------
+
+
+@inlined
+def restored(v, speed2, scale2):
+    """A velocity along the walls with |v|^2 as the energy says, where it is known to more digits than v has."""
+    now = square(v)
+    f = 0.5 * (speed2 - now) / select(now > 0.0, now, 1.0)
+    return v * (1.0 + select((now > _FAST * scale2) & (abs(f) < 0.1), f, 0.0))
+
+
+@inlined
+def error(h, start, end, allowed):
+    """The error of a composed step over what is allowed; start and end are (r, v, a).
+
+    Its defect, r1 - r0 - h (v0 + v1)/2 - h^2 (a0 - a1)/12, is of fifth order as the error of the step is, and vanishes
+    as it does where the motion is a parabola.
+    """
+    r0, v0, a0 = start
+    r1, v1, a1 = end
+    defect = (r1 - r0) - (0.5 * h) * (v0 + v1) - (h * h / 12.0) * (a0 - a1)
+    off = total(absolute(defect)) - _NOISE * (total(absolute(r0)) + total(absolute(r1)))
+    return select(off > 0.0, _ERROR * off / allowed, 0.0)
+
+
+@inlined
+def next_step(h, ratio):
+    """The length of the next step after one whose error is so much of what is allowed."""
+    some = ratio > 0.0
+    # The error over the time that it took is of fourth order.
+    factor = _SAFE / math.sqrt(math.sqrt(select(some, ratio, 1.0)))
+    factor = select(some & (factor < _GROW), factor, _GROW)
+    return h * select(factor > _SHRINK, factor, _SHRINK)
+
+
+class Path(NamedTuple):
+    """A step of length h."""
+
+    r0: Vec
+    v0: Vec
+    r1: Vec
+    v1: Vec
+    h: Any
+
+
+@by_type
+def meets(chain, number, held, path, near):
+    """Whether a step may go deeper than `near` into a wall that does not hold the particle."""
+    raise NotImplementedError
+
+
+@meets.register(walls.Chain)
+def _(chain, number, held, path, near):
+    here = _may_meet(chain.first, path, near) & (not is_held_by(held, number))
+    return here | meets(chain.rest, number + 1.0, held, path, near)
+
+
+meets.register(type(None), lambda chain, number, held, path, near: False)
+
+
+@inlined
+def _may_meet(surface, path, near):
+    level0, rise0, _scale = _level(surface, path.r0, path.v0)
+    level1, rise1, scale = _level(surface, path.r1, path.v1)
+    # The cubic through both ends is below its control points; the start is known to be admissible.
+    third, deep = path.h / 3.0, near * scale
+    on_line = _on_line(surface, path.r0, path.r1 - path.r0)
+    return (level0 + third * rise0 > deep) | (level1 - third * rise1 > deep) | (level1 > deep) | on_line
+
+
+@inlined
+def _level(surface, r, v):
+    """The level of a wall, its rate of change, and the length of its gradient."""
+    scale = math.sqrt(square(contract.slope(surface, r)))
+    rate = scale * dot(contract.unit_normal(surface, r), v)
+    return contract.level_of(surface, contract.inner(surface, r)), rate, scale
+
+
+@by_type
+def _on_line(surface, r, d):
+    """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
+    if contract.is_quartic(surface) or contract.flat(surface):
+        return False
+    time, _found = contract.first_hit(surface, r, d)
+    return time < 1.0

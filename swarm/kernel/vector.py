@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from .jit import Array, inlined, kept
+from .jit import Array, inlined, kept, select
 
 
 class Vec(NamedTuple):
@@ -141,6 +141,12 @@ def total(a):
 def largest(a):
     """The largest magnitude of a component."""
     return max(abs(a.x), abs(a.y), abs(a.z))
+
+
+@inlined
+def either(condition, a, b):
+    """`select` of vectors."""
+    return Vec(select(condition, a.x, b.x), select(condition, a.y, b.y), select(condition, a.z, b.z))
 
 
 @inlined

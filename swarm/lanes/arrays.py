@@ -5,23 +5,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.events import ARRIVED, EVENT
 from ..contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
-from ..kernel.jit import Array, by_type_outlined, index, inlined, next_of, outlined, spaced
+from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined, next_of, outlined, select, spaced
 from ..kernel.vector import column, put
 from ..methods import contract as methods
-from ..particles import Multipliers
+from ..particles import Contacts, Multipliers
 from ..surfaces import flights
 from ..surfaces import fold as walls
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
 LANES = 256
 # The row stride is not a power of two, so that the rows of a lane do not share a cache set.
-_STRIDE = 264
+STRIDE = 264
 # Bytes of a line of the cache, and of a number of eight flags.
 _LINE, EIGHT = 64, 8
 R, V, LEFT, OWN, HITS, ROWS = 0, 3, 6, 7, 10, 11
 
-with_distances = spaced(_STRIDE)
+with_distances = spaced(STRIDE)
 
 
 class Lanes(NamedTuple):
@@ -62,16 +63,18 @@ class Draws(NamedTuple):
     the last one.
     """
 
-    ticket: Array  # (1,) the next draw, of all threads
+    ticket: Array  # (1,) how many of `order` are drawn, by all threads
+    order: Array  # int64, the draws
     size: int
-    mine: Array  # the draws of this thread, in order
+    mine: Array  # int64, the draws of this thread, in order
 
 
 class Share(NamedTuple):
     """What one thread advances of a frame, and by how much."""
 
     state: Any  # `particles.State`
-    done: Array  # (N,) bool, who has arrived
+    phase: Array  # (N,) int8, who flies, slides on one wall or on two, or has arrived
+    pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
     halted: Halted
     draws: Draws
     halt: Array  # (1,) int64, passes after which to return
@@ -80,32 +83,32 @@ class Share(NamedTuple):
 
 def empty(walls: int) -> Lanes:
     """Lanes for one block."""
-    eights = np.zeros(_STRIDE // EIGHT, np.int64)
+    eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
-        rows=_table(ROWS),
-        impulse=_table(walls),
-        wall=_table(1)[0],
-        kappa=_table(1)[0],
-        unsolved=np.zeros(_STRIDE, np.bool_),
-        sweeping=np.zeros(_STRIDE, np.bool_),
-        record=_table(RECORDS),
-        course=_table(walls * flights.COURSE),
-        turned=_table(4),
-        particle=np.zeros(_STRIDE, np.int64),
+        rows=table(ROWS),
+        impulse=table(walls),
+        wall=table(1)[0],
+        kappa=table(1)[0],
+        unsolved=np.zeros(STRIDE, np.bool_),
+        sweeping=np.zeros(STRIDE, np.bool_),
+        record=table(RECORDS),
+        course=table(walls * flights.COURSE),
+        turned=table(4),
+        particle=np.zeros(STRIDE, np.int64),
         marked=eights.view(np.bool_),
         eights=eights,
         some=np.zeros_like(eights),
-        order=np.zeros(_STRIDE, np.int64),
-        left_behind=_table(ROWS + walls),
+        order=np.zeros(STRIDE, np.int64),
+        left_behind=table(ROWS + walls),
     )
 
 
-def _table(rows: int) -> NDArray[np.float64]:
+def table(rows: int) -> NDArray[np.float64]:
     """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
-    size = 8 * rows * _STRIDE
+    size = 8 * rows * STRIDE
     memory = np.zeros(size + _LINE, np.uint8)
     first = -memory.ctypes.data % _LINE
-    return memory[first : first + size].view(np.float64).reshape(rows, _STRIDE)
+    return memory[first : first + size].view(np.float64).reshape(rows, STRIDE)
 
 
 def none_halted(walls: int) -> Halted:
@@ -121,19 +124,24 @@ def lane_of(method, rows, i):
 
 
 @inlined
-def following_particle(share, i, stop, drawn):
-    """(particle, stop, draws so far): the first from i on that is not done, of another draw if need be; or stop."""
-    draws, done = share.draws, share.done
+def following_particle(share, phase, i, stop, drawn):
+    """(particle, stop, draws so far): the first from i on that is in this phase, of another draw if need be; or stop.
+
+    Counts those in other phases, which other kernels advance.
+    """
+    draws, phases, pending = share.draws, share.phase, share.pending
     while True:
-        while i < stop and done[i]:
+        while i < stop and phases[i] != phase:
+            pending[phases[i]] += 1
             i += 1
         if i < stop:
             return i, stop, drawn
         k = next_of(draws.ticket)
-        i = min(k * draws.size, done.size)
-        stop = min(i + draws.size, done.size)
-        if i == stop:
-            return i, stop, drawn
+        if k >= draws.order.size:
+            return i, i, drawn
+        k = draws.order[k]
+        i = k * draws.size
+        stop = min(i + draws.size, phases.size)
         draws.mine[drawn] = k
         drawn += 1
 
@@ -144,7 +152,8 @@ def load(method, chain, lanes, lane, share, i):
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
     particle[lane] = i
     state, halted = share.state, share.halted
-    if halted.particle.size > 0 and _pick_up(lanes, lane, halted, i):
+    left = rest_of_frame(state.contacts, i)
+    if halted.particle.size > 0 and not left > 0.0 and _pick_up(lanes, lane, halted, i):
         return
     i = index(i)
     v = column(state.velocity, 0, i)
@@ -152,7 +161,7 @@ def load(method, chain, lanes, lane, share, i):
     put(rows, V, lane, v)
     own = methods.constants(method, state.mass[i], state.energy[i], v)
     rows[OWN, lane], rows[OWN + 1, lane], rows[OWN + 2, lane] = own
-    rows[LEFT, lane], rows[HITS, lane] = share.span, 0.0
+    rows[LEFT, lane], rows[HITS, lane] = select(left > 0.0, left, share.span), 0.0
     for s in range(walls.length(chain)):
         impulse[s, lane] = 0.0
 
@@ -188,8 +197,9 @@ def leave(lanes, live):
 
 
 @inlined
-def retire(method, chain, lanes, lane, state):
-    """A lane back into its particle."""
+def retire(method, chain, lanes, lane, share):
+    """A lane back into its particle, which has arrived or goes on along a wall."""
+    state = share.state
     rows, impulse, impacts, total = lanes.rows, lanes.impulse, state.impacts, state.impulse
     i = index(lanes.particle[lane])
     put(state.position, 0, i, column(rows, R, lane))
@@ -202,6 +212,9 @@ def retire(method, chain, lanes, lane, state):
         now = 0.5 * rows[OWN, lane]
         state.dissipated[i] += state.mass[i] * (state.energy[i] - now)
         state.energy[i] = now
+    phase = hand_over(state.contacts, i, rows[LEFT, lane], lanes.wall[lane])
+    share.phase[i] = phase
+    share.pending[phase] += 1
 
 
 @inlined
@@ -213,6 +226,44 @@ def move(chain, lanes, source, target):
     for s in range(walls.length(chain)):
         impulse[s, target] = impulse[s, source]
     particle[target] = particle[source]
+
+
+# --- Between the kernels of a frame ----------------------------------------------------------------------
+
+
+@by_type
+def rest_of_frame(contacts, i):
+    """What is left of the frame of a particle that comes from a wall; 0 at its start."""
+    return 0.0
+
+
+@rest_of_frame.register(Contacts)
+def _(contacts, i):
+    left = contacts.left[i]
+    contacts.left[i], contacts.walls[0, i], contacts.walls[1, i] = 0.0, -1.0, -1.0
+    return left
+
+
+@inlined
+def speed2_scale(state, i):
+    """The square of the speed that a particle's energy scale is that of."""
+    scale = state.inverse_scale[i]
+    return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)
+
+
+@by_type
+def hand_over(contacts, i, left, wall):
+    """Leave a particle that has arrived, or whose contact lasts, to what comes next: its phase."""
+    return ARRIVED
+
+
+@hand_over.register(Contacts)
+def _(contacts, i, left, wall):
+    if not left > 0.0:
+        return ARRIVED
+    contacts.left[i], contacts.met[i] = left, methods.HARD - wall
+    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+    return EVENT
 
 
 # --- What the loop of the multiplier took ----------------------------------------------------------------

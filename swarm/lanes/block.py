@@ -7,6 +7,7 @@ depend on which lane or block a particle is in.
 
 from typing import NamedTuple
 
+from ..contact.events import FLYING
 from ..kernel.gravity import Gravity, Nothing, as_vector
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, select
 from ..kernel.vector import column, put
@@ -59,7 +60,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     lanes, state = with_distances(lanes), share.state
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
-        following, stop, drawn = following_particle(share, following, stop, drawn)
+        following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
         if following == stop:
             break
         load(method, chain, lanes, index(live), share, following)
@@ -82,9 +83,8 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
         for k in range(_marked(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
-            retire(method, chain, lanes, lane, state)
-            share.done[index(lanes.particle[lane])] = True
-            following, stop, drawn = following_particle(share, following, stop, drawn)
+            retire(method, chain, lanes, lane, share)
+            following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
             if following < stop:
                 load(method, chain, lanes, lane, share, following)
                 following += 1
@@ -207,8 +207,20 @@ def _end(method, chain, lanes, i, contact):
     _put(lanes, i, contact)
     _count(method, lanes, i, contact)
     lanes.wall[i] = contact.wall
-    _add_impulse(chain.rest, chain, lanes.impulse, i, contact.wall, contact.impulse)
-    return not (contact.left > 0.0), contact.wall <= methods.HARD
+    _add_impulse(chain.rest, chain, lanes.impulse, i, _wall_of(method, contact), contact.impulse)
+    hard = contact.wall <= methods.HARD
+    if methods.holds(method):
+        # What lasts is another kernel's.
+        return hard | (not (contact.left > 0.0)), False
+    return not (contact.left > 0.0), hard
+
+
+@inlined
+def _wall_of(method, contact):
+    """The wall that gives an impulse: one whose contact lasts too."""
+    if methods.holds(method):
+        return select(contact.wall <= methods.HARD, methods.HARD - contact.wall, contact.wall)
+    return contact.wall
 
 
 @inlined
@@ -226,7 +238,8 @@ def _count(method, lanes, i, contact):
     rows[HITS, i] += contact.hits
     if methods.dissipates(method):
         rows[OWN, i] = contact.twice_energy
-    lanes.marked[i] = not (contact.left > 0.0)
+    gone = methods.holds(method) & (contact.wall <= methods.HARD)
+    lanes.marked[i] = gone | (not (contact.left > 0.0))
 
 
 @by_type

@@ -13,7 +13,7 @@ from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.records import Step
 from ..contact.reflection import CHORD_NEEDS
-from ..contact.sliding import NEEDS as SLIDING_NEEDS
+from ..contact.touching import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import inlined, kept, scratch, select

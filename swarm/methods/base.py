@@ -45,6 +45,10 @@ class Method:
         """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
         return False
 
+    def may_slide(self) -> bool:
+        """Whether a particle may stay on its walls: then the kernels of sliding are compiled at the first one."""
+        return False
+
     def seldom_hard(self, scene: Scene) -> bool:
         """Whether most runs meet no contact for `hard_pass`: then the slow-path kernel is compiled at the first one."""
         return False

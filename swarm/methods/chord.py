@@ -1,23 +1,23 @@
-"""The contact step of `Impact`, a chord of the surface, and what follows short flights."""
+"""The contact step of `Impact`, a chord of the surface."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..contact.reflection import chord_end, chord_step, chord_turn
-from ..contact.sliding import Contacts, Moving, impact
 from ..kernel.gravity import displacement
 from ..kernel.jit import inlined, kept, select
-from ..status import Status
 from ..surfaces import fold as walls
 from . import contract
 
 
 class Chord(NamedTuple):
-    """What kernels know of `Impact` with a contact step; one of the shortest flight's two numbers is 0."""
+    """What kernels know of `Impact` with a contact step: `Lasting`, no laws, and the step."""
 
-    shortest_flight: float  # [s]
-    shortest_length: float  # of a flight [m]
-    touch: float  # distance within which walls hold a sliding particle [m]
-    fall2: float  # |G| size, the square of a speed
+    size: float
+    fall2: float
+    shortest_flight: float
+    shortest_length: float
+    sliding_tolerance: float
+    laws: Any
     contact_step: float  # h [s]
 
 
@@ -55,7 +55,7 @@ def _(method, chain, gravity, lane, wall, solution):
     h, turned = _step(method, lane), solution.turned
     r, v, stays = chord_end(chain, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
     hit = wall >= 0.0
-    chord = hit & stays & (turned.impulse > 0.0) & (not solution.unsolved)
+    chord = hit & stays & (turned.impulse > 2.0 * lane.own.slow) & (not solution.unsolved)
     return contract.Contact(
         select(chord, r, kept(lane.r)),
         select(chord, v, kept(lane.v)),
@@ -65,20 +65,3 @@ def _(method, chain, gravity, lane, wall, solution):
         select(chord, 1.0, 0.0),
         lane.own.energy.twice,
     )
-
-
-# --- Short flights ---------------------------------------------------------------------------------------
-
-
-@contract.hard_pass.register(Chord)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    contacts = Contacts(method.contact_step, None, lane.own.shortest, method.touch)
-    return after_short_flight(contacts, chain, gravity, lane, wall, lanes, i)
-
-
-@inlined
-def after_short_flight(contacts, chain, gravity, lane, wall, lanes, i):
-    """The impact of one particle that may graze, rest or be in a corner, as `hard_pass`."""
-    moving = Moving(lane.r, lane.v, lane.left)
-    end = impact(contacts, chain, gravity, wall, moving, lane.own.energy, lanes.impulse, i)
-    return contract.Contact(end.r, end.v, lane.left - end.used, wall, 0.0, 1.0, end.twice_energy), Status.DONE.value

@@ -99,6 +99,30 @@ def dissipates(method):
     return False
 
 
+@by_type
+def holds(method):
+    """Whether a particle may stay on a wall: its numbers are `Held`, and a contact that lasts is HARD."""
+    return False
+
+
+@by_type
+def laws(method):
+    """The laws of its walls, or None."""
+    return None
+
+
+@by_type
+def friction(method):
+    """Their friction, or None."""
+    return None
+
+
+@by_type
+def sliding_tolerance(method):
+    """The relative error of a crossing, of a particle that slides."""
+    return 0.0
+
+
 # --- Flight ----------------------------------------------------------------------------------------------
 
 

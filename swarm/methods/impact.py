@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import checks
+from ..contact import laws as wall_laws
+from ..contact import sliding, touching
 from ..contact.reflection import CHORD_NEEDS, Energy, exact, loses_energy
-from ..contact.sliding import NEEDS as SLIDING_NEEDS
-from ..contact.sliding import Contacts
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import kept, select
@@ -16,10 +16,10 @@ from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
 from . import base, contract
-from .chord import Chord, after_short_flight
+from .chord import Chord
 
-# Walls within this part of the scene's size hold a sliding particle together.
-_TOUCH = 1e-10
+# Of the sliding tolerance: round-off, and steps that no longer follow the wall.
+_FINEST, _COARSEST = 1e-13, 1e-3
 
 
 @dataclass(frozen=True)
@@ -55,24 +55,29 @@ class Impact(base.Method):
 
     contact_step: float = 0.0
     shortest_flight: float | None = None
+    sliding_tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "contact_step", checks.at_least("contact_step", self.contact_step, 0.0))
         if self.shortest_flight is not None:
             object.__setattr__(self, "shortest_flight", checks.positive("shortest_flight", self.shortest_flight))
+        tolerance = checks.positive("sliding_tolerance", self.sliding_tolerance)
+        if not _FINEST <= tolerance <= _COARSEST:
+            raise SceneError(f"sliding_tolerance must be from {_FINEST:g} to {_COARSEST:g}, got {tolerance:g}")
+        object.__setattr__(self, "sliding_tolerance", tolerance)
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_crossing("contact_step", self.contact_step, scene, particles)
         base.check_crossing("shortest_flight", self.shortest_flight, scene, particles)
-        if self.contact_step > 0.0 and scene.restitution() is not None:
+        if self.contact_step > 0.0 and scene.laws() is not None:
             raise SceneError(
-                f"contact_step must be 0 where a surface has a restitution below 1, got {self.contact_step:g}: "
-                "the contact step conserves the energy"
+                f"contact_step must be 0 where a surface has a restitution below 1, friction or a temperature, got "
+                f"{self.contact_step:g}: the contact step conserves the energy"
             )
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
-        return *flights.of_flights(scene.gravity is not None), *SLIDING_NEEDS, *chord
+        return *flights.of_flights(scene.gravity is not None), *sliding.NEEDS, *touching.NEEDS, *chord
 
     def time_of_impact(self) -> float:
         return self.contact_step
@@ -80,35 +85,45 @@ class Impact(base.Method):
     def is_rigid(self) -> bool:
         return True
 
-    def seldom_hard(self, scene: Scene) -> bool:
-        # In one smooth cavity only what grazes is: one launch in 1e9, if none is aimed.
-        return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid() and scene.gravity is None
-
     def numbers(self, scene: Scene) -> "Reflection | Chord":
         size = scene.finite_size()
         length = base.SHORTEST * size if self.shortest_flight is None else 0.0
         pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
-        given = self.shortest_flight or 0.0, length, _TOUCH * size, pull * size
+        given = Lasting(size, pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance)
         if self.contact_step > 0.0:
-            return Chord(*given, self.contact_step)
-        return Reflection(*given, scene.restitution())
+            return Chord(*given, None, self.contact_step)
+        return Reflection(*given, scene.laws())
+
+    def may_slide(self) -> bool:
+        return True
+
+
+class Lasting(NamedTuple):
+    """What decides whether a contact lasts; one of the shortest flight's two numbers is 0."""
+
+    size: float  # of the scene [m]
+    fall2: float  # |G| size, the square of a speed
+    shortest_flight: float  # [s]
+    shortest_length: float  # of a flight [m]
+    sliding_tolerance: float  # a crossing
 
 
 class Reflection(NamedTuple):
-    """What kernels know of the method with the exact reflection; one of the shortest flight's two numbers is 0."""
+    """What kernels know of the method with the exact reflection: `Lasting` and the laws of the walls."""
 
-    shortest_flight: float  # [s]
-    shortest_length: float  # of a flight [m]
-    touch: float  # distance within which walls hold a sliding particle [m]
-    fall2: float  # |G| size, the square of a speed
-    restitution: Any  # None or one e a wall
+    size: float
+    fall2: float
+    shortest_flight: float
+    shortest_length: float
+    sliding_tolerance: float
+    laws: Any  # None or `Laws`
 
 
 class ImpactOwn(NamedTuple):
-    """What a lane keeps: its energy, and its shortest flight [s]."""
+    """What a lane keeps: its energy, and the speed [m/s] away from a wall below which a contact may last."""
 
     energy: Energy
-    shortest: float
+    slow: float
 
 
 # --- One pass --------------------------------------------------------------------------------------------
@@ -117,14 +132,14 @@ class ImpactOwn(NamedTuple):
 @contract.constants.register(Reflection)
 @contract.constants.register(Chord)
 def _(method, mass, energy, v):
-    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the shortest flight of this particle
+    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow
     twice_energy = 2.0 * energy
     moving = twice_energy > 0.0
     half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
     speed2 = square(v) + method.fall2
-    moving = speed2 > 0.0
-    shortest = method.shortest_flight + method.shortest_length / math.sqrt(select(moving, speed2, 1.0))
-    return twice_energy, half_inverse, select(moving, shortest, 0.0)
+    # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it.
+    slow = 0.5 * (method.shortest_flight * speed2 + method.shortest_length * math.sqrt(speed2)) / method.size
+    return twice_energy, half_inverse, slow
 
 
 @contract.own.register(Reflection)
@@ -135,43 +150,39 @@ def _(method, first, second, third):
 
 @contract.dissipates.register(Reflection)
 def _(method):
-    return loses_energy(method.restitution)
+    return loses_energy(method.laws)
+
+
+contract.holds.register(Reflection, lambda method: True)
+contract.holds.register(Chord, lambda method: True)
+contract.friction.register(Reflection, lambda method: wall_laws.friction(method.laws))
+contract.sliding_tolerance.register(Reflection, lambda method: method.sliding_tolerance)
+contract.sliding_tolerance.register(Chord, lambda method: method.sliding_tolerance)
 
 
 @contract.land.register(Reflection)
 @contract.land.register(Chord)
 def _(method, chain, gravity, lane, hit):
     t = select(hit.time < lane.left, hit.time, lane.left)
-    # A flight shorter than the shortest ends in a contact that may graze; not the first one, cut by the frame's begin.
-    short = (hit.time < lane.own.shortest) & (lane.hits > 0.0)
-    wall = select(short, contract.HARD - hit.wall, hit.wall)
     return contract.Flight(
         lane.r + displacement(gravity, lane.v, t),
         accelerated(gravity, lane.v, t),
         lane.left - t,
-        select((hit.time <= lane.left) & (hit.wall >= 0.0), wall, -1.0),
+        select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
     )
 
 
 @contract.contact.register(Reflection)
 def _(method, chain, gravity, lane, wall, solution):
-    bounce = exact(method.restitution, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
+    bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
+    slow = hit & (bounce.away <= lane.own.slow)
     return contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
-        wall,
+        select(slow, contract.HARD - wall, wall),
         select(hit, bounce.impulse, 0.0),
-        select(hit, 1.0, 0.0),
+        select(hit & (bounce.impulse > 0.0), 1.0, 0.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
     )
-
-
-# --- Short flights ---------------------------------------------------------------------------------------
-
-
-@contract.hard_pass.register(Reflection)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    contacts = Contacts(None, method.restitution, lane.own.shortest, method.touch)
-    return after_short_flight(contacts, chain, gravity, lane, wall, lanes, i)

@@ -11,7 +11,7 @@ from ..contact import regularisation as law_of
 from ..contact import uzawa
 from ..contact.discrete_gradient import nested
 from ..contact.reflection import Energy, chord, exact
-from ..contact.sliding import Contacts, Moving, impact
+from ..contact.touching import Contacts, Moving, impact
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
 from ..kernel.vector import square
 from ..status import Status

@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 from .. import observables
 from ..errors import RunError
 from ..lanes import arrays as lanes
+from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD, PHASES
+from ..contact.sliding import One, Two
 from ..lanes import block as blocks
+from ..lanes import meet, slide
+from ..kernel.jit import next_of
 from ..methods.base import Method
-from ..particles import Multipliers, Particles, State
+from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
 from .tiers import Tier
@@ -32,6 +36,10 @@ _LITTLE_WORK = 2e-4
 _GLANCE = 0.1
 # A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
+# What slides in each phase, and what else is no flight: each is a kernel.
+_KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
+# A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
+_PARTS = 4
 # (status, particle, what a halt left in the lanes)
 _End = tuple[int, int, lanes.Halted | None]
 
@@ -52,8 +60,9 @@ class Run:
             np.empty(n),
             np.zeros(n, np.int64),
             np.zeros((len(self._owners), n)),
-            np.zeros(0 if scene.restitution() is None else n),
+            np.zeros(0 if scene.laws() is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
+            _no_contacts(n) if method.may_slide() else None,
         )
         self._scene, self._method = scene, method
         self._numbers, self._law = method.numbers(scene), method.law()
@@ -68,10 +77,12 @@ class Run:
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._halt = np.full(1, blocks.NEVER)
-        self._done = np.zeros(n, np.bool_)
+        self._phase = np.zeros(n, np.int8)
+        self._order = np.arange(self._draws)
+        self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(len(self._owners))
         self._cut_short = False
-        self._hard = None if method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
+        self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._pace = math.inf  # work of the last frame [s], over its span
@@ -101,7 +112,7 @@ class Run:
         time to write a frame [s].
         """
         if not self._cut_short:
-            self._done.fill(False)
+            self._begin()
         if self._tier.is_plain:
             if self._tier.left <= 0.0:
                 self._choose_tier()
@@ -117,8 +128,12 @@ class Run:
         status, particle, _left = max(ends, key=lambda end: end[:2])
         self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
         if status == Status.HARD_CONTACT:
-            self._hard = blocks.Hard(blocks.MOST_HITS)
+            if self.state.contacts is not None:
+                self._kinds.add(particle)
+            else:
+                self._hard = blocks.Hard(blocks.MOST_HITS)
             self._choose_tier()
+            self._keep([left for *_, left in ends if left is not None])
             return self.advance(span, moment, writing, latest)
         self._halt[0] = blocks.NEVER
         if status == Status.INTERRUPTED:
@@ -133,10 +148,38 @@ class Run:
     def _share(self, span: float) -> _End:
         """Advance and observe what one thread draws."""
         draws, mine = self._lanes()
-        advance_block, observe = self._tier.kernel(blocks.advance_block), self._tier.kernel(observables.observe)
-        status, particle, drawn = advance_block(*self._advancing(span, draws, mine))
+        if not self._kinds:
+            return self._part(span, draws, mine)
+        # Who flies first would have drawn everything when the others are ready to slide.
+        some, end = max(1, self._draws // (_PARTS * self._threads)), (int(Status.DONE), 0, None)
+        while end[0] == Status.DONE:
+            first = min(some * next_of(self._ticket), self._draws)
+            if first == self._draws:
+                break
+            end = self._part(span, _again(draws, self._order[first : first + some]), mine)
+        return end
+
+    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> _End:
+        """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
+        share = self._shared(span, draws)
+        status, particle, drawn = self._tier.kernel(blocks.advance_block)(*self._flying(share, mine))
+        while status == Status.DONE and any(share.pending[phase] for phase in _KINDS):
+            share = self._shared(span, _again(draws, draws.mine[:drawn].copy()))
+            for phase in _KINDS:
+                if phase not in self._kinds and (self._phase == phase).any():
+                    return int(Status.HARD_CONTACT), phase, None
+                if phase in self._kinds and status == Status.DONE:
+                    share.draws.ticket[0] = 0
+                    kernel, arguments = self._lasting(phase, share)
+                    status, particle, _drawn = self._tier.kernel(kernel)(*arguments)
+            if status == Status.INTERRUPTED:
+                return status, 0, None
+            if status == Status.DONE:
+                share.pending.fill(0)
+                share.draws.ticket[0] = 0
+                status, particle, _drawn = self._tier.kernel(blocks.advance_block)(*self._flying(share, mine))
         if status == Status.DONE:
-            observe(*self._observing(draws.mine[:drawn]))
+            self._tier.kernel(observables.observe)(*self._observing(draws.mine[:drawn]))
         if status != Status.INTERRUPTED:
             return status, particle, None
         live = particle
@@ -158,14 +201,25 @@ class Run:
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
-        self._done.fill(True)
+        self._phase.fill(ARRIVED)
         self._ticket[0] = 0
         self._share(0.0)
+
+    def _begin(self) -> None:
+        """Whether each particle begins a frame in flight or along its walls."""
+        contacts = self.state.contacts
+        if contacts is None or not self._kinds:
+            self._phase.fill(FLYING)
+        else:
+            first, second = contacts.walls >= 0.0
+            self._phase[:] = np.where(first, np.where(second, EDGE, HELD), FLYING)
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
         left = self._halted.rows[lanes.LEFT]
-        return float(self._done.sum() + (1.0 - left / span).sum()) / len(self._done)
+        if self.state.contacts is not None:
+            left = np.append(left, self.state.contacts.left[self.state.contacts.left > 0.0])
+        return float((self._phase == ARRIVED).sum() + (1.0 - left / span).sum()) / len(self._phase)
 
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
         """How many threads of the pool advance a frame, and whether the caller's thread does too."""
@@ -189,12 +243,28 @@ class Run:
 
     def _lanes(self) -> tuple[lanes.Draws, lanes.Lanes]:
         """Arrays of one thread: its draws and its lanes."""
-        return lanes.Draws(self._ticket, self._size, np.empty(self._draws, np.int64)), lanes.empty(len(self._owners))
+        draws = lanes.Draws(self._ticket, self._order, self._size, np.empty(self._draws, np.int64))
+        return draws, lanes.empty(len(self._owners))
 
-    def _advancing(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> tuple[Any, ...]:
+    def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
+        """What a thread shares with the others, and its counts."""
+        pending = np.zeros(PHASES, np.int64)
+        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span)
+
+    def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
-        share = lanes.Share(self.state, self._done, self._halted, draws, self._halt, span)
         return self._numbers, self._chain, self._gravity, self._hard, share, mine
+
+    def _lasting(self, phase: int, share: lanes.Share) -> tuple[Any, tuple[Any, ...]]:
+        """The kernel that advances particles in this phase, which is not flight, and its arguments."""
+        if _KINDS[phase] is None:
+            return meet.meet_block if phase == EVENT else meet.careful_block, (
+                self._numbers,
+                self._chain,
+                self._gravity,
+                share,
+            )
+        return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, slide.empty())
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
@@ -203,7 +273,10 @@ class Run:
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
         draws, mine = self._lanes()
-        yield blocks.advance_block, self._advancing(0.0, draws, mine)
+        share = self._shared(0.0, draws)
+        yield blocks.advance_block, self._flying(share, mine)
+        for phase in self._kinds:
+            yield self._lasting(phase, share)
         yield observables.observe, self._observing(draws.mine)
         if self._far < math.inf:
             yield observables.count_escaped, self._escaping
@@ -214,7 +287,7 @@ class Run:
 
     def _keep(self, left_behind: list[lanes.Halted]) -> None:
         """Keep what a halt left in the lanes, and what an earlier one left and no lane has taken since."""
-        picked_up = np.concatenate([np.flatnonzero(self._done), *(left.particle for left in left_behind)])
+        picked_up = np.concatenate([np.flatnonzero(self._phase != FLYING), *(left.particle for left in left_behind)])
         waiting = ~np.isin(self._halted.particle, picked_up)
         parts = [lanes.Halted(self._halted.particle[waiting], self._halted.rows[:, waiting]), *left_behind]
         particle = np.concatenate([part.particle for part in parts])
@@ -224,9 +297,9 @@ class Run:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What `restore` needs to continue with the same bits, not copied; to be called between calls of `advance`."""
-        arrays: dict[str, NDArray[Any]] = {"done": self._done, **_named("halted", self._halted)}
+        arrays: dict[str, NDArray[Any]] = {"phase": self._phase, **_named("halted", self._halted)}
         for name, array in self.state._asdict().items():
-            arrays |= _named(name, array) if isinstance(array, Multipliers) else {name: array}
+            arrays |= _named(name, array) if isinstance(array, (Contacts, Multipliers)) else {name: array}
         return {name: array for name, array in arrays.items() if array is not None}
 
     def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
@@ -235,6 +308,10 @@ class Run:
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
+        contacts = self.state.contacts
+        if contacts is not None and ((contacts.walls >= 0.0).any() or (contacts.left > 0.0).any()):
+            self._kinds = set(_KINDS)
+            self._choose_tier()
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
@@ -264,9 +341,19 @@ class Run:
             )
 
 
+def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:
+    """The draws of this `order`, for one thread."""
+    return draws._replace(ticket=np.zeros(1, np.int64), order=order)
+
+
 def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
     """The arrays of a NamedTuple under dotted names."""
     return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
+
+
+def _no_contacts(n: int) -> Contacts:
+    met, step, keep, left, sliding = np.zeros((5, n))
+    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), sliding)
 
 
 def _no_sweeps(n: int) -> Multipliers:

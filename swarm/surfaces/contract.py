@@ -22,7 +22,7 @@ surface whose inner function is not phi registers `inner`, `slope`, `gap_of`, `l
 import math
 
 from ..kernel.jit import by_type, select
-from ..kernel.vector import absolute, norm, square, times, total
+from ..kernel.vector import absolute, dot, norm, square, times, total
 from .course import Quartic, first_rise, safe_rise_time
 
 # Newton steps of the chord.
@@ -214,6 +214,16 @@ def passed(surface, r, v):
     return False
 
 
+@by_type
+def outward_acceleration(surface, r, v, pull):
+    """How fast a free flight along the wall gathers speed out of it [m/s^2]: above 0 the wall holds the particle."""
+    # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|
+    n, h = slope(surface, r), hessian(surface, r)
+    bent = h.xx * v.x * v.x + h.yy * v.y * v.y + h.zz * v.z * v.z
+    bent += 2.0 * (h.xy * v.x * v.y + h.yz * v.y * v.z + h.zx * v.z * v.x)
+    return (2.0 * bent + dot(n, pull)) * (surface.side / norm(n))
+
+
 # --- Contact: a step r1 = r0 + p - kappa D(r0, r1) with the free displacement p = h v0 + h^2 G/2 ---------
 
 
@@ -226,6 +236,13 @@ def inner_gradient(surface, r0, r1):
     d2 = square(d)
     rest = difference(surface, r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z
     return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
+
+
+@by_type
+def step_normal(surface, r0, r1):
+    """The unit vector along that discrete gradient, out of the admissible side."""
+    n = inner_gradient(surface, r0, r1)
+    return n * (surface.side / norm(n))
 
 
 @by_type

@@ -81,6 +81,7 @@ def _(surface, r):
     return r - (contract.inner(surface, r) - surface.offset) * surface.normal
 
 
+contract.outward_acceleration.register(PlaneNumbers, lambda surface, r, v, pull: dot(surface.normal, pull))
 contract.flat.register(PlaneNumbers, lambda surface: True)
 
 
@@ -109,6 +110,7 @@ def _(surface, r, v, pull):
 # --- Contact ---------------------------------------------------------------------------------------------
 
 contract.inner_gradient.register(PlaneNumbers, lambda surface, r0, r1: surface.normal)
+contract.step_normal.register(PlaneNumbers, lambda surface, r0, r1: surface.normal)
 contract.push.register(PlaneNumbers, lambda surface, r0, p, kappa: r0 + (p - kappa * surface.normal))
 contract.rise.register(PlaneNumbers, lambda surface, r0, p, kappa: (dot(surface.normal, p) - kappa, -1.0))
 contract.resolve.register(PlaneNumbers, lambda surface, r, strength: r - strength * surface.normal)

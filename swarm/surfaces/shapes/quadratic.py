@@ -114,6 +114,14 @@ def _(surface, r):
     return r - (contract.phi(surface, r) / select(g2 > _TINY, g2, 1.0)) * g
 
 
+@contract.outward_acceleration.register(QuadricNumbers)
+def _(surface, r, v, pull):
+    # (2 v.A v + grad q.G)/|grad q|
+    g = contract.gradient(surface, r)
+    g2 = square(g)
+    return surface.side * (2.0 * form(surface.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > _TINY, g2, 1.0))
+
+
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
@@ -197,6 +205,11 @@ contract.gap_slope.register(QuadricNumbers, lambda surface, q0, q1: (surface.sid
 def _(surface, r0, r1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
     return tilted(surface, times(surface.a, r0 + r1 - 2.0 * surface.center), 1.0)
+
+
+@contract.step_normal.register(QuadricNumbers)
+def _(surface, r0, r1):
+    return _unit(surface, contract.inner_gradient(surface, r0, r1))
 
 
 @contract.push.register(QuadricNumbers)

@@ -47,12 +47,12 @@ _turned(
 _turned(lambda f: lambda surface, r, v: f(surface.body, own(surface, r), own(surface, v)), contract.first_hit)
 _turned(
     lambda f: lambda surface, r, v, pull: f(surface.body, own(surface, r), own(surface, v), own(surface, pull)),
-    contract.course, contract.falling_hit, contract.safe_time,
+    contract.course, contract.falling_hit, contract.safe_time, contract.outward_acceleration,
 )  # fmt: skip
 _turned(
     lambda f: lambda surface, r0, r1: scene(surface, f(surface.body, own(surface, r0), own(surface, r1))),
-    contract.inner_gradient,
-)
+    contract.inner_gradient, contract.step_normal,
+)  # fmt: skip
 _turned(
     lambda f: lambda surface, r0, p, kappa: scene(surface, f(surface.body, own(surface, r0), own(surface, p), kappa)),
     contract.push,

@@ -181,6 +181,11 @@ def _(surface, r):
     return r - scaled(surface.normal, d - math.copysign(surface.radius, d))
 
 
+@contract.outward_acceleration.register(SlabNumbers)
+def _(surface, r, v, pull):
+    return dot(contract.unit_normal(surface, r), pull)
+
+
 contract.flat.register(SlabNumbers, lambda surface: True)
 
 
@@ -220,6 +225,9 @@ def _(surface, r, v, pull):
 def _(surface, r0, r1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
     return scaled(surface.normal, _off(surface, r0) + _off(surface, r1))
+
+
+contract.step_normal.register(SlabNumbers, lambda surface, r0, r1: contract.unit_normal(surface, r0))
 
 
 @contract.push.register(SlabNumbers)

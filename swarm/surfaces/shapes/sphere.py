@@ -87,6 +87,12 @@ def _(surface, r):
     return r - ((square(d) - surface.radius2) * k) * d
 
 
+@contract.outward_acceleration.register(SphereNumbers)
+def _(surface, r, v, pull):
+    # |v|^2/R + n.G
+    return surface.curvature * (square(v) + dot(r - surface.center, pull))
+
+
 # --- Flight ----------------------------------------------------------------------------------------------
 
 

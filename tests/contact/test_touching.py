@@ -7,7 +7,7 @@ import pytest
 from conftest import EPSILON, SURFACES, call, wall_point
 
 import swarm
-from swarm.contact import projection, sliding
+from swarm.contact import projection, touching
 from swarm.kernel.vector import vec
 from swarm.surfaces.fold import chain_of
 
@@ -94,7 +94,7 @@ def test_a_sliding_step_keeps_the_energy(name):
             plane = swarm.Plane(normal, float(normal @ point) / float(np.linalg.norm(normal)))
             chain = chain_of([surface, plane][:count])
             w = random.standard_normal(3)
-            touch = sliding.Touch(np.ones(count, bool), np.zeros((3, count)), np.zeros(count), np.zeros(count))
-            u = np.array(call(sliding.velocity_along, chain, touch, point, w, h))
+            touch = touching.Touch(np.ones(count, bool), np.zeros((3, count)), np.zeros(count), np.zeros(count))
+            u = np.array(call(touching.velocity_along, chain, touch, point, w, h))
             assert np.linalg.norm(2.0 * u - w) == pytest.approx(np.linalg.norm(w), rel=16 * EPSILON)
             assert (touch.held >= 0.0).all()

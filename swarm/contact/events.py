@@ -1,0 +1,309 @@
+"""How a lasting contact begins and ends, one particle at a time: what it becomes at a wall, and where a step is cut."""
+
+import math
+from typing import NamedTuple
+
+from ..kernel.gravity import accelerated
+from ..kernel.jit import by_type, inlined, outlined, scratch
+from ..kernel.vector import ZERO, Vec, cross, dot, norm, square
+from ..surfaces import contract, flights
+from ..surfaces import fold as walls
+from . import laws as wall_laws
+from . import sliding, touching
+from .projection import ALLOWED
+from .reflection import Energy, exact
+from .sliding import One, Two
+
+# What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
+# decided; or it is left to `careful`.
+PHASES = 6
+FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
+# A particle leaves a wall slower than this part of its own speed: its hops are 1e-4 of a crossing long.
+GRAZING = 5e-5
+# Parts of an acceleration, of a length and of a time that are none.
+_PRESSED, _NEAR, _INSTANT = 1e-12, 1e-13, 1e-9
+# Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
+_SHARPEST = 1e-2
+_EPSILON = 2.220446049250313e-16
+# Walls within this part of the scene's size hold a particle together.
+_TOUCH = 1e-10
+# Places of a step that are looked at for another wall, and halvings down to its instant.
+_PLACES, _HALVINGS = 16, 60
+
+
+class Particle(NamedTuple):
+    """A particle in contact: its energy is twice that per mass, and scale2 is the square of its own speed."""
+
+    r: Vec
+    v: Vec
+    left: float
+    twice: float
+    scale2: float
+
+
+class Next(NamedTuple):
+    """What becomes of it: its velocity along the walls, the speed it keeps across them, its energy, its second wall.
+
+    `wait` is how long the hops last that are left out, `impulse` what the wall gave.
+    """
+
+    phase: int
+    v: Vec
+    keep: float
+    twice: float
+    wall: float
+    other: float
+    impulse: float
+    wait: float
+
+
+@inlined
+def own_speed2(p):
+    """The square of the speed that a particle's own scale and its motion say."""
+    return max(p.scale2, square(p.v))
+
+
+@inlined
+def weightless(rules, gravity, p):
+    """An acceleration that is none for this particle."""
+    return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.size)
+
+
+@inlined
+def _energy(twice):
+    return Energy(twice, 0.5 / twice if twice > 0.0 else 0.0)
+
+
+@inlined
+def _loses(rules, wall):
+    return 1.0 - wall_laws.restitution_of(rules.laws, wall) > 0.0
+
+
+# Each once in a kernel, and not wherever it is asked for: half of the time to compile.
+
+
+@outlined
+def _normal(chain, wall, r):
+    return walls.unit_normal(chain, wall, r)
+
+
+@outlined
+def _press(chain, wall, r, v, pull):
+    return walls.outward_acceleration(chain, wall, r, v, pull)
+
+
+@outlined
+def _bounce(rules, chain, gravity, wall, p):
+    return exact(rules.laws, chain, gravity, wall, p.r, p.v, _energy(p.twice))
+
+
+# --- From flight -----------------------------------------------------------------------------------------
+
+
+@outlined
+def enter(rules, chain, gravity, wall, p):
+    """What becomes of a particle that leaves this wall so slowly that it is back at once."""
+    n = _normal(chain, wall, p.r)
+    v, twice, impulse = p.v, p.twice, 0.0
+    if dot(v, n) > 0.0:
+        bounce = _bounce(rules, chain, gravity, wall, p)
+        v, twice, impulse = bounce.v, bounce.twice_energy, bounce.impulse
+    away = -dot(v, n)
+    along = v + away * n
+    flies = Next(FLYING, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+    pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
+    press = _press(chain, wall, p.r, along, pull)
+    if not press > weightless(rules, gravity, p) or wall_laws.is_hot(rules.laws, wall):
+        return flies
+    hop = 2.0 * max(away, 0.0) / press
+    short = hop < rules.shortest_flight if rules.shortest_flight > 0.0 else away <= GRAZING * math.sqrt(speed2)
+    if not short:
+        return flies
+    following = flights.first_hit(chain, gravity, p.r, v)
+    if 0.0 <= following.wall != wall and following.time < hop:
+        at = accelerated(gravity, v, following.time)
+        towards = dot(_normal(chain, following.wall, p.r), at)
+        if towards <= GRAZING * math.sqrt(speed2):
+            edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
+            if edge.phase == EDGE:
+                return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse, 0.0)
+        if following.time <= _INSTANT * rules.size / math.sqrt(speed2):
+            return Next(CAREFUL, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+        return flies
+    if not _loses(rules, wall):
+        return Next(HELD, along, max(away, 0.0), twice, wall, -1.0, impulse, 0.0)
+    # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together.
+    e = wall_laws.restitution_of(rules.laws, wall)
+    return Next(HELD, along, 0.0, twice - away * away, wall, -1.0, impulse, hop / (1.0 - e))
+
+
+@outlined
+def _on_edge(rules, chain, gravity, two, p):
+    """What becomes of a particle in an edge: it slides there if both walls press on it."""
+    taken = sliding.split_at(two, chain, p.r, p.v)
+    across2 = max(square(p.v) - square(taken.along), 0.0)
+    stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
+    least = weightless(rules, gravity, p)
+    if square(cross(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
+        return stays
+    n, m = sliding.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
+    if not (n > least and m > least):
+        return stays
+    if _loses(rules, two.first) or _loses(rules, two.second):
+        return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second, 0.0, 0.0)
+    return Next(EDGE, taken.along, math.sqrt(across2), p.twice, two.first, two.second, 0.0, 0.0)
+
+
+# --- While it slides -------------------------------------------------------------------------------------
+
+
+@outlined
+def meet(rules, held, chain, gravity, wall, p):
+    """What becomes of a sliding particle at another wall."""
+    bounce = _bounce(rules, chain, gravity, wall, p)
+    return after_meeting(
+        rules, held, chain, gravity, wall, Particle(p.r, bounce.v, bounce.impulse, bounce.twice_energy, p.scale2)
+    )
+
+
+@outlined
+def after_meeting(rules, held, chain, gravity, wall, p):
+    """The same with the velocity that the other wall has turned; `left` is its impulse."""
+    impulse = p.left
+    away = -dot(_normal(chain, wall, p.r), p.v)
+    slow = GRAZING * math.sqrt(own_speed2(p))
+    taken = sliding.split_at(held, chain, p.r, p.v)
+    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
+    if max(abs(taken.b), abs(taken.c)) > slow:
+        return flies
+    if away <= slow:
+        found = _at_rest_there(held, rules, chain, gravity, wall, p)
+        if found.phase != FLYING:
+            return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse, 0.0)
+    across2 = max(square(p.v) - square(taken.along), 0.0)
+    keep, twice = math.sqrt(across2), p.twice
+    if _loses(rules, held.first):
+        keep, twice = 0.0, p.twice - across2
+    other = sliding.second(held)
+    return Next(EDGE if other >= 0.0 else HELD, taken.along, keep, twice, held.first, other, impulse, 0.0)
+
+
+@by_type
+def _at_rest_there(held, rules, chain, gravity, wall, p):
+    """What becomes of it where it is too slow to leave the other wall: an edge, or that wall alone."""
+    edge = _on_edge(rules, chain, gravity, Two(held.first, wall), p)
+    if edge.phase == EDGE:
+        return edge
+    pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
+    away = -dot(n, p.v)
+    along = p.v + away * n
+    least = weightless(rules, gravity, p)
+    if not _press(chain, wall, p.r, along, pull) > least:
+        return edge
+    if (
+        dot(_normal(chain, held.first, p.r), sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration)
+        > 0.0
+    ):
+        return edge
+    keep, twice = max(away, 0.0), p.twice
+    if _loses(rules, wall):
+        keep, twice = 0.0, p.twice - away * away
+    return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
+
+
+@_at_rest_there.register(Two)
+def _(held, rules, chain, gravity, wall, p):
+    return Next(CAREFUL, p.v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
+
+
+@outlined
+def careful(rules, chain, gravity, wall, p, impulse):
+    """A short step of a particle that several walls hold: (r, v, time used, twice its energy). Adds to impulse[:, 0]."""
+    shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
+    contacts = touching.Contacts(None, rules.laws, shortest, _TOUCH * rules.size)
+    return touching.impact(
+        contacts, chain, gravity, wall, touching.Moving(p.r, p.v, p.left), _energy(p.twice), impulse, 0
+    )
+
+
+@inlined
+def rests(gravity, force):
+    """Whether a particle without speed stays where it is."""
+    return norm(force.acceleration) <= ALLOWED * norm(accelerated(gravity, ZERO, 1.0))
+
+
+@outlined
+def off_the_wall(chain, wall, r, v):
+    """A velocity along a wall that lets the particle go, leaning away from it by more than round-off."""
+    n = _normal(chain, wall, r)
+    b, least = dot(v, n), ALLOWED * norm(v)
+    return v - (b + least) * n if abs(b) <= least else v
+
+
+# --- Where a step is cut ---------------------------------------------------------------------------------
+
+
+class Arrival(NamedTuple):
+    """The part of a step after which it meets a wall, infinite where it meets none, and that wall."""
+
+    time: float
+    wall: float
+
+
+@by_type
+def arrival(chain, number, held, path, near):
+    """The first wall that a step goes into."""
+    raise NotImplementedError
+
+
+@arrival.register(walls.Chain)
+def _(chain, number, held, path, near):
+    later = arrival(chain.rest, number + 1.0, held, path, near)
+    if sliding.is_held_by(held, number):
+        return later
+    time = _deep_after(chain.first, path, near)
+    if time <= later.time:
+        return Arrival(time, number)
+    return later
+
+
+arrival.register(type(None), lambda chain, number, held, path, near: Arrival(math.inf, -1.0))
+
+
+@outlined
+def _deep_after(surface, path, near):
+    """The part of a step after which it is deeper than `near` in a wall; 0 where it is there and goes in."""
+    depth = contract.distance(surface, path.r0)
+    if depth >= -near and dot(contract.unit_normal(surface, path.r0), path.v0) > 0.0:
+        return 0.0
+    low, high = 0.0, math.inf
+    for k in range(1, _PLACES + 1):
+        if contract.distance(surface, _at(path, k / _PLACES)) > near:
+            high = k / _PLACES
+            break
+        low = k / _PLACES
+    if not high < math.inf:
+        time, found = contract.first_hit(surface, path.r0, path.r1 - path.r0)
+        return time if found and 0.0 < time < 1.0 else math.inf
+    for _i in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if contract.distance(surface, _at(path, middle)) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@inlined
+def _at(path, s):
+    """The cubic through both ends of a step."""
+    d, h = path.r1 - path.r0, path.h
+    # Hermite's form: r0 + h v0 s + (3 d - h (2 v0 + v1)) s^2 + (h (v0 + v1) - 2 d) s^3
+    a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
+    return path.r0 + s * (h * path.v0 + s * (a + s * b))
+
+
+@inlined
+def near(rules, r):
+    """A distance that is none."""
+    return _NEAR * rules.size + 8.0 * _EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))

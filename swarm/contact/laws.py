@@ -1,0 +1,118 @@
+"""The laws of walls: restitution, Coulomb's friction, thermal walls. What no wall of a scene has is None."""
+
+from typing import Any, NamedTuple
+
+from ..kernel.jit import by_type, select
+from ..surfaces.fold import Chain
+
+
+class Laws(NamedTuple):
+    """What impacts do to a particle besides turning it round."""
+
+    restitution: Any  # None, or a Chain of one e a wall
+    friction: Any  # None, or a Chain of one mu a wall
+    thermal: Any  # None, or a Chain of one `Thermal` a wall
+
+
+class Thermal(NamedTuple):
+    """A thermal wall, or one that is not, whose accommodation is 0."""
+
+    energy: float  # k_B T [J]
+    accommodation: float
+
+
+@by_type
+def number_of(chain, wall):
+    """The number of this wall."""
+    return 0.0
+
+
+@number_of.register(Chain)
+def _(chain, wall):
+    return select(wall == 0.0, chain.first, number_of(chain.rest, wall - 1.0))
+
+
+@by_type
+def is_given(chain):
+    """Whether any wall has this law: a constant for the compiler."""
+    return False
+
+
+@is_given.register(Chain)
+def _(chain):
+    return True
+
+
+@by_type
+def thermal_of(chain, wall):
+    """`Thermal` of this wall."""
+    return Thermal(0.0, 0.0)
+
+
+@thermal_of.register(Chain)
+def _(chain, wall):
+    here, other = wall == 0.0, thermal_of(chain.rest, wall - 1.0)
+    first = chain.first
+    return Thermal(select(here, first.energy, other.energy), select(here, first.accommodation, other.accommodation))
+
+
+# --- Of the laws of a scene, or None ---------------------------------------------------------------------
+
+
+@by_type
+def restitution(laws):
+    """The restitution of all walls."""
+    return None
+
+
+@by_type
+def friction(laws):
+    """The friction of all walls."""
+    return None
+
+
+@by_type
+def thermal(laws):
+    """The temperatures of all walls."""
+    return None
+
+
+restitution.register(Laws, lambda laws: laws.restitution)
+friction.register(Laws, lambda laws: laws.friction)
+thermal.register(Laws, lambda laws: laws.thermal)
+
+
+# --- Of one wall -----------------------------------------------------------------------------------------
+
+
+@by_type
+def restitution_of(laws, wall):
+    """e of this wall."""
+    return 1.0
+
+
+@restitution_of.register(Laws)
+def _(laws, wall):
+    return _e(laws.restitution, wall)
+
+
+@by_type
+def _e(chain, wall):
+    return 1.0
+
+
+@_e.register(Chain)
+def _(chain, wall):
+    return number_of(chain, wall)
+
+
+@by_type
+def is_hot(laws, wall):
+    """Whether this wall gives particles a speed of its own, so that none slides on it."""
+    return False
+
+
+@is_hot.register(Laws)
+def _(laws, wall):
+    found = thermal_of(laws.thermal, wall)
+    return (found.accommodation > 0.0) & (found.energy > 0.0)

@@ -1,0 +1,264 @@
+"""Impacts that follow one another too quickly to be resolved: grazing, rolling along a wall, resting, corners, cusps.
+
+A sliding step of length h holds the particle on every wall it touches: with w0 = v0 + h G/2 and P the projection of
+w0 on the directions that no touched wall forbids, r1 = r0 + h P and w1 = 2 P - w0. P and w0 - P are orthogonal
+(Moreau), so |w1| = |w0|, and with one wall the step is the reflection about its discrete gradient.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..kernel.gravity import accelerated
+from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
+from ..kernel.vector import ZERO, Vec, dot, largest, moves, norm, put, square, total
+from ..surfaces import contract, flights
+from ..surfaces import fold as walls
+from . import laws as wall_laws
+from . import reflection
+from .projection import ALLOWED, along, project
+
+_EPSILON = 2.220446049250313e-16
+# A second wall nearer than this part of the shortest flight is met in the same instant.
+_SAME_INSTANT = 1e-6
+# Exact reflections within one instant: a wedge of 0.05 rad turns a particle around in its edge.
+_BLOWS = 64
+# Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
+_SWEEPS = 60
+# Times that a step is cut because another wall is in the way.
+_CUTS = 60
+# What these need of every wall; exact reflections need no more.
+NEEDS = (contract.first_hit, contract.unit_normal, contract.inner_gradient, contract.distance, contract.settle)
+
+
+class Contacts(NamedTuple):
+    """How impacts are taken."""
+
+    contact_step: Any  # None or h
+    laws: Any  # None or `Laws`
+    shortest: float  # flight: the particle slides instead of shorter ones [s]
+    touch: float  # distance within which walls hold a sliding particle too [m]
+
+
+class Moving(NamedTuple):
+    """A particle, and how much of its frame is left [s]."""
+
+    r: Vec
+    v: Vec
+    left: float
+
+
+class Landing(NamedTuple):
+    """The particle after the impact, the time it took, and twice its energy per mass."""
+
+    r: Vec
+    v: Vec
+    used: float
+    twice_energy: float
+
+
+class Touch(NamedTuple):
+    """The walls that a sliding particle touches, one entry each."""
+
+    touched: Any  # whether
+    normal: Any  # (3, walls): unit normal of the step
+    held: Any  # what the wall takes of the velocity
+    depth: Any  # signed distance outside
+
+
+@outlined
+def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
+    """One impact of one particle on `wall` after a short flight. Adds to impulse[:, lane].
+
+    If the next flight would be shorter than the shortest too, the particle slides for that time instead.
+    """
+    r, v, half_inverse = flight.r, flight.v, energy.half_inverse
+    given = scratch(walls.length(chain), np.float64)
+    w, now, at = v, energy, wall
+    for _blow in range(_BLOWS):
+        bounce = reflection.exact(method.laws, chain, gravity, at, r, w, now)
+        w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
+        given[int(at)] += bounce.impulse
+        following = flights.first_hit(chain, gravity, r, w)
+        if following.time >= method.shortest or following.wall < 0.0:
+            end = reflection.Stepped(r, w, 0.0, given[int(wall)])
+            if at == wall:
+                end = _stepped(method.contact_step, chain, gravity, wall, flight, now, end)
+                given[int(wall)] = end.impulse
+            for i in range(given.size):
+                impulse[i, lane] += given[i]
+            return Landing(end.r, end.v, end.used, now.twice)
+        if following.wall == at or following.time > _SAME_INSTANT * method.shortest:
+            break
+        at = following.wall
+    return _slide(method, chain, gravity, wall, flight, energy, impulse, lane)
+
+
+@by_type_outlined
+def _stepped(contact_step, chain, gravity, wall, flight, energy, reflected):
+    """The impact as a contact step of that length; without one, as it was reflected."""
+    return reflected
+
+
+@_stepped.register(float)
+def _(contact_step, chain, gravity, wall, flight, energy, reflected):
+    return reflection.contact(contact_step, chain, gravity, wall, flight.r, flight.v, flight.left, energy)
+
+
+@outlined
+def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
+    """One sliding step: the result of `impact`."""
+    laws, r, count = method.laws, flight.r, walls.length(chain)
+    touch = Touch(
+        scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64),
+        scratch(count, np.float64),
+    )  # fmt: skip
+    _depths(chain, 0, r, touch.depth)
+    for i in range(count):
+        touch.touched[i] = touch.depth[i] >= -method.touch
+    touch.touched[int(wall)] = True
+    given = scratch(count, np.float64)
+    v, twice_energy = _landed(laws, chain, touch, given, r, flight.v, energy.twice)
+    straight = _goes_straight(chain, gravity, touch, r, v)
+    h = flight.left if straight else min(method.shortest, flight.left)
+    u, h = _unhindered(chain, gravity, touch, r, v, h, method.touch)
+    w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
+    if moves(u):
+        r = _settled(chain, wall, touch, r + h * u)
+    speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
+    half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
+    w = reflection.restore(gravity, w, speed2, half_inverse)
+    for i in range(count):
+        impulse[i, lane] += given[i] + 2.0 * touch.held[i]
+    return Landing(r, w, h, twice_energy)
+
+
+@outlined
+def _unhindered(chain, gravity, touch, r, v, h, near):
+    """P of the longest step up to h that no further wall is in the way of, and its length.
+
+    A wall that is met within the distance `near` becomes one of the touched.
+    """
+    u = ZERO
+    for cut in range(_CUTS):
+        u = velocity_along(chain, touch, r, accelerated(gravity, v, 0.5 * h), h)
+        following, other = h, -1
+        for i in range(touch.touched.size):
+            if not touch.touched[i]:
+                time, _found = flights.hit_of(chain, None, float(i), r, u)
+                if time < following:
+                    following, other = time, i
+        if other < 0:
+            break
+        if following * norm(u) <= near:
+            touch.touched[other] = True
+        else:
+            # The step to that wall is another one, since its walls curve and gravity has less time.
+            h = following if cut < _CUTS // 2 else 0.5 * following
+    return u, h
+
+
+@outlined
+def _settled(chain, wall, touch, r):
+    """The end of a step on the wall that holds the particle, and on every touched one that it has left by round-off.
+
+    Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
+    where the particle is outside would lean inwards, and let it fall by the last place again and again.
+    """
+    _depths(chain, 0, r, touch.depth)
+    for i in range(touch.touched.size):
+        holds = i == int(wall) and touch.held[i] > 0.0
+        if holds or (touch.touched[i] and touch.depth[i] > 0.0):
+            r = walls.settle(chain, float(i), r)
+    return r
+
+
+@by_type_outlined
+def _depths(chain, k, r, into):
+    """Signed distance outside of every wall into `into`."""
+
+
+@_depths.register(walls.Chain)
+def _(chain, k, r, into):
+    into[k] = contract.distance(chain.first, r)
+    _depths(chain.rest, k + 1, r, into)
+
+
+@by_type_outlined
+def _landed(laws, chain, touch, given, r, v, twice_energy):
+    """Chattering ends: walls that lose energy take what is left of the velocity towards them.
+
+    Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
+    would reflect the rest.
+    """
+    return v, twice_energy
+
+
+@_landed.register(wall_laws.Laws)
+def _(laws, chain, touch, given, r, v, twice_energy):
+    lossy = scratch(given.size, np.bool_)
+    for i in range(given.size):
+        lossy[i] = touch.touched[i] and reflection.bounciness(laws, float(i)) < 2.0
+        if lossy[i]:
+            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
+    u = project(lossy, touch.normal, given, v)
+    # |v|^2 - |u|^2, because v - u is orthogonal to u
+    return u, twice_energy - square(v - u)
+
+
+@outlined
+def velocity_along(chain, touch, r, w, h):
+    """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
+    u, r1 = ZERO, r
+    for _sweep in range(_SWEEPS):
+        for i in range(touch.touched.size):
+            if touch.touched[i]:
+                put(touch.normal, 0, i, _normal(chain, float(i), r, r1))
+        u = project(touch.touched, touch.normal, touch.held, w)
+        before, r1 = r1, r + h * u
+        if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
+            break
+    return u
+
+
+@outlined
+def _normal(chain, wall, r0, r1):
+    """The unit vector along the discrete gradient of a wall, out of the admissible side."""
+    n = walls.unit_normal(chain, wall, r0)
+    d = walls.inner_gradient(chain, wall, r0, r1)
+    length = norm(d)
+    if dot(d, n) < 0.0:
+        length = -length
+    # At a singular point, such as an apex, both may be undefined: the wall then forbids nothing.
+    if length != 0.0 and math.isfinite(length):
+        n = d / length
+    return n if math.isfinite(total(n)) else ZERO
+
+
+@outlined
+def _goes_straight(chain, gravity, touch, r, v):
+    """Whether the step may have any length: rest, or uniform motion along flat walls that gravity presses against."""
+    g = accelerated(gravity, ZERO, 1.0)
+    for i in range(touch.touched.size):
+        if touch.touched[i]:
+            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
+    falling = project(touch.touched, touch.normal, touch.held, g)
+    if not moves(g) or largest(falling) > ALLOWED * largest(g):
+        return False
+    speed = largest(v)
+    for i in range(touch.touched.size):
+        if touch.touched[i] and abs(along(touch.normal, i, v)) > ALLOWED * speed:
+            return False
+    return speed == 0.0 or _flat(chain, touch.touched, 0)
+
+
+@by_type
+def _flat(chain, touched, k):
+    """Whether every touched wall is flat."""
+    return True
+
+
+@_flat.register(walls.Chain)
+def _(chain, touched, k):
+    return (contract.flat(chain.first) or not touched[k]) and _flat(chain.rest, touched, k + 1)

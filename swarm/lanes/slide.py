@@ -1,0 +1,422 @@
+"""Particles that slide, a block of them at once, in lanes: one kernel for one wall, one for the edges of two.
+
+One pass is one composed step of every lane, in loops without branches. What a step may end with (the wall lets go,
+another wall is met, the particle stops) is found one lane at a time: the step is cut there and taken again, so that it
+ends at the instant to round-off. A lane writes what it gives its walls step by step, so that a halt changes no bit.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..contact import events
+from ..contact import laws as wall_laws
+from ..contact import sliding as slides
+from ..contact.events import ARRIVED, EDGE, EVENT, FLYING, HELD
+from ..kernel.gravity import accelerated, potential
+from ..kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
+from ..kernel.vector import ZERO, column, either, put, square
+from ..methods import contract as methods
+from ..status import Status
+from ..surfaces import fold as walls
+from .arrays import LANES, STRIDE, following_particle, speed2_scale, table, with_distances
+
+# What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
+# speed it keeps across the walls, twice its energy, the square of its speed scale, its walls, and where a step is cut.
+R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12, 13, 14, 15, 16, 18
+# The step of this pass: its length and end, what presses there, its impulses, the work of friction.
+H, R1, V1, A1, PRESS1, IMPULSE, WORK = 19, 20, 23, 26, 29, 31, 33
+# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, its work; how
+# often the step has been cut.
+FROM, W, END, W1, TAKEN, DRAG, TRIALS, ROWS = 34, 37, 40, 43, 46, 48, 49, 50
+# Times that a step is cut before the particle is given up: it takes four or so.
+_MOST_TRIALS = 1000
+# The first step of a particle that begins to slide, in crossings; the walls correct it.
+_FIRST = 1e-3
+# A step that is tried again is so much shorter; one of this part of a crossing is the shortest.
+_RETRY, _SHORTEST = 0.25, 1e-10
+# Friction has stopped a particle where this part of |v|^2 is left.
+_STOPPED = 1e-24
+
+
+class Lanes(NamedTuple):
+    """Arrays of one column a lane."""
+
+    rows: Array  # (ROWS, stride)
+    particle: Array  # int64
+    moving: Array  # bool, whether the sweeps of a step go on
+    event: Array  # int64, what the step of this pass may end with
+
+
+# What a step may end with.
+LIFTED, MET, FAILED, STOPPED = 1, 2, 4, 8
+
+
+def empty() -> Lanes:
+    """Lanes for one block."""
+    return Lanes(table(ROWS), np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64))
+
+
+@by_type
+def _phase(kind):
+    return HELD
+
+
+_phase.register(slides.Two, lambda kind: EDGE)
+
+
+@kernel
+def slide_block(kind, method, chain, gravity, share, lanes):
+    """Advance the particles of this kind, `One` or `Two`, that a thread draws: (status, particle, drawn).
+
+    Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
+    """
+    lanes = with_distances(lanes)
+    following, stop, drawn, live, passes = 0, 0, 0, 0, 0
+    while live < LANES:
+        following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
+        if following == stop:
+            break
+        if _load(kind, method, chain, gravity, share, lanes, live, following):
+            live += 1
+        following += 1
+    while live > 0:
+        if passes >= share.halt[0]:
+            for i in range(live):
+                _retire(kind, chain, share, lanes, i, _phase(kind))
+            return Status.INTERRUPTED.value, 0, drawn
+        passes += 1
+        _compose(kind, method, chain, gravity, lanes, live)
+        _end_steps(kind, method, chain, gravity, lanes, live)
+        for i in range(live):
+            _account(kind, method, share.state, lanes, i)
+        for i in range(live - 1, -1, -1):
+            phase = _phase(kind)
+            if lanes.event[i] != 0:
+                phase = _decide(kind, method, chain, gravity, share.state, lanes, i)
+                if phase < 0:
+                    return Status.STALLED.value, lanes.particle[i], drawn
+            if not lanes.rows[LEFT, i] > 0.0:
+                phase = ARRIVED
+            if phase != _phase(kind):
+                _retire(kind, chain, share, lanes, i, phase)
+                loaded = False
+                while not loaded:
+                    following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
+                    if following == stop:
+                        break
+                    loaded = _load(kind, method, chain, gravity, share, lanes, i, following)
+                    following += 1
+                if not loaded:
+                    live -= 1
+                    _move(lanes, live, i)
+    return Status.DONE.value, 0, drawn
+
+
+# --- One composed step of every lane ---------------------------------------------------------------------
+
+
+@inlined
+def _compose(kind, method, chain, gravity, lanes, live):
+    rows, moving = lanes.rows, lanes.moving
+    friction = methods.friction(method)
+    for i in range(live):
+        v, a = column(rows, V, i), column(rows, A, i)
+        h = select(rows[STEP, i] < rows[LEFT, i], rows[STEP, i], rows[LEFT, i])
+        h = select(rows[CUT, i] < h, rows[CUT, i], h)
+        stop = slides.longest(friction, v, a)
+        rows[H, i] = select(stop < h, stop, h)
+        put(rows, R1, i, column(rows, R, i))
+        put(rows, V1, i, v)
+        put(rows, A1, i, a)
+        rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i] = 0.0, 0.0, 0.0
+        lanes.event[i] = 0
+    for k in range(slides.PARTS):
+        for i in range(live):
+            r, v, h = column(rows, R1, i), column(rows, V1, i), slides.part(k) * rows[H, i]
+            put(rows, FROM, i, r)
+            put(rows, W, i, accelerated(gravity, v, 0.5 * h))
+            put(rows, END, i, r + h * (v + (0.5 * h) * column(rows, A1, i)))
+            moving[i] = h != 0.0
+        for _sweep in range(slides.SWEEPS):
+            some = False
+            for i in range(live):
+                some = _sweep_lane(kind, friction, chain, lanes, i, slides.part(k)) | some
+            if not some:
+                break
+        for i in range(live):
+            h, w1 = slides.part(k) * rows[H, i], column(rows, W1, i)
+            v0, v1 = column(rows, V1, i), accelerated(gravity, w1, 0.5 * h)
+            put(rows, R1, i, column(rows, END, i))
+            put(rows, V1, i, v1)
+            put(rows, A1, i, (v1 - v0) / select(h == 0.0, 1.0, h))
+            rows[IMPULSE, i] += 2.0 * rows[TAKEN, i]
+            rows[IMPULSE + 1, i] += 2.0 * rows[TAKEN + 1, i]
+            rows[WORK, i] += rows[DRAG, i]
+            lanes.event[i] |= select(moving[i], FAILED, 0)
+
+
+@inlined
+def _sweep_lane(kind, friction, chain, lanes, i, part):
+    """One sweep of a lane that still moves: whether it needs another."""
+    rows, moving = lanes.rows, lanes.moving
+    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    r0, end, w = column(rows, FROM, i), column(rows, END, i), column(rows, W, i)
+    swept = slides.sweep(friction, held, chain, part * rows[H, i], r0, end, w)
+    on = moving[i]
+    put(rows, END, i, either(on, swept.r, end))
+    put(rows, W1, i, either(on, swept.w, column(rows, W1, i)))
+    rows[TAKEN, i] = select(on, swept.b, rows[TAKEN, i])
+    rows[TAKEN + 1, i] = select(on, swept.c, rows[TAKEN + 1, i])
+    rows[DRAG, i] = select(on, swept.work, rows[DRAG, i])
+    more = on & swept.moves
+    moving[i] = more
+    return more
+
+
+# --- Its end ---------------------------------------------------------------------------------------------
+
+
+@inlined
+def _end_steps(kind, method, chain, gravity, lanes, live):
+    """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
+    rows, friction, tolerance = lanes.rows, methods.friction(method), methods.sliding_tolerance(method)
+    for i in range(live):
+        held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+        h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
+        r0, v0, a0 = column(rows, R, i), column(rows, V, i), column(rows, A, i)
+        r1 = slides.settle(held, chain, column(rows, R1, i))
+        # Friction has taken 2 (sum mu b) |u| of |w|^2/2 in each part.
+        twice = rows[TWICE, i] - 4.0 * rows[WORK, i]
+        v1 = slides.split_at(held, chain, r1, column(rows, V1, i)).along
+        v1 = slides.restored(v1, twice - 2.0 * potential(gravity, r1) - keep * keep, scale2)
+        force = slides.force(friction, held, chain, gravity, r1, v1)
+        ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), tolerance * np.sqrt(scale2) * h)
+        path = slides.Path(r0, v0, r1, v1, h)
+        lifted = slides.lets_go(held, force.n, force.m)
+        met = slides.meets(chain, 0.0, held, path, events.near(method, r1))
+        good = (ratio <= 1.0) & (lanes.event[i] == 0)
+        fine = good & (not lifted) & (not met)
+        happened = select(lifted, LIFTED, 0) | select(met, MET, 0)
+        lanes.event[i] |= select(good, happened, 0)
+        lanes.moving[i] = fine
+        # What the end of the frame or an event cuts says nothing of the length.
+        whole = (h == rows[STEP, i]) | (not (ratio <= 1.0))
+        rows[STEP, i] = select(whole, slides.next_step(h, ratio), rows[STEP, i])
+        rows[CUT, i] = select(fine, np.inf, rows[CUT, i])
+        rows[LEFT, i] -= select(fine, h, 0.0)
+        rows[TWICE, i] = select(fine, twice, rows[TWICE, i])
+        put(rows, R1, i, r1)
+        put(rows, V1, i, v1)
+        rows[PRESS1, i], rows[PRESS1 + 1, i] = force.n, force.m
+        put(rows, R, i, either(fine, r1, r0))
+        put(rows, V, i, either(fine, v1, v0))
+        put(rows, A, i, either(fine, force.acceleration, a0))
+        rows[PRESS, i] = select(fine, force.n, rows[PRESS, i])
+        rows[PRESS + 1, i] = select(fine, force.m, rows[PRESS + 1, i])
+        lanes.event[i] |= _stop(friction, fine, v1, scale2)
+
+
+@by_type
+def _stop(friction, fine, v, scale2):
+    """Whether friction has stopped a particle."""
+    return select(fine & (square(v) <= _STOPPED * scale2), STOPPED, 0)
+
+
+@_stop.register(type(None))
+def _(friction, fine, v, scale2):
+    return 0
+
+
+@inlined
+def _account(kind, method, state, lanes, i):
+    """What a step that is taken gives to the state."""
+    rows, p = lanes.rows, lanes.particle[i]
+    if not lanes.moving[i]:
+        return
+    state.contacts.sliding[p] += rows[H, i]
+    _push(state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
+    rows[TRIALS, i] = 0.0
+    if wall_laws.is_given(methods.friction(method)):
+        _lose(state, lanes, i, 4.0 * rows[WORK, i])
+
+
+@inlined
+def _push(state, lanes, i, first, second):
+    """Impulses per mass to the walls that hold a lane."""
+    rows, p = lanes.rows, lanes.particle[i]
+    state.impulse[int(rows[WALL, i]), p] += first * state.mass[p]
+    if rows[WALL + 1, i] >= 0.0:
+        state.impulse[int(rows[WALL + 1, i]), p] += second * state.mass[p]
+
+
+@inlined
+def _lose(state, lanes, i, twice):
+    """Book twice the energy per mass that a lane has lost; its row knows what is left."""
+    p = lanes.particle[i]
+    state.energy[p] = 0.5 * lanes.rows[TWICE, i]
+    state.dissipated[p] += 0.5 * twice * state.mass[p]
+
+
+# --- Into lanes and out of them --------------------------------------------------------------------------
+
+
+@outlined
+def _load(kind, method, chain, gravity, share, lanes, lane, i):
+    """Particle i into a lane; whether it slides: it may also rest until the end of the frame, or fly."""
+    rows, state = lanes.rows, share.state
+    contacts = state.contacts
+    begins = not contacts.left[i] > 0.0
+    left = share.span if begins else contacts.left[i]
+    r, v, twice = column(state.position, 0, i), column(state.velocity, 0, i), 2.0 * state.energy[i]
+    scale2 = speed2_scale(state, i)
+    lanes.particle[lane] = i
+    rows[LEFT, lane], rows[CUT, lane], rows[TRIALS, lane], rows[SCALE2, lane] = left, np.inf, 0.0, scale2
+    rows[WALL, lane], rows[WALL + 1, lane] = contacts.walls[0, i], contacts.walls[1, i]
+    rows[STEP, lane], rows[KEEP, lane], rows[TWICE, lane] = contacts.step[i], contacts.keep[i], twice
+    if begins:
+        held = slides.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane])
+        along = slides.split_at(held, chain, r, v).along
+        rows[KEEP, lane] = np.sqrt(max(square(v) - square(along), 0.0))
+        v = along
+    put(rows, R, lane, r)
+    put(rows, V, lane, v)
+    phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
+    if phase != _phase(kind):
+        _retire(kind, chain, share, lanes, lane, phase)
+        return False
+    return True
+
+
+@outlined
+def _set_going(kind, method, chain, gravity, state, lanes, i):
+    """The forces on a lane at the start of its next step; what it does next, which may be to rest."""
+    rows, friction = lanes.rows, methods.friction(method)
+    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
+    force = slides.force(friction, held, chain, gravity, r, v)
+    put(rows, A, i, force.acceleration)
+    rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
+    if not rows[STEP, i] > 0.0:
+        rows[STEP, i] = _FIRST * method.size / np.sqrt(rows[SCALE2, i])
+    if square(v) == 0.0 and events.rests(gravity, force):
+        state.contacts.sliding[lanes.particle[i]] += left
+        _push(state, lanes, i, force.n * left, force.m * left)
+        rows[LEFT, i] = 0.0
+        return ARRIVED
+    return _phase(kind)
+
+
+@outlined
+def _retire(kind, chain, share, lanes, i, phase):
+    """A lane back into its particle, for what it does next."""
+    rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
+    v, keep = column(rows, V, i), rows[KEEP, i]
+    slid = phase == HELD or phase == EDGE or phase == ARRIVED
+    if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
+        held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+        taken = slides.split_at(held, chain, column(rows, R, i), v)
+        v = v + keep * slides.inward(held, taken.n, taken.m)
+    if phase == FLYING:
+        v = events.off_the_wall(chain, rows[WALL, i], column(rows, R, i), v)
+    put(share.state.position, 0, p, column(rows, R, i))
+    put(share.state.velocity, 0, p, v)
+    contacts.walls[0, p] = rows[WALL, i] if slid else -1.0
+    contacts.walls[1, p] = rows[WALL + 1, i] if slid else -1.0
+    contacts.left[p] = rows[LEFT, i] if phase != ARRIVED else 0.0
+    contacts.step[p] = rows[STEP, i] if slid else 0.0
+    contacts.keep[p] = keep
+    share.phase[p] = phase
+    share.pending[phase] += 1
+
+
+@inlined
+def _move(lanes, source, target):
+    """The last live lane into the free slot."""
+    for row in range(R1):
+        lanes.rows[row, target] = lanes.rows[row, source]
+    lanes.rows[TRIALS, target] = lanes.rows[TRIALS, source]
+    lanes.particle[target] = lanes.particle[source]
+
+
+# --- Events ----------------------------------------------------------------------------------------------
+
+
+@outlined
+def _decide(kind, method, chain, gravity, state, lanes, i):
+    """What a lane does whose step may not be taken as it is: its phase, or -1 where it cannot go on.
+
+    The step is cut where the event is, and taken again, until the event is at its start.
+    """
+    rows, event, h = lanes.rows, lanes.event[i], lanes.rows[H, i]
+    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    r, v, scale2 = column(rows, R, i), column(rows, V, i), rows[SCALE2, i]
+    if event & STOPPED:
+        rows[TWICE, i] -= square(v)
+        _lose(state, lanes, i, square(v))
+        put(rows, V, i, ZERO)
+        return _set_going(kind, method, chain, gravity, state, lanes, i)
+    if event & FAILED:
+        rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
+        crossing = method.size / np.sqrt(scale2)
+        if h > _SHORTEST * crossing:
+            return _phase(kind)
+        # Over the edge of a solid: there is no wall beyond it.
+        end = r + h * v
+        if walls.outside(chain, -1.0, end) or not h > 0.0:
+            return -1
+        put(rows, R, i, end)
+        rows[LEFT, i] -= h
+        return FLYING
+    particle = events.Particle(r, v, rows[LEFT, i], rows[TWICE, i], scale2)
+    none, cut = events.weightless(method, gravity, particle), 1.0
+    if event & LIFTED:
+        phase, part = _lift(kind, lanes, i, none)
+        if phase >= 0:
+            return phase
+        cut = part
+    if event & MET:
+        near = events.near(method, r)
+        path = slides.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
+        met = events.arrival(chain, 0.0, held, path, near)
+        if met.time == 0.0:
+            state.contacts.met[lanes.particle[i]] = met.wall
+            put(rows, R, i, walls.settle(chain, met.wall, r))
+            return EVENT
+        cut = min(cut, met.time)
+    rows[CUT, i] = cut * h
+    if not event & LIFTED and cut == 1.0:
+        # A cubic through its ends passes near a wall, but does not meet it.
+        rows[CUT, i] = _RETRY * h
+    rows[TRIALS, i] += 1.0
+    if rows[TRIALS, i] > _MOST_TRIALS:
+        return -1
+    return _phase(kind)
+
+
+@by_type
+def _lift(kind, lanes, i, none):
+    """(what a lane does that its wall lets go now, or -1 and the part of the step after which it does)."""
+    rows = lanes.rows
+    if rows[PRESS, i] <= none:
+        return FLYING, 0.0
+    return -1, _part(rows[PRESS, i], rows[PRESS1, i])
+
+
+@_lift.register(slides.Two)
+def _(kind, lanes, i, none):
+    rows = lanes.rows
+    if rows[PRESS, i] <= none and rows[PRESS1, i] < 0.0:
+        rows[WALL, i] = rows[WALL + 1, i]
+        rows[WALL + 1, i] = -1.0
+        return HELD, 0.0
+    if rows[PRESS + 1, i] <= none and rows[PRESS1 + 1, i] < 0.0:
+        rows[WALL + 1, i] = -1.0
+        return HELD, 0.0
+    return -1, min(_part(rows[PRESS, i], rows[PRESS1, i]), _part(rows[PRESS + 1, i], rows[PRESS1 + 1, i]))
+
+
+@inlined
+def _part(start, end):
+    """Where a straight line from `start` falls through 0, if it does."""
+    return start / (start - end) if end < 0.0 else 1.0
