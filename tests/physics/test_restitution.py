@@ -174,6 +174,7 @@ def test_restitution_of_one_changes_no_bit(gravity):
     ids=["penalty", "augmented Lagrangian"],
 )
 def test_conserving_methods_refuse_it(method):
+    """As they do the other laws of walls: methods/test_baselines.py."""
     scene = cut_sphere((1.0, 0.9, 1.0))
     with pytest.raises(swarm.SceneError, match=r"surfaces\[1\]\.restitution must be 1 .*got 0\.9"):
         run(scene, swarm.Particles([0.0] * 3, [1.0, 0.0, 0.0]), method, 1.0)
