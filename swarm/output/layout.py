@@ -36,6 +36,8 @@ def frames(file: Any, path: Path) -> int:
     for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start")):
         if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
+    if "parameters/seed" in file:
+        _dataset(file, "parameters/seed", _INTEGER, ())
     count = int(_dataset(file, "parameters/particles", _INTEGER, ())[()])
     time = _dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])
@@ -47,8 +49,13 @@ def frames(file: Any, path: Path) -> int:
             if value.ndim not in (1, 2) or value.shape[0] < n:
                 raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
             _require_fits(value, n, path)
-    if "particles/all" not in file:
-        return n
+    if "particles/all" in file:
+        _require_particles(file, n, count, path)
+    return n
+
+
+def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
+    """Raise a ValueError if what is kept of the `count` particles in n frames is inconsistent."""
     kept = _dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
         raise ValueError(f"particles/all/mass must have 1 to {count} entries, got {len(kept)}")
@@ -57,7 +64,6 @@ def frames(file: Any, path: Path) -> int:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
     for name in PARTS:
         _require_fits(_dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
-    return n
 
 
 def require_index(file: Any) -> None:

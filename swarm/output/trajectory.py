@@ -2,8 +2,8 @@
 
 particles/all/{position,velocity}/{step,time,value}, value (frames, N, 3); particles/all/{mass,id} (N,);
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
-number that were run, and parameters/start, a digest of them at the start. All elements share one step and one time
-dataset by hard links. writer.py writes them.
+number that were run, parameters/start, a digest of them at the start, and parameters/seed, of thermal walls. All
+elements share one step and one time dataset by hard links. writer.py writes them.
 """
 
 import contextlib
@@ -177,6 +177,12 @@ class Trajectory:
         with self._reading("its start") as file:
             stored = "parameters/start" in file
         return self._text("start") if stored else ""
+
+    @property
+    def seed(self) -> int:
+        """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
+        with self._reading("its seed") as file:
+            return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
 
     @property
     def scene(self) -> Scene:

@@ -60,12 +60,12 @@ class TrajectoryWriter:
         method: Method,
         particles: Particles,
         scene_text: str | None,
-        start: str,
+        identity: dict[str, Any],
         following: bool = False,
     ) -> None:
         self._path, self._storage, self._scene, self._method = path, storage, scene, method
         self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
-        self._start, self._following = start, following
+        self._identity, self._following = identity, following
         self._part = path if following else paths.part_of(path)
 
     def __enter__(self) -> WriteFrames:
@@ -122,7 +122,8 @@ class TrajectoryWriter:
         parameters = file.create_group("parameters")
         for name, text in descriptions(self._scene, self._method, self._storage).items():
             parameters[name] = text
-        parameters["particles"], parameters["start"] = self._count, self._start
+        for name, value in {"particles": self._count, **self._identity}.items():
+            parameters[name] = value
         if self._text is not None:
             parameters["scene_file"] = self._text
         self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))

@@ -76,6 +76,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     resume: bool = False,
     walltime: float | None = None,
     compile: str = "auto",
+    seed: int = 0,
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
@@ -115,6 +116,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
             and after about a second the rest of the run is compiled. "always": compiled from the start. "never":
             plain Python only.
+        seed: of the random numbers of thermal walls, from 0 to 2**64 - 1: the same seed gives the same bits.
 
     Returns:
         A `Result`.

@@ -152,6 +152,7 @@ STRANGE = {
     "scene is no table": (replaced("parameters/scene", "surface = 1"), "its scene"),
     "scene is too deep": (replaced("parameters/scene", f"surface = {'[' * 5000}"), "its scene"),
     "method is unknown": (replaced("parameters/method", 'kind = "magic"'), "its method: method.kind must be one of"),
+    "a seed is text": (replaced("parameters/seed", b"one"), "parameters/seed must hold numbers"),
     "particles are many": (replaced("parameters/particles", np.zeros(3, int)), "parameters/particles must have"),
     "fewer were run": (replaced("parameters/particles", 19), "particles/all/mass must have 1 to 19 entries, got 20"),
     "positions are flat": (replaced("particles/all/position/value", np.zeros((5, 20))), "position/value must have"),

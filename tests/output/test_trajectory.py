@@ -44,6 +44,17 @@ def test_everything_comes_back(run):
             trajectory.frame(4)
 
 
+def test_the_seed_comes_back_and_older_files_have_none(tmp_path):
+    particles, path = swarm.fill(SCENE, 3, speed=0.3), tmp_path / "run.h5"
+    swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=path, seed=2**64 - 1)
+    with swarm.load(path) as trajectory:
+        assert trajectory.seed == 2**64 - 1
+    with h5py.File(path, "r+") as file:
+        del file["parameters/seed"]
+    with swarm.load(path) as trajectory:
+        assert trajectory.seed == 0
+
+
 def test_layout_is_h5md(run):
     """H5MD 1.1: version, creator, box without edges, and step, time, value of one length in every element."""
     path, _, _ = run

@@ -34,7 +34,7 @@ def frame(number, n=N):
 
 def writer_of(path, following=False, storage=None):
     particles = swarm.Particles(np.zeros((3, N)), np.ones((3, N)))
-    return writer.TrajectoryWriter(path, storage or Storage(), SPHERE, swarm.Impact(), particles, None, "", following)
+    return writer.TrajectoryWriter(path, storage or Storage(), SPHERE, swarm.Impact(), particles, None, {}, following)
 
 
 def require_frames(path, least, n=None):
