@@ -26,6 +26,9 @@ NAMES = {
     "dissipated_energy",
     "escaped",
     "unconverged",
+    "sliding",
+    "sliding_time",
+    "wall_heat",
 }
 
 
@@ -62,7 +65,7 @@ def test_simulate_does_not_change_its_argument():
 def test_observables_have_one_entry_a_frame():
     observables = _run(scene=NESTED, every=0.5).observables
     assert set(observables) == NAMES
-    shapes = {"momentum": (5, 3), "angular_momentum": (5, 3), "impulse": (5, 2)}
+    shapes = {"momentum": (5, 3), "angular_momentum": (5, 3), "impulse": (5, 2), "wall_heat": (5, 2)}
     assert {name: column.shape for name, column in observables.items()} == {
         name: shapes.get(name, (5,)) for name in NAMES
     }

@@ -22,6 +22,9 @@ _NUMBERS = (
     "max_penetration", "impacts", "escaped", "unconverged",
 )  # fmt: skip
 
+# Likewise, besides the heat of each surface, but files of older versions have none of them.
+_LATER = ("sliding", "sliding_time")
+
 
 def missing(file: Any) -> str | None:
     """The first part of a trajectory that this file lacks, or None."""
@@ -108,6 +111,8 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
     """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
+    later: dict[str, tuple[int, ...]] = {**dict.fromkeys(_LATER, (n,)), "wall_heat": (n, surfaces)}
+    shapes |= {name: shape for name, shape in later.items() if name in seen}
     for name, shape in shapes.items():
         if name not in seen or seen[name].shape != shape:
             came = "nothing" if name not in seen else str(seen[name].shape)

@@ -48,8 +48,10 @@ def draw(trajectory: Trajectory, target: Path) -> None:
         rows.append(series.row_of(lines, moment, now, before))
         before = moment, now
     columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
-    views = series.views_of(lines)
-    cells = right.subplots(2, 3).ravel()
+    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or columns[line.path].any()]
+    views = series.views_of(shown)
+    # One more is for the speeds.
+    cells = right.subplots(2, max(3, 1 + len(views) // 2)).ravel()
     for cell, (group, together) in zip(cells, views.items(), strict=False):
         known = {line.name: ~np.isnan(columns[line.path]) for line in together}
         curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}

@@ -48,7 +48,7 @@ class TrajectoryWriter:
     """A context that creates the file, or reopens it, and gives the function that writes frames.
 
     Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once cost little more than one:
-    the time goes into the fifteen datasets and the flush. The file gets its name when its first frame is whole; until
+    the time goes into the twenty datasets and the flush. The file gets its name when its first frame is whole; until
     then an existing file of that name, and its checkpoint, stay.
     """
 
@@ -278,7 +278,7 @@ def _reason(error: Exception) -> str:
 
 
 def _put(dataset: Any, first: int, values: Any) -> None:
-    """Write entries from row `first` on. h5py's indexing takes four times as long, for fifteen datasets a frame."""
+    """Write entries from row `first` on. h5py's indexing takes four times as long, for twenty datasets a frame."""
     handle = dataset.id
     count, *shape = handle.shape
     entries = np.ascontiguousarray(values, dtype=dataset.dtype)

@@ -164,6 +164,8 @@ STRANGE = {
     "an observable is short": (replaced("observables/impacts/value", np.zeros(4)), "observables/impacts must have 5"),
     "an observable is gone": (lambda file: file["observables"].pop("impacts"), "expected impacts of the shape"),
     "an impulse is gone": (replaced("observables/impulse/value", np.zeros((5, 2))), "expected impulse of the shape"),
+    "a heat is gone": (replaced("observables/wall_heat/value", np.zeros((5, 2))), "expected wall_heat of the shape"),
+    "sliding is a table": (replaced("observables/sliding/value", np.zeros((5, 2))), "expected sliding of the shape"),
     "a position is infinite": (written("particles/all/position/value", (2, 3, 1), np.inf), "frame 2: position must be"),
     "an energy is no number": (written("observables/total_energy/value", 4, np.nan), "got nan at frame 4"),
     "time stands still": (written("parameters/time", 3, 0.2), "its times: frame 3 is not after the one before it"),
