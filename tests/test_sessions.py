@@ -132,6 +132,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
     assert numbers == [3, 4]
     assert not paths.checkpoint_of(path).exists()
     assert np.array_equal(resumed.particles.position, expected.particles.position)
+    assert np.array_equal(resumed.impacts_per_particle, expected.impacts_per_particle)
     with swarm.load(path) as one, swarm.load(whole) as other:
         assert len(one) == len(other) == 5
         for name, values in expected.observables.items():
@@ -140,6 +141,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
         if storage.get("frames") != "none":
             for k in range(5):
                 assert np.array_equal(one.frame(k).velocity, other.frame(k).velocity)
+                assert np.array_equal(one.impacts(k), other.impacts(k))
 
 
 def halted_after(monkeypatch, passes, seconds):

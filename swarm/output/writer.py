@@ -23,7 +23,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import paths, superblock
-from .layout import PARTS
+from .layout import COUNTS, PARTS
 from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
@@ -39,7 +39,7 @@ _PACKED: dict[str, dict[str, Any]] = {
     "lzf": {"compression": "lzf", "shuffle": True},
 }
 
-# Number, time [s], positions and velocities, observables.
+# Number, time [s], positions, velocities and impacts, observables.
 Written = tuple[int, float, State, dict[str, Any]]
 WriteFrames = Callable[[list[Written]], None]
 
@@ -146,11 +146,15 @@ class TrajectoryWriter:
             self._values[name] = self._element(
                 f"particles/all/{name}", (n, 3), self._storage.precision, (deep, min(n, _CHUNK[1]), 3), **options,
             )  # fmt: skip
+        self._values[COUNTS] = self._element(
+            f"particles/all/{COUNTS}", (n,), np.int64, (deep, min(n, _CHUNK[1])), **options
+        )
 
     def _open(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
-        groups = {"particles/all": PARTS if len(self._mass) else (), "observables": tuple(self._file["observables"])}
+        kept = [name for name in (*PARTS, COUNTS) if f"particles/all/{name}" in self._file]
+        groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (
             {name: self._file[f"{group}/{name}/value"] for name in names} for group, names in groups.items()
         )
@@ -161,7 +165,7 @@ class TrajectoryWriter:
         self._begin()
 
     def _cache(self) -> int:
-        """Bytes of the chunk cache of positions, and of velocities."""
+        """Bytes of the chunk cache of positions, of velocities, and of impacts, which need less."""
         chunks = -(-len(self._mass) // _CHUNK[1])
         return min(_LARGEST_CACHE, chunks * _CHUNK[0] * _CHUNK[1] * 24)
 
@@ -189,7 +193,7 @@ class TrajectoryWriter:
                 self._begin()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
-                _put(dataset, first, rows(parts, dataset.dtype))
+                _put(dataset, first, parts if name == COUNTS else rows(parts, dataset.dtype))
             for name, dataset in self._observables.items():
                 _put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
             self._file.flush()

@@ -42,6 +42,7 @@ class Result:
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
+        impacts_per_particle: (N,) how many impacts each has had.
     """
 
     particles: Particles
@@ -49,6 +50,7 @@ class Result:
     wall_time: float
     trajectory: Path | None
     multipliers: Multipliers | None
+    impacts_per_particle: NDArray[np.int64]
 
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
@@ -171,6 +173,7 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
             session.wall_time(),
             options.trajectory,
             run.state.multipliers,
+            run.state.impacts,
         )
 
 
