@@ -174,10 +174,13 @@ def test_restitution_of_one_changes_no_bit(gravity):
     ids=["penalty", "augmented Lagrangian"],
 )
 def test_conserving_methods_refuse_it(method):
-    """As they do the other laws of walls: methods/test_baselines.py."""
     scene = cut_sphere((1.0, 0.9, 1.0))
     with pytest.raises(swarm.SceneError, match=r"surfaces\[1\]\.restitution must be 1 .*got 0\.9"):
         run(scene, swarm.Particles([0.0] * 3, [1.0, 0.0, 0.0]), method, 1.0)
+    for law in ("friction", "temperature"):
+        other = swarm.Scene([swarm.Sphere(0.7, **{law: 0.5})])
+        with pytest.raises(swarm.SceneError, match=rf"surfaces\[0\]\.{law} must be .*got 0\.5; use Impact"):
+            run(other, swarm.Particles([0.0] * 3, [1.0, 0.0, 0.0]), method, 1.0)
 
 
 def test_a_contact_step_refuses_it():
