@@ -76,6 +76,14 @@ def count(name: str, value: Any, least: int = 1) -> int:
     return result
 
 
+def seed(name: str, value: Any) -> int:
+    """`value` as a key of random numbers: an integer that 64 bits hold."""
+    result = count(name, value, least=0)
+    if result >= 1 << 64:
+        raise SceneError(f"{name} must be below 2**64, got {min(result, 10**300):.6g}")
+    return result
+
+
 @functools.cache
 def memory() -> int:
     """Memory of this machine [bytes]."""

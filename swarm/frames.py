@@ -18,7 +18,7 @@ _SAME_TIME = 1e-9
 # More frames than any run has, but finite.
 _MOST = 1e300
 # Bytes of a frame's observables: numbers in a file, Python objects in memory; and what each surface adds.
-_NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 8
+_NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 16
 
 
 @dataclass(frozen=True)

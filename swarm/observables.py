@@ -162,9 +162,10 @@ def _(gravity, chain, r, v):
 
 
 def drift(seen: dict[str, Any]) -> float:
-    """Change of the total energy over a run, what was dissipated included; relative, if there was any at the start."""
+    """Change of the total energy over a run that walls did not cause; relative, if there was any at the start."""
     energy, lost = seen["total_energy"], seen["dissipated_energy"]
-    change = abs(energy[-1] + lost[-1] - energy[0])
+    given = np.sum(seen.get("wall_heat", [0.0])[-1])  # files of older versions have none
+    change = abs(energy[-1] + lost[-1] - given - energy[0])
     return float(change / abs(energy[0]) if energy[0] else change)
 
 
@@ -173,7 +174,11 @@ def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
 
     `owners` says which surface each wall belongs to.
     """
-    multipliers = state.multipliers
+    multipliers, contacts = state.multipliers, state.contacts
+    impulse, heat = (
+        np.bincount(owners, weights=np.zeros(len(owners)) if rows is None else rows.sum(axis=1))
+        for rows in (state.impulse, state.heat)
+    )
     loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
@@ -189,7 +194,10 @@ def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
         "angular_momentum": totals[_LX : _LZ + 1],
         "max_penetration": depth,
         "impacts": int(state.impacts.sum()),
-        "impulse": np.bincount(owners, weights=state.impulse.sum(axis=1)),
+        "impulse": impulse,
+        "sliding": 0 if contacts is None else int((contacts.walls[0] >= 0.0).sum()),
+        "sliding_time": 0.0 if contacts is None else float(contacts.sliding.sum()),
+        "wall_heat": heat,
         **loops,
         "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }

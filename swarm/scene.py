@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
+from .contact.laws import Laws, Thermal
 from .errors import SceneError
-from .contact.laws import Laws
 from .kernel.gravity import Gravity
 from .surfaces import required
 from .surfaces.fold import Chain, chain_of
@@ -35,6 +35,8 @@ _FAR = 1e6
 _FARTHEST, _ROUND_OFF = 1e15, 1e-14
 # Determinants of three normals: below the first they meet in a flat corner, below the second in none.
 _FLAT, _PARALLEL = 1e-12, 1e-15
+# The law of a wall without temperature.
+_NO_HEAT = Thermal(0.0, 0.0)
 # Triples of planes that are intersected at once.
 _TRIPLES = 4096
 
@@ -92,29 +94,23 @@ class Scene:
         """Gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
-    def restitution(self) -> Chain | None:
-        """The restitution of every wall of the chain as kernels take it, None where no surface loses energy."""
-        if all(surface.restitution == 1.0 for surface in self.surfaces):
+    def laws(self) -> Laws | None:
+        """The laws of every wall of the chain as kernels take them, None where no surface has one."""
+        laws = Laws(
+            self._of_walls([surface.restitution for surface in self.surfaces], 1.0),
+            self._of_walls([surface.friction for surface in self.surfaces], 0.0),
+            self._of_walls([_thermal(surface) for surface in self.surfaces], _NO_HEAT),
+        )
+        return None if laws == (None, None, None) else laws
+
+    def _of_walls(self, values: list[Any], neutral: Any) -> Chain | None:
+        """The value of the owner of every wall as a chain, None where all are neutral."""
+        if all(value == neutral for value in values):
             return None
         chain = None
         for i in reversed(self.owners()):
-            chain = Chain(self.surfaces[i].restitution, chain)
+            chain = Chain(values[i], chain)
         return chain
-
-    def laws(self) -> Laws | None:
-        """The laws of every wall of the chain as kernels take them, None where every impact is elastic and smooth."""
-
-        def of(name, none):
-            values = [getattr(self.surfaces[i], name, none) for i in self.owners()]
-            if all(v == none for v in values):
-                return None
-            chain = None
-            for v in reversed(values):
-                chain = Chain(v, chain)
-            return chain
-
-        laws = Laws(of("restitution", 1.0), of("friction", 0.0), None)
-        return laws if any(law is not None for law in laws) else None
 
     def owners(self) -> list[int]:
         """The surface that each wall of the chain belongs to."""
@@ -210,6 +206,12 @@ class Scene:
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
         return max(surface.extent() for surface in self.surfaces) or 1.0
+
+
+def _thermal(surface: Surface) -> Thermal:
+    if surface.temperature is None:
+        return _NO_HEAT
+    return Thermal(surface.temperature, surface.accommodation)
 
 
 def _side(surface: Surface) -> float:

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .observables import drift
 from .run.simulation import Result
 
@@ -23,6 +25,10 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "energy_error": float(seen["energy_error"].max()),
         "max_penetration": float(seen["max_penetration"].max()),
         "dissipated_energy": float(seen["dissipated_energy"][-1]),
+        # Files of older versions have none of these.
+        "wall_heat": np.array(seen.get("wall_heat", [[]])[-1]).tolist(),
+        "sliding": int(seen.get("sliding", [0])[-1]),
+        "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),
         "escaped": int(seen["escaped"][-1]),
         "unconverged": int(seen["unconverged"][-1]),
     }
@@ -89,11 +95,16 @@ def _figures(seen: dict[str, Any]) -> dict[str, str]:
     escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
     lost = seen.get("dissipated_energy", [0.0])[-1]
     dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
+    slid = seen.get("sliding_time", [0.0])[-1]
+    sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
+    heats = [f"{heat:.4g} J from surfaces[{i}]" for i, heat in enumerate(seen.get("wall_heat", [[]])[-1]) if heat]
     return {
         "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
+        **sliding,
         "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
         "largest penetration": f"{seen['max_penetration'].max():.1e} m",
         **dissipated,
+        **({"wall heat": ", ".join(heats)} if heats else {}),
         **escaped,
     }
 

@@ -62,6 +62,10 @@ def test_what_is_not_a_finite_number(check, value):
         (lambda: checks.count("n", 2.5), "n must be a whole number, 1 or more, got 2.5"),
         (lambda: checks.count("n", True), "n must be a whole number, 1 or more, got True"),
         (lambda: checks.count("seed", -1, least=0), "seed must be 0 or more, got -1"),
+        (lambda: checks.seed("seed", -1), "seed must be 0 or more, got -1"),
+        (lambda: checks.seed("seed", 1.0), "seed must be a whole number, 0 or more, got 1.0"),
+        (lambda: checks.seed("seed", 2**64), "seed must be below 2**64, got 1.84467e+19"),
+        (lambda: checks.seed("seed", 10**5000), "seed must be below 2**64, got 1e+300"),
         (lambda: checks.vector("center", (1, 2)), "center must be three numbers, got 2: (1, 2)"),
         (lambda: checks.vector("center", "xyz"), "center must be three numbers, got 'xyz'"),
         (lambda: checks.vector("center", 5.0), "center must be three numbers, got 5.0"),
@@ -91,6 +95,7 @@ def test_values_pass():
     assert checks.one_of("side", "inside", {"inside": 1.0}) == "inside"
     assert checks.count("n", np.int32(3)) == 3
     assert checks.count("seed", 0, least=0) == 0
+    assert checks.seed("seed", np.uint64(2**64 - 1)) == 2**64 - 1
 
 
 @pytest.mark.parametrize(

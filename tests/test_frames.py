@@ -48,13 +48,13 @@ def test_frames_are_compared_with_the_disk_and_what_they_replace(tmp_path, monke
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage(0, 0, 50_000))
     run = {"until": 100.0, "every": 1.0, "trajectory": path, "overwrite": True}
     many = swarm.fill(SPHERE, 20, speed=1e-3, seed=1)
-    with pytest.raises(swarm.SceneError, match=r"101 frames, 118 kB, and what is free in .* is 50 kB"):
+    with pytest.raises(swarm.SceneError, match=r"101 frames, 135 kB, and what is free in .* is 50 kB"):
         swarm.simulate(SPHERE, many, swarm.Impact(), **run)
     # Half of it, or no particles, fits; the size of compressed frames is unknown.
     for fits in ({"precision": "float32", "until": 50.0}, {"frames": "none"}, {"compression": "gzip"}):
         with caplog.at_level(logging.INFO, "swarm"):
             swarm.simulate(SPHERE, many, swarm.Impact(), **{**run, **fits})
-    assert "the run has 101 frames, at most 118 kB" in caplog.text
+    assert "the run has 101 frames, at most 135 kB" in caplog.text
     path.write_bytes(bytes(100_000))
     swarm.simulate(SPHERE, many, swarm.Impact(), **run)
 

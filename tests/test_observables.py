@@ -7,7 +7,7 @@ from conftest import EPSILON, call, numbers_of, scene_of, wall_point
 import swarm
 from swarm import observables
 from swarm.contact.regularisation import regularisation
-from swarm.particles import State
+from swarm.particles import Contacts, State
 from swarm.surfaces import contract
 
 # Not a whole number of chunks, nor of the columns of a chunk.
@@ -96,6 +96,34 @@ def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
     found = observe(None, scene, state)
     assert found["contact_energy"] == found["potential_energy"] == found["max_penetration"] == 0.0
     assert (state.inverse_scale > 0.0).all()
+
+
+def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
+    """Who is on a wall now, how long all were, and the heat of each surface, whose walls may be several."""
+    scene, law, state, found = seen
+    assert (found["sliding"], found["sliding_time"], found["wall_heat"].tolist()) == (0, 0.0, [0.0, 0.0])
+    random = np.random.default_rng(7)
+    walls, sliding = np.full((2, N), -1.0), random.uniform(size=N)
+    # Wall 0, or wall 1, or the edge of both.
+    walls[0, 3], walls[0, 40:50], walls[:, -1] = 1.0, 0.0, (0.0, 1.0)
+    contacts = Contacts(walls, np.zeros(N), np.zeros(N), sliding)
+    heat = random.normal(size=(2, N))
+    lasting = observe(law, scene, state._replace(contacts=contacts, heat=heat))
+    assert (lasting["sliding"], lasting["sliding_time"]) == (12, pytest.approx(sliding.sum(), rel=1e-13))
+    assert lasting["wall_heat"] == pytest.approx(heat.sum(axis=1), rel=1e-12)
+    partial = np.zeros((1, observables.ROWS))
+    of_one = observables.summary(partial, state._replace(heat=heat), [0, 0])
+    assert of_one["wall_heat"] == pytest.approx([heat.sum()], rel=1e-12)
+    for name in found.keys() - {"sliding", "sliding_time", "wall_heat"}:
+        assert np.array_equal(found[name], lasting[name]), name
+
+
+def test_drift_is_what_neither_loss_nor_heat_explains():
+    table = {"total_energy": [2.0, 2.5], "dissipated_energy": [0.0, 0.25], "wall_heat": [[0.0, 0.0], [1.0, -0.25]]}
+    seen = {name: np.array(values) for name, values in table.items()}
+    assert observables.drift(seen) == 0.0
+    del seen["wall_heat"]  # of an older version
+    assert observables.drift(seen) == 0.375
 
 
 def test_at_rest_the_energy_error_has_no_scale():

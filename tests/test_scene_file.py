@@ -48,6 +48,14 @@ def test_a_job(tmp_path):
     np.testing.assert_array_equal(job.particles().position, swarm.fill(job.scene, 10, speed=0.5).position)
 
 
+def test_laws_of_walls_and_their_seed(tmp_path):
+    laws = "friction = 0.25\ntemperature = 300\naccommodation = 0.5"
+    job = read(tmp_path, GOOD.replace("radius = 0.5", f"radius = 0.5\n{laws}") + f"seed = {2**64 - 1}\n")
+    assert job.scene.surfaces == (swarm.Sphere(0.5, friction=0.25, temperature=300.0, accommodation=0.5),)
+    assert job.run.seed == 2**64 - 1
+    assert read(tmp_path, GOOD).run.seed == 0
+
+
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
 def test_shipped_scenes_are_read(path):
     job = scene_file.read(path)
@@ -92,7 +100,10 @@ def test_shipped_scenes_are_read(path):
         ("every = 0.5", "checkpoint = 0.0", r"run\.checkpoint must be 0\.01 or more, got 0"),
         ("every = 0.5", 'compile = "nevr"', r"run\.compile must be one of .*'nevr'; did you mean 'never'"),
         ("every = 0.5", "trajectory = 5", r"run\.trajectory must be the path of a file, got 5"),
-        ("every = 0.5", "resume = true", r"run\.resume: unknown key, expected 'until', 'every', .* and 'compile'"),
+        ("every = 0.5", "resume = true", r"run\.resume: unknown key, expected 'until', 'every', .* and 'seed'"),
+        ("every = 0.5", "seed = -1", r"run\.seed must be 0 or more, got -1"),
+        ("every = 0.5", "seed = 1.5", r"run\.seed: expected int.*, got float \(in seed = 1\.5\)"),
+        ("every = 0.5", "seed = 18446744073709551616", r"run\.seed must be below 2\*\*64, got 1\.84467e\+19"),
         ("every = 0.5", "gravity = [0, 0, -1]", r"run\.gravity: unknown key.*gravity belongs at the top"),
         ("[particles]", "gravity = [0, 0]\n[particles]", r"gravity must be three numbers, got 2"),
         ("[particles]", "[particles", r"cannot read the scene file .*scene\.toml"),
@@ -106,6 +117,12 @@ def test_shipped_scenes_are_read(path):
             "radius = 0.5",
             "radius = 0.5\nrotation = { axis = [0, 0, 0], angle = 1.0 }",
             r"surface\[0\]\.rotation\.axis must not be of length 0",
+        ),
+        ("radius = 0.5", "radius = 0.5\nfriction = -1", r"surface\[0\]\.friction must be 0 or more, got -1"),
+        (
+            "radius = 0.5",
+            "radius = 0.5\naccommodation = 0.5",
+            r"surface\[0\]\.accommodation must go with a temperature",
         ),
         ("radius = 0.5", "radius = 0.5\nrestitution = 1.5", r"surface\[0\]\.restitution must be from 0 to 1, got 1\.5"),
         (

@@ -94,8 +94,8 @@ def test_a_thread_is_halted_as_often_on_every_machine(tmp_path):
     assert require_resumed_is_whole(tmp_path, *CASES["impact, sphere"], every=20.0, threads=(1,)) == 24
 
 
-def run(path, scene=SPHERE, method=None, until=2.0, every=0.5, n=20, **keywords):
-    start = swarm.fill(scene, n, speed=1.0, seed=keywords.pop("seed", 1))
+def run(path, scene=SPHERE, method=None, until=2.0, every=0.5, n=20, start_seed=1, **keywords):
+    start = swarm.fill(scene, n, speed=1.0, seed=start_seed)
     return swarm.simulate(
         scene, start, method or swarm.Impact(), until=until, every=every, trajectory=path, threads=1, **keywords
     )
@@ -132,6 +132,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
     assert numbers == [3, 4]
     assert not paths.checkpoint_of(path).exists()
     assert np.array_equal(resumed.particles.position, expected.particles.position)
+    assert np.array_equal(resumed.impacts_per_particle, expected.impacts_per_particle)
     with swarm.load(path) as one, swarm.load(whole) as other:
         assert len(one) == len(other) == 5
         for name, values in expected.observables.items():
@@ -140,6 +141,7 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
         if storage.get("frames") != "none":
             for k in range(5):
                 assert np.array_equal(one.frame(k).velocity, other.frame(k).velocity)
+                assert np.array_equal(one.impacts(k), other.impacts(k))
 
 
 def halted_after(monkeypatch, passes, seconds):
@@ -200,11 +202,12 @@ def test_a_longer_run_goes_on_from_a_shorter_one(tmp_path):
         ({"scene": swarm.Scene([swarm.Sphere(0.6)])}, ["radius = 0.5", "radius = 0.6"]),
         ({"scene": swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -1.0))}, ["gravity", "scene is"]),
         ({"precision": "float32"}, ['precision = "float64"', 'precision = "float32"']),
-        ({"seed": 2}, ["particles at the start (seed,", "digest"]),
+        ({"start_seed": 2}, ["particles at the start (seed,", "digest"]),
+        ({"seed": 2}, ["seed of thermal walls is 0, got 2"]),
         ({"every": 0.25}, ["its frame 2 is at 1 s, got 0.5 s"]),
         ({"until": 1.0}, ["until must be after", "1 s, got 1 s"]),
     ],
-    ids=["count", "contact step", "method", "scene", "gravity", "storage", "start", "every", "until"],
+    ids=["count", "contact step", "method", "scene", "gravity", "storage", "start", "seed", "every", "until"],
 )
 def test_another_run_is_refused_with_both_values(tmp_path, change, words):
     path = tmp_path / "run.h5"
@@ -227,7 +230,8 @@ def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):
     frames = path.read_bytes()
     for change, words in (
         ({"n": 30}, "number of particles is 20, got 30"),
-        ({"seed": 2}, r"run\.h5 is of another run: its particles at the start .* have the digest"),
+        ({"start_seed": 2}, r"run\.h5 is of another run: its particles at the start .* have the digest"),
+        ({"seed": 2}, r"run\.h5 is of another run: its seed of thermal walls is 0, got 2"),
         ({}, r"run\.h5\.checkpoint must be there .*begin again at 0 s and replace the 3 frames of .*--overwrite"),
     ):
         with pytest.raises(swarm.SceneError, match=words) as caught:
@@ -269,7 +273,7 @@ def test_a_run_that_fails_at_its_first_frame_leaves_the_old_one_and_its_checkpoi
 
     monkeypatch.setattr(Run, "require_admissible", fail)
     with pytest.raises(swarm.RunError, match="at once"):
-        run(path, overwrite=True, seed=2)
+        run(path, overwrite=True, start_seed=2)
     monkeypatch.undo()
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
     assert len(run(path, resume=True).observables["time"]) == 5

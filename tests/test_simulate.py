@@ -26,6 +26,9 @@ NAMES = {
     "dissipated_energy",
     "escaped",
     "unconverged",
+    "sliding",
+    "sliding_time",
+    "wall_heat",
 }
 
 
@@ -62,7 +65,7 @@ def test_simulate_does_not_change_its_argument():
 def test_observables_have_one_entry_a_frame():
     observables = _run(scene=NESTED, every=0.5).observables
     assert set(observables) == NAMES
-    shapes = {"momentum": (5, 3), "angular_momentum": (5, 3), "impulse": (5, 2)}
+    shapes = {"momentum": (5, 3), "angular_momentum": (5, 3), "impulse": (5, 2), "wall_heat": (5, 2)}
     assert {name: column.shape for name, column in observables.items()} == {
         name: shapes.get(name, (5,)) for name in NAMES
     }
@@ -77,8 +80,17 @@ def test_result_arrays():
     for array in (result.particles.position, result.particles.velocity):
         assert (array.shape, array.dtype, array.flags.c_contiguous) == ((3, 7), np.float64, True)
     assert result.particles.mass.tolist() == [1.0] * 7
+    each = result.impacts_per_particle
+    assert (each.shape, each.dtype, each.sum()) == ((7,), np.int64, result.observables["impacts"][-1])
     assert result.trajectory is None
     assert result.wall_time > 0.0
+
+
+def test_impacts_of_each_particle():
+    """At unit speed along a diameter of 1 m, from its middle; and one that rests."""
+    start = swarm.Particles(np.zeros((3, 3)), [[1.0, 3.0, 0.0], [0.0] * 3, [0.0] * 3])
+    result = swarm.simulate(SPHERE, start, swarm.Impact(), until=4.0, compile="never")
+    assert result.impacts_per_particle.tolist() == [4, 12, 0]
 
 
 def test_observables_are_sums_over_particles():

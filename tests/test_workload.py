@@ -114,8 +114,9 @@ def test_honest_runs_are_not_refused(name, caplog):
     assert not caplog.records
 
 
-def test_what_loses_energy_comes_to_rest():
-    scene = swarm.Scene([swarm.Slab((0.0, 0.0, 1.0), THIN, restitution=0.5), BOX])
+@pytest.mark.parametrize("law", [{"restitution": 0.5}, {"friction": 0.5}, {"temperature": 300.0}], ids=str)
+def test_what_loses_or_gets_energy_is_not_judged_by_its_start(law):
+    scene = swarm.Scene([swarm.Slab((0.0, 0.0, 1.0), THIN, **law), BOX])
     workload.check(scene, moving(0.0, 0.0, 0.0), swarm.Impact(), 1.0, 1.0)
 
 

@@ -97,7 +97,7 @@ class AugmentedLagrangian(base.Method):
         checks.one_of("on_unconverged", self.on_unconverged, _POLICIES)
 
     def check(self, scene: Scene, particles: Particles) -> None:
-        base.check_elastic("AugmentedLagrangian", scene)
+        base.check_laws("AugmentedLagrangian", scene)
         if scene.gravity is not None and (self.adaptive or self.on_unconverged == "impact"):
             name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
             raise SceneError(

@@ -12,6 +12,8 @@ from ..surfaces import required
 
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
+# The laws of a surface, and their values where there is none.
+_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None}
 
 
 @dataclass(frozen=True)
@@ -74,14 +76,16 @@ def check_surfaces(method: Method, scene: Scene) -> None:
     required.require(scene.surfaces, purpose, (*method.needs(scene), surfaces.distance, *seen))
 
 
-def check_elastic(name: str, scene: Scene) -> None:
-    """Raise a `SceneError` if a surface loses energy, which a method of this name does not know."""
+def check_laws(name: str, scene: Scene) -> None:
+    """Raise a `SceneError` if a surface has a law that a method of this name does not know: any but rigidity."""
     for i, surface in enumerate(scene.surfaces):
-        if surface.restitution < 1.0:
-            raise SceneError(
-                f"surfaces[{i}].restitution must be 1 with {name}, which conserves the energy, got "
-                f"{surface.restitution:g}; use Impact"
-            )
+        for law, without in _WITHOUT_LAWS.items():
+            value = getattr(surface, law)
+            if value != without:
+                raise SceneError(
+                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls only, got "
+                    f"{value:g}; use Impact"
+                )
 
 
 def check_crossing(name: str, step: float | None, scene: Scene, particles: Particles) -> None:

@@ -38,7 +38,7 @@ class SoftWalls(base.Method):
         check_numbers(self)
 
     def check(self, scene: Scene, particles: Particles) -> None:
-        base.check_elastic(type(self).__name__, scene)
+        base.check_laws(type(self).__name__, scene)
         check_solids(scene, particles, self.dt)
 
     def seldom_hard(self, scene: Scene) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..particles import State
+from .layout import COUNTS, PARTS
 from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
@@ -21,6 +22,8 @@ _PATIENCE = 0.05
 # memory. With very many particles there is one, which is written while the next is computed.
 _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
+# What is copied of a state, for the writers, and its bytes a particle.
+_COPIED, _PARTICLE = (*PARTS, COUNTS), 56
 
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
@@ -67,7 +70,7 @@ class Several:
 
 
 def _some(state: State, kept: slice) -> State:
-    return state._replace(position=state.position[:, kept], velocity=state.velocity[:, kept])
+    return state._replace(**{name: getattr(state, name)[..., kept] for name in _COPIED})
 
 
 class Background:
@@ -84,7 +87,7 @@ class Background:
         self._frames: queue.SimpleQueue[Written | threading.Event | None] = queue.SimpleQueue()
         # Bounds the other queue: a frame needs one of these copies.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
-        copies = max(1, min(_COPIES, _BYTES // (48 * n)))
+        copies = max(1, min(_COPIES, _BYTES // (_PARTICLE * n)))
         for _ in range(copies):
             self._copies.put(None)
         half = max(1, copies // 2)
@@ -117,9 +120,9 @@ class Background:
             raise self._problem
         some = _some(state, self._kept)
         if copy is None:
-            copy = some._replace(position=np.empty_like(some.position), velocity=np.empty_like(some.velocity))
-        np.copyto(copy.position, some.position)
-        np.copyto(copy.velocity, some.velocity)
+            copy = some._replace(**{name: np.empty_like(getattr(some, name)) for name in _COPIED})
+        for name in _COPIED:
+            np.copyto(getattr(copy, name), getattr(some, name))
         self._frames.put((number, moment, copy, seen))
 
     def drain(self) -> None:

@@ -42,6 +42,7 @@ class Job:
         frame, time: the last frame that was written [s].
         following: time of the frame that is being computed [s], or None.
         wall_time: used so far [s].
+        seed: of thermal walls.
     """
 
     version: str
@@ -54,10 +55,11 @@ class Job:
     time: float = 0.0
     following: float | None = None
     wall_time: float = 0.0
+    seed: int = 0
 
     def require_same(self, other: "Job", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
-        for name in ("particles", "method", "scene", "storage", "start", "version"):
+        for name in ("particles", "method", "scene", "storage", "start", "seed", "version"):
             mine, its = getattr(self, name), getattr(other, name)
             if mine != its:
                 raise SceneError(
@@ -71,6 +73,7 @@ _NAMES = {
     "scene": "scene is",
     "storage": "trajectory keeps",
     "start": "particles at the start (seed, speed, mass, file) have the digest",
+    "seed": "seed of thermal walls is",
     "version": "version of swarm is",
 }
 

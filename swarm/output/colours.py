@@ -66,7 +66,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
     """The scale, and its quantity as a function of positions and velocities (3, N).
 
     Raises:
-        SceneError: energy errors are asked for where impacts dissipate energy.
+        SceneError: energy errors are asked for where walls dissipate or give energy.
     """
     law = method.law()
     at_start = observables.energies(scene, law, start.mass, start.position, start.velocity)
@@ -76,10 +76,10 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         # Two digits are enough on a legend.
         fastest = float(f"{fastest:.1e}")
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: _speed(velocity)
-    if scene.restitution() is not None:
+    if scene.laws() is not None:
         raise SceneError(
-            "record_color must be 'speed' where a surface has a restitution below 1, got 'energy-error': energy that "
-            "impacts dissipate is not an error"
+            "record_color must be 'speed' where a surface has a restitution below 1, friction or a temperature, got "
+            "'energy-error': energy that walls dissipate or give is not an error"
         )
     before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 

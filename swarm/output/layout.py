@@ -8,6 +8,8 @@ import h5py
 from numpy.typing import NDArray
 
 PARTS = ("position", "velocity")
+# The impacts of each particle, beside these; files of older versions have none.
+COUNTS = "impacts"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
@@ -21,6 +23,9 @@ _NUMBERS = (
     "kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy", "energy_error",
     "max_penetration", "impacts", "escaped", "unconverged",
 )  # fmt: skip
+
+# Likewise, besides the heat of each surface, but files of older versions have none of them.
+_LATER = ("sliding", "sliding_time")
 
 
 def missing(file: Any) -> str | None:
@@ -36,6 +41,8 @@ def frames(file: Any, path: Path) -> int:
     for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start")):
         if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
+    if "parameters/seed" in file:
+        _dataset(file, "parameters/seed", _INTEGER, ())
     count = int(_dataset(file, "parameters/particles", _INTEGER, ())[()])
     time = _dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])
@@ -47,8 +54,13 @@ def frames(file: Any, path: Path) -> int:
             if value.ndim not in (1, 2) or value.shape[0] < n:
                 raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
             _require_fits(value, n, path)
-    if "particles/all" not in file:
-        return n
+    if "particles/all" in file:
+        _require_particles(file, n, count, path)
+    return n
+
+
+def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
+    """Raise a ValueError if what is kept of the `count` particles in n frames is inconsistent."""
     kept = _dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
         raise ValueError(f"particles/all/mass must have 1 to {count} entries, got {len(kept)}")
@@ -57,7 +69,8 @@ def frames(file: Any, path: Path) -> int:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
     for name in PARTS:
         _require_fits(_dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
-    return n
+    if f"particles/all/{COUNTS}" in file:
+        _require_fits(_dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
 
 
 def require_index(file: Any) -> None:
@@ -102,6 +115,8 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
     """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
+    later: dict[str, tuple[int, ...]] = {**dict.fromkeys(_LATER, (n,)), "wall_heat": (n, surfaces)}
+    shapes |= {name: shape for name, shape in later.items() if name in seen}
     for name, shape in shapes.items():
         if name not in seen or seen[name].shape != shape:
             came = "nothing" if name not in seen else str(seen[name].shape)

@@ -48,8 +48,10 @@ def draw(trajectory: Trajectory, target: Path) -> None:
         rows.append(series.row_of(lines, moment, now, before))
         before = moment, now
     columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
-    views = series.views_of(lines)
-    cells = right.subplots(2, 3).ravel()
+    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or columns[line.path].any()]
+    views = series.views_of(shown)
+    # One more is for the speeds.
+    cells = right.subplots(2, max(3, 1 + len(views) // 2)).ravel()
     for cell, (group, together) in zip(cells, views.items(), strict=False):
         known = {line.name: ~np.isnan(columns[line.path]) for line in together}
         curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}
@@ -74,7 +76,7 @@ def _speeds(axes: Any, trajectory: Trajectory) -> None:
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
         axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
     axes.set_yscale("log")  # at the start all may be in one bin
-    axes.set_title(f"speeds, particles in each of {_BINS} bins [%]", fontsize=10)
+    axes.set_title(f"speeds, % in each of {_BINS} bins", fontsize=10)
     axes.set_xlabel("speed [m/s]", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

@@ -2,7 +2,7 @@
 
 /scene/particles              Points3D, a frame's; coloured
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
-/energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...)     Scalars
+/energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values; static
 """

@@ -20,7 +20,11 @@ VIEWS = {
     "impacts": ("impacts per second [1/s]", False),
     "pressure": ("pressure on each surface [Pa]", False),
     "force": ("force on each surface [N]", False),
+    "sliding": ("particles that slide or rest", False),
+    "heat": ("heat from each surface [W]", False),
 }
+# Views that pictures leave out where all values are 0.
+RARE = ("sliding",)
 
 # A frame's time [s] and its observables.
 Seen = tuple[float, dict[str, Any]] | None
@@ -45,8 +49,9 @@ def group_of(path: str) -> str:
 
 def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
     """The time series of a scene, without those that are always zero in it."""
+    laws = scene.laws()
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
-    energies |= {"contact": method.law() is not None, "dissipated": scene.restitution() is not None}
+    energies |= {"contact": method.law() is not None, "dissipated": laws is not None and laws[:2] != (None, None)}
     lines = [Line(f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there]
     lines += [
         Line("/energy_error", "of a particle", _logarithm_of("energy_error")),
@@ -59,6 +64,11 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
         area = 1.0 if scene.is_open() else shape.area()
         if area > 0.0:
             lines.append(Line(f"/{group}/{shape.name}", shape.name, _rate("impulse", area, i)))
+    if method.is_rigid():
+        lines.append(Line("/sliding", "all particles", _of("sliding")))
+    for i, shape in enumerate(shapes):
+        if scene.surfaces[i].temperature is not None:
+            lines.append(Line(f"/heat/{shape.name}", shape.name, _rate("wall_heat", 1.0, i)))
     return lines
 
 
@@ -76,7 +86,8 @@ def row_of(lines: list[Line], moment: float, seen: dict[str, Any], before: Seen)
 
 
 def _of(name: str) -> Callable[..., float]:
-    return lambda _moment, seen, _before: float(seen[name])
+    # Files of older versions have no "sliding".
+    return lambda _moment, seen, _before: float(seen.get(name, 0.0))
 
 
 def _logarithm_of(name: str) -> Callable[..., float]:

@@ -67,7 +67,9 @@ def _pictures(
 def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
     groups: dict[str, dict[str, Any]] = {}
     for path, values in sorted(playback.series.items()):
-        groups.setdefault(series.group_of(path), {})[playback.names[path]] = values
+        group = series.group_of(path)
+        if group not in series.RARE or values[1].any():
+            groups.setdefault(group, {})[playback.names[path]] = values
     above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
     picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()

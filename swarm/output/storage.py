@@ -48,4 +48,4 @@ class Storage:
 
     def bytes_of(self, n: int) -> int:
         """Bytes that n particles take in a frame, if they are not compressed."""
-        return len(range(n)[self.kept()]) * 6 * np.dtype(self.precision).itemsize
+        return len(range(n)[self.kept()]) * (6 * np.dtype(self.precision).itemsize + np.dtype(np.int64).itemsize)

@@ -1,9 +1,9 @@
 """Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read on demand.
 
-particles/all/{position,velocity}/{step,time,value}, value (frames, N, 3); particles/all/{mass,id} (N,);
-observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
-number that were run, and parameters/start, a digest of them at the start. All elements share one step and one time
-dataset by hard links. writer.py writes them.
+particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
+start; particles/all/{mass,id} (N,); observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as
+TOML text, parameters/particles, the number that were run, parameters/start, a digest of them at the start, and
+parameters/seed, of thermal walls. All elements share one step and one time dataset by hard links. writer.py writes it.
 """
 
 import contextlib
@@ -124,15 +124,33 @@ class Trajectory:
 
     def frame(self, k: int) -> Particles:
         """The particles at frame k; negative k count from the end."""
+        k = self._number(k)
+        with self._reading(f"frame {k}") as file:
+            everything = file["particles/all"]
+            position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
+            return Particles(position, velocity, everything["mass"][()])
+
+    def impacts(self, k: int) -> NDArray[np.int64]:
+        """How many impacts each of the particles of frame k has had since the start, (N,)."""
+        k, name = self._number(k), f"particles/all/{layout.COUNTS}"
+        with self._reading("its impacts") as file:
+            kept = name in file
+        if not kept:
+            raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
+        with self._reading(f"the impacts of frame {k}") as file:
+            counts = file[f"{name}/value"][k].astype(np.int64)
+            if (counts < 0).any():
+                raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
+        return np.asarray(counts)
+
+    def _number(self, k: int) -> int:
+        """The number of a frame whose particles are kept, from 0 on."""
         k, n = _whole(f"{self.path}: frame", k), len(self)
         self.require_frames()
         if not -n <= k < n:
             raise SceneError(f"{self.path}: frame must lie between {-n} and {n - 1}, got {k}")
         self._require_particles()
-        with self._reading(f"frame {k % n}") as file:
-            everything = file["particles/all"]
-            position, velocity = (everything[f"{name}/value"][k % n].T for name in layout.PARTS)
-            return Particles(position, velocity, everything["mass"][()])
+        return k % n
 
     def particle(self, i: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """The path of particle i: its positions and velocities, (3, frames) each."""
@@ -177,6 +195,12 @@ class Trajectory:
         with self._reading("its start") as file:
             stored = "parameters/start" in file
         return self._text("start") if stored else ""
+
+    @property
+    def seed(self) -> int:
+        """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
+        with self._reading("its seed") as file:
+            return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
 
     @property
     def scene(self) -> Scene:

@@ -23,7 +23,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import paths, superblock
-from .layout import PARTS
+from .layout import COUNTS, PARTS
 from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
@@ -39,7 +39,7 @@ _PACKED: dict[str, dict[str, Any]] = {
     "lzf": {"compression": "lzf", "shuffle": True},
 }
 
-# Number, time [s], positions and velocities, observables.
+# Number, time [s], positions, velocities and impacts, observables.
 Written = tuple[int, float, State, dict[str, Any]]
 WriteFrames = Callable[[list[Written]], None]
 
@@ -48,7 +48,7 @@ class TrajectoryWriter:
     """A context that creates the file, or reopens it, and gives the function that writes frames.
 
     Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once cost little more than one:
-    the time goes into the fifteen datasets and the flush. The file gets its name when its first frame is whole; until
+    the time goes into the twenty datasets and the flush. The file gets its name when its first frame is whole; until
     then an existing file of that name, and its checkpoint, stay.
     """
 
@@ -60,12 +60,12 @@ class TrajectoryWriter:
         method: Method,
         particles: Particles,
         scene_text: str | None,
-        start: str,
+        identity: dict[str, Any],
         following: bool = False,
     ) -> None:
         self._path, self._storage, self._scene, self._method = path, storage, scene, method
         self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
-        self._start, self._following = start, following
+        self._identity, self._following = identity, following
         self._part = path if following else paths.part_of(path)
 
     def __enter__(self) -> WriteFrames:
@@ -122,7 +122,8 @@ class TrajectoryWriter:
         parameters = file.create_group("parameters")
         for name, text in descriptions(self._scene, self._method, self._storage).items():
             parameters[name] = text
-        parameters["particles"], parameters["start"] = self._count, self._start
+        for name, value in {"particles": self._count, **self._identity}.items():
+            parameters[name] = value
         if self._text is not None:
             parameters["scene_file"] = self._text
         self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
@@ -145,11 +146,15 @@ class TrajectoryWriter:
             self._values[name] = self._element(
                 f"particles/all/{name}", (n, 3), self._storage.precision, (deep, min(n, _CHUNK[1]), 3), **options,
             )  # fmt: skip
+        self._values[COUNTS] = self._element(
+            f"particles/all/{COUNTS}", (n,), np.int64, (deep, min(n, _CHUNK[1])), **options
+        )
 
     def _open(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
-        groups = {"particles/all": PARTS if len(self._mass) else (), "observables": tuple(self._file["observables"])}
+        kept = [name for name in (*PARTS, COUNTS) if f"particles/all/{name}" in self._file]
+        groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (
             {name: self._file[f"{group}/{name}/value"] for name in names} for group, names in groups.items()
         )
@@ -160,7 +165,7 @@ class TrajectoryWriter:
         self._begin()
 
     def _cache(self) -> int:
-        """Bytes of the chunk cache of positions, and of velocities."""
+        """Bytes of the chunk cache of positions, of velocities, and of impacts, which need less."""
         chunks = -(-len(self._mass) // _CHUNK[1])
         return min(_LARGEST_CACHE, chunks * _CHUNK[0] * _CHUNK[1] * 24)
 
@@ -188,7 +193,7 @@ class TrajectoryWriter:
                 self._begin()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
-                _put(dataset, first, rows(parts, dataset.dtype))
+                _put(dataset, first, parts if name == COUNTS else rows(parts, dataset.dtype))
             for name, dataset in self._observables.items():
                 _put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
             self._file.flush()
@@ -277,7 +282,7 @@ def _reason(error: Exception) -> str:
 
 
 def _put(dataset: Any, first: int, values: Any) -> None:
-    """Write entries from row `first` on. h5py's indexing takes four times as long, for fifteen datasets a frame."""
+    """Write entries from row `first` on. h5py's indexing takes four times as long, for twenty datasets a frame."""
     handle = dataset.id
     count, *shape = handle.shape
     entries = np.ascontiguousarray(values, dtype=dataset.dtype)

@@ -49,6 +49,7 @@ class RunOptions:
     resume: bool = field(default=False, metadata=_OF_A_SESSION)
     walltime: float | None = field(default=None, metadata=_OF_A_SESSION)
     compile: str = "auto"
+    seed: int = 0
 
     def __post_init__(self) -> None:
         for name in ("trajectory", "recording"):
@@ -65,6 +66,7 @@ class RunOptions:
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
         checks.one_of("compile", self.compile, CHOICES)
+        object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         _ = self.storage
 
     @property

@@ -51,5 +51,5 @@ def _trajectory(task: Task, session: Session) -> "Writer | None":
 
     return TrajectoryWriter(
         options.trajectory, options.storage, task.scene, task.method, task.particles, options.scene_text,
-        session.start, session.first > 0,
+        session.identity, session.first > 0,
     )  # fmt: skip

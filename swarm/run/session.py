@@ -34,8 +34,8 @@ class Session:
         self._due = self._began + self._every
         self._stops = False
         self._trajectory, self._path = options.trajectory, options.checkpoint_file()
-        # A digest of the particles at the start, for the trajectory.
-        self.start = ""
+        # What identifies the run besides its texts, for the trajectory.
+        self.identity: dict[str, Any] = {}
         self._job: Job | None = None
         self._arrays: Arrays | None = None
         self._held = contextlib.ExitStack()
@@ -76,9 +76,9 @@ class Session:
                 f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
                 "replace; move it away, or choose another name for the trajectory"
             )
-        self.start = checkpoint.digest_of(task.particles)
+        self.identity = {"start": checkpoint.digest_of(task.particles), "seed": task.options.seed}
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
-        self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), start=self.start)
+        self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
         if not self._resumes:
             return
         if self._path.exists():
@@ -93,7 +93,8 @@ class Session:
         assert self._job is not None
         with load(trajectory) as before:
             texts: dict[str, Any] = before.descriptions
-            there = dataclasses.replace(self._job, **texts, particles=before.count, start=before.start)
+            identity: dict[str, Any] = {"particles": before.count, "start": before.start, "seed": before.seed}
+            there = dataclasses.replace(self._job, **texts, **identity)
             frames, last = len(before), before.times[-1:]
         if not there.start:
             raise SceneError(

@@ -38,10 +38,11 @@ class Result:
     Attributes:
         particles: the particles at `until`.
         observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
-            (frames, surfaces).
+            and "wall_heat" (frames, surfaces).
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
+        impacts_per_particle: (N,) how many impacts each has had.
     """
 
     particles: Particles
@@ -49,6 +50,7 @@ class Result:
     wall_time: float
     trajectory: Path | None
     multipliers: Multipliers | None
+    impacts_per_particle: NDArray[np.int64]
 
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
@@ -76,6 +78,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     resume: bool = False,
     walltime: float | None = None,
     compile: str = "auto",
+    seed: int = 0,
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
@@ -115,6 +118,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
             and after about a second the rest of the run is compiled. "always": compiled from the start. "never":
             plain Python only.
+        seed: of the random numbers of thermal walls, from 0 to 2**64 - 1: the same seed gives the same bits.
 
     Returns:
         A `Result`.
@@ -169,6 +173,7 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
             session.wall_time(),
             options.trajectory,
             run.state.multipliers,
+            run.state.impacts,
         )
 
 

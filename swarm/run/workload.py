@@ -37,8 +37,8 @@ class Flights(NamedTuple):
 def check(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
     """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
     impact = method.time_of_impact()
-    # Where energy is lost particles come to rest: the first flights say nothing of the later ones.
-    if impact is None or scene.restitution() is not None:
+    # Where energy is lost or given, the first flights say nothing of the later ones.
+    if impact is None or scene.laws() is not None:
         return
     with np.errstate(all="ignore"):
         found = _of_particles(scene, particles, impact)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import Vector, array, number, one_of, vector
+from ..checks import Vector, array, magnitude, number, one_of, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import contract
@@ -29,17 +29,31 @@ class Surface:
     Args:
         rotation: about the centre: None, a quaternion (w, x, y, z) of any length, or {"axis": (x, y, z), "angle": rad}.
         restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
+        friction: Coulomb's coefficient, 0 or more: the tangential impulse, or force, opposes the slip; it is at most
+            this times the normal one, and at most what stops the slip.
+        temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
+        accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
+            temperature (diffusely), instead of specularly.
     """
 
     rotation: Any = field(default=None, kw_only=True)
     restitution: float = field(default=1.0, kw_only=True)
+    friction: float = field(default=0.0, kw_only=True)
+    temperature: float | None = field(default=None, kw_only=True)
+    accommodation: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
-        restitution = number("restitution", self.restitution, "a number from 0 to 1")
-        if not 0.0 <= restitution <= 1.0:
-            raise SceneError(f"restitution must be from 0 to 1, got {restitution:g}")
-        object.__setattr__(self, "restitution", restitution)
+        object.__setattr__(self, "restitution", _part("restitution", self.restitution))
+        object.__setattr__(self, "friction", magnitude("friction", self.friction))
+        object.__setattr__(self, "accommodation", _part("accommodation", self.accommodation))
+        if self.temperature is not None:
+            object.__setattr__(self, "temperature", magnitude("temperature", self.temperature))
+        elif self.accommodation != 1.0:
+            raise SceneError(
+                f"accommodation must go with a temperature, got {self.accommodation:g} and none; give temperature= "
+                "(k_B T in joule), or leave accommodation out"
+            )
         if hasattr(self, "center"):
             object.__setattr__(self, "center", vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))
@@ -100,6 +114,14 @@ class Surface:
             parts = [np.array(np.broadcast_arrays(*contract.gradient(wall, rows), rows.x)[:3]) for wall in self.walls()]
             largest = np.argmax([contract.phi(wall, rows) for wall in self.walls()], axis=0)
         return np.asarray(np.choose(largest, parts))
+
+
+def _part(name: str, value: Any) -> float:
+    """`value` as a number from 0 to 1."""
+    part = number(name, value, "a number from 0 to 1")
+    if not 0.0 <= part <= 1.0:
+        raise SceneError(f"{name} must be from 0 to 1, got {part:g}")
+    return part
 
 
 def _rows(points: ArrayLike) -> Vec:

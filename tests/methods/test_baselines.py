@@ -137,11 +137,18 @@ def test_bad_arguments(rule, arguments, message):
 
 
 @every_rule
-def test_restitution_and_fast_particles_are_refused(rule):
+def test_laws_of_walls_and_fast_particles_are_refused(rule):
     method = RULES[rule](dt=0.1, penalty=1.0)
     lossy = swarm.Scene([swarm.Sphere(0.5, restitution=0.9)])
     with pytest.raises(swarm.SceneError, match=f"with {type(method).__name__}, which"):
         swarm.simulate(lossy, swarm.fill(lossy, 1, speed=1.0), method, until=1.0)
+    for law, message in (
+        ({"friction": 0.3}, r"surfaces\[1\]\.friction must be 0 with .*, got 0\.3; use Impact"),
+        ({"temperature": 0.0}, r"surfaces\[1\]\.temperature must be None with .*, got 0; use Impact"),
+    ):
+        rough = swarm.Scene([swarm.Sphere(0.5), swarm.Plane((0, 0, 1), 0.3, **law)])
+        with pytest.raises(swarm.SceneError, match=message):
+            swarm.simulate(rough, swarm.fill(rough, 1, speed=1.0), method, until=1.0)
     ball = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.01, side="outside")])
     with pytest.raises(swarm.SceneError, match="no particle jumps over a solid"):
         swarm.simulate(ball, swarm.fill(ball, 1, speed=1.0), method, until=1.0)

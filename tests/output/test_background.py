@@ -29,12 +29,13 @@ class Writer:
             if number == self.fails:
                 raise OSError(f"frame {number} does not fit")
             self.threads.add(threading.get_ident())
-            self.frames.append((number, moment, state.position.copy(), state.velocity.copy(), seen))
+            arrays = (state.position.copy(), state.velocity.copy(), state.impacts.copy())
+            self.frames.append((number, moment, *arrays, seen))
 
 
 def state_of(n=5):
-    nothing = np.zeros(n)
-    return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, nothing, nothing, nothing, None)
+    nothing, none = np.zeros(n), np.zeros(n, np.int64)
+    return State(np.zeros((3, n)), np.zeros((3, n)), nothing, nothing, nothing, none, nothing, nothing, None)
 
 
 @pytest.mark.parametrize("memory", [background._BYTES, 1], ids=["many copies", "one copy"])
@@ -45,16 +46,17 @@ def test_every_frame_is_written_as_it_was(monkeypatch, memory):
     writer = Writer(waits=changed.acquire)
     with Background(writer, 5) as write:
         for number in range(6):
-            state.position[:], state.velocity[:] = number, -number
+            state.position[:], state.velocity[:], state.impacts[:] = number, -number, 2 * number
             if number > 0:
                 changed.release()
             write(number, 0.1 * number, state, {"time": 0.1 * number})
         changed.release()
     assert [frame[0] for frame in writer.frames] == list(range(6))
-    for number, moment, position, velocity, seen in writer.frames:
+    for number, moment, position, velocity, impacts, seen in writer.frames:
         assert moment == seen["time"] == 0.1 * number
         assert (position == number).all()
         assert (velocity == -number).all()
+        assert (impacts == 2 * number).all()
     assert writer.threads.isdisjoint({threading.get_ident()})
     assert writer.left_with is None
 

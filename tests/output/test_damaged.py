@@ -50,7 +50,7 @@ def everything(path):
         if "none" not in trajectory.descriptions["storage"].split("\n")[0]:
             for k in range(len(trajectory)):
                 frame = trajectory.frame(k)
-                parts += [frame.position, frame.velocity, frame.mass]
+                parts += [frame.position, frame.velocity, frame.mass, trajectory.impacts(k)]
             for i in (0, N - 1):
                 parts += trajectory.particle(i)
     assert all(np.isfinite(part).all() for part in parts)
@@ -152,6 +152,7 @@ STRANGE = {
     "scene is no table": (replaced("parameters/scene", "surface = 1"), "its scene"),
     "scene is too deep": (replaced("parameters/scene", f"surface = {'[' * 5000}"), "its scene"),
     "method is unknown": (replaced("parameters/method", 'kind = "magic"'), "its method: method.kind must be one of"),
+    "a seed is text": (replaced("parameters/seed", b"one"), "parameters/seed must hold numbers"),
     "particles are many": (replaced("parameters/particles", np.zeros(3, int)), "parameters/particles must have"),
     "fewer were run": (replaced("parameters/particles", 19), "particles/all/mass must have 1 to 19 entries, got 20"),
     "positions are flat": (replaced("particles/all/position/value", np.zeros((5, 20))), "position/value must have"),
@@ -163,6 +164,15 @@ STRANGE = {
     "an observable is short": (replaced("observables/impacts/value", np.zeros(4)), "observables/impacts must have 5"),
     "an observable is gone": (lambda file: file["observables"].pop("impacts"), "expected impacts of the shape"),
     "an impulse is gone": (replaced("observables/impulse/value", np.zeros((5, 2))), "expected impulse of the shape"),
+    "a heat is gone": (replaced("observables/wall_heat/value", np.zeros((5, 2))), "expected wall_heat of the shape"),
+    "sliding is a table": (replaced("observables/sliding/value", np.zeros((5, 2))), "expected sliding of the shape"),
+    "impacts are flat": (
+        replaced("particles/all/impacts/value", np.zeros(5, int)),
+        "impacts/value must have the shape",
+    ),
+    "impacts are few": (replaced("particles/all/impacts/value", np.zeros((4, 20), int)), "impacts/value must have the"),
+    "impacts are halves": (replaced("particles/all/impacts/value", np.zeros((5, 20))), "impacts/value must hold"),
+    "impacts are negative": (written("particles/all/impacts/value", (2, 3), -1), "frame 2: expected 0 or more, got -1"),
     "a position is infinite": (written("particles/all/position/value", (2, 3, 1), np.inf), "frame 2: position must be"),
     "an energy is no number": (written("observables/total_energy/value", 4, np.nan), "got nan at frame 4"),
     "time stands still": (written("parameters/time", 3, 0.2), "its times: frame 3 is not after the one before it"),
@@ -229,6 +239,7 @@ def test_what_is_no_frame_or_particle(whole):
         assert (trajectory.particle(np.uint8(3))[0] == trajectory.particle(3)[0]).all()
     for read in (
         len, lambda t: t.times, lambda t: t.observables, lambda t: t.frame(0), lambda t: t.particle(0),
+        lambda t: t.impacts(0), lambda t: t.seed,
         lambda t: t.scene, lambda t: t.method, lambda t: t.scene_text, lambda t: t.count, lambda t: t.descriptions,
     ):  # fmt: skip
         with pytest.raises(swarm.SceneError, match=r"run\.h5 is closed; open it again with swarm\.load"):

@@ -135,9 +135,9 @@ def test_energy_errors_as_colours(tmp_path):
     told = values(deep, 1.1 * start.velocity)
     np.testing.assert_allclose(10.0**told, np.abs(after - before) / (0.5 + 0.5), rtol=1e-9)
     assert (scale.low, scale.high) == (-16.0, -6.0)
-    lossy = swarm.Scene([swarm.Sphere(0.5, restitution=0.9)])
-    with pytest.raises(swarm.SceneError, match="record_color must be 'speed'"):
-        colours.colouring("energy-error", lossy, METHOD, start)
+    for law in ({"restitution": 0.9}, {"friction": 0.1}, {"temperature": 300.0}):
+        with pytest.raises(swarm.SceneError, match="record_color must be 'speed'"):
+            colours.colouring("energy-error", swarm.Scene([swarm.Sphere(0.5, **law)]), METHOD, start)
 
 
 @pytest.mark.parametrize("lost", [20_000, 10])

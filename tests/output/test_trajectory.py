@@ -37,11 +37,27 @@ def test_everything_comes_back(run):
         np.testing.assert_array_equal(trajectory.frame(-1).position, result.particles.position)
         np.testing.assert_array_equal(trajectory.frame(3).velocity, result.particles.velocity)
         np.testing.assert_array_equal(trajectory.frame(1).mass, particles.mass)
+        assert (trajectory.impacts(-1).dtype, trajectory.impacts(0).tolist()) == (np.int64, [0] * 30)
+        np.testing.assert_array_equal(trajectory.impacts(-1), result.impacts_per_particle)
+        assert [trajectory.impacts(k).sum() for k in range(4)] == result.observables["impacts"].tolist()
         assert trajectory.observables.keys() == result.observables.keys()
         for name, values in result.observables.items():
             np.testing.assert_array_equal(trajectory.observables[name], values)
         with pytest.raises(swarm.SceneError, match=r"frame must lie between -4 and 3, got 4"):
             trajectory.frame(4)
+        with pytest.raises(swarm.SceneError, match=r"frame must lie between -4 and 3, got -5"):
+            trajectory.impacts(-5)
+
+
+def test_the_seed_comes_back_and_older_files_have_none(tmp_path):
+    particles, path = swarm.fill(SCENE, 3, speed=0.3), tmp_path / "run.h5"
+    swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=path, seed=2**64 - 1)
+    with swarm.load(path) as trajectory:
+        assert trajectory.seed == 2**64 - 1
+    with h5py.File(path, "r+") as file:
+        del file["parameters/seed"]
+    with swarm.load(path) as trajectory:
+        assert trajectory.seed == 0
 
 
 def test_layout_is_h5md(run):
@@ -54,7 +70,8 @@ def test_layout_is_h5md(run):
         assert box.attrs["dimension"] == 3
         assert list(box.attrs["boundary"]) == ["none"] * 3
         assert "edges" not in box
-        elements = [file["particles/all/position"], file["particles/all/velocity"], *file["observables"].values()]
+        parts = [file[f"particles/all/{name}"] for name in ("position", "velocity", "impacts")]
+        elements = [*parts, *file["observables"].values()]
         for element in elements:
             assert {"step", "time", "value"} == set(element)
             assert element["value"].shape[0] == element["step"].shape[0] == element["time"].shape[0] == 4
@@ -137,6 +154,7 @@ def test_every_kth_particle_in_half_the_precision(tmp_path, compression):
             expected = whole.frame(k).position[:, ::7].astype(np.float32)
             np.testing.assert_array_equal(part.frame(k).position, expected)
         np.testing.assert_array_equal(part.frame(0).mass, particles.mass[::7])
+        np.testing.assert_array_equal(part.impacts(-1), whole.impacts(-1)[::7])
         for mine, its in zip(part.particle(14), whole.particle(14), strict=True):
             assert mine.shape == (3, 5)
             np.testing.assert_array_equal(mine, its.astype(np.float32))
@@ -160,6 +178,8 @@ def test_observables_alone(tmp_path):
         np.testing.assert_array_equal(trajectory.observables["total_energy"], result.observables["total_energy"])
         with pytest.raises(swarm.SceneError, match='keeps no particles: it was run with frames = "none"'):
             trajectory.frame(0)
+        with pytest.raises(swarm.SceneError, match='keeps no particles: it was run with frames = "none"'):
+            trajectory.impacts(0)
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ N = 3
 def frame(number, n=N):
     """Frame k holds the number k throughout."""
     rows = np.full((3, n), float(number))
-    nothing = np.zeros(n)
-    state = State(rows, -rows, nothing, nothing, nothing, nothing, nothing, nothing, None)
+    nothing, counts = np.zeros(n), np.full(n, number)
+    state = State(rows, -rows, nothing, nothing, nothing, counts, nothing, nothing, None)
     return (
         number,
         float(number),
@@ -34,7 +34,7 @@ def frame(number, n=N):
 
 def writer_of(path, following=False, storage=None):
     particles = swarm.Particles(np.zeros((3, N)), np.ones((3, N)))
-    return writer.TrajectoryWriter(path, storage or Storage(), SPHERE, swarm.Impact(), particles, None, "", following)
+    return writer.TrajectoryWriter(path, storage or Storage(), SPHERE, swarm.Impact(), particles, None, {}, following)
 
 
 def require_frames(path, least, n=None):
@@ -50,6 +50,8 @@ def require_frames(path, least, n=None):
                 assert np.array_equal(position, expected)
                 assert np.array_equal(velocity, -expected)
             assert trajectory.observables["impacts"].tolist() == list(range(count))
+            for k in {0, count // 2, count - 1}:
+                assert trajectory.impacts(k).tolist() == [k] * N
             assert np.array_equal(trajectory.observables["momentum"].T, expected)
     return count
 
@@ -142,6 +144,20 @@ def test_sessions_write_the_same_rows(tmp_path):
         with writer_of(path, first > 0) as write:
             write([frame(number) for number in range(first, last)])
     assert require_frames(path, 25) == 25
+
+
+def test_a_session_goes_on_in_a_file_of_a_version_without_impacts(tmp_path):
+    path = tmp_path / "run.h5"
+    with writer_of(path) as write:
+        write([frame(0)])
+    with h5py.File(path, "r+") as file:
+        del file["particles/all/impacts"]
+    with writer_of(path, True) as write:
+        write([frame(1)])
+    with swarm.load(path) as trajectory:
+        assert (trajectory.frame(1).position == 1.0).all()
+        with pytest.raises(swarm.SceneError, match=r"run\.h5 keeps no impacts of particles: an older version"):
+            trajectory.impacts(1)
 
 
 def test_the_checksum_is_that_of_hdf5(tmp_path):

@@ -158,7 +158,7 @@ def test_restitution_of_one_changes_no_bit(gravity):
         [swarm.Sphere(0.7), swarm.Plane((0.0, 0.0, -1.0), 0.3), swarm.Plane((1.0, 0.2, -0.1), 0.4)], gravity
     )
     given = cut_sphere((1.0, 1.0, 1.0), gravity)
-    assert given.restitution() is None
+    assert given.laws() is None
     start = swarm.fill(bare, 40, speed=1.0, seed=5)
     one, two = (run(scene, start, swarm.Impact(), 3.0, compile="never") for scene in (bare, given))
     assert (one.particles.position == two.particles.position).all()
@@ -177,6 +177,10 @@ def test_conserving_methods_refuse_it(method):
     scene = cut_sphere((1.0, 0.9, 1.0))
     with pytest.raises(swarm.SceneError, match=r"surfaces\[1\]\.restitution must be 1 .*got 0\.9"):
         run(scene, swarm.Particles([0.0] * 3, [1.0, 0.0, 0.0]), method, 1.0)
+    for law in ("friction", "temperature"):
+        other = swarm.Scene([swarm.Sphere(0.7, **{law: 0.5})])
+        with pytest.raises(swarm.SceneError, match=rf"surfaces\[0\]\.{law} must be .*got 0\.5; use Impact"):
+            run(other, swarm.Particles([0.0] * 3, [1.0, 0.0, 0.0]), method, 1.0)
 
 
 def test_a_contact_step_refuses_it():

@@ -82,6 +82,16 @@ ONE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
         (lambda: swarm.Box((1, 1, 1), open="+x"), ["open", "list of faces", "'+x'"]),
         (lambda: swarm.Box((1, 1, 1), open=["-x", "+x", "-y", "+y", "-z", "+z"]), ["open", "all six"]),
         (lambda: swarm.Box((1, 1, 1), side="outside", open=["+x"]), ["open", "outside", "['+x']"]),
+        (lambda: swarm.Sphere(1.0, friction=-0.1), ["friction must be 0 or more", "got -0.1"]),
+        (lambda: swarm.Sphere(1.0, friction=math.inf), ["friction must be a finite number", "got inf"]),
+        (lambda: swarm.Sphere(1.0, friction=None), ["friction must be a finite number", "got None"]),
+        (lambda: swarm.Sphere(1.0, temperature=-1), ["temperature must be 0 or more", "got -1"]),
+        (lambda: swarm.Sphere(1.0, temperature=math.nan), ["temperature must be a finite number", "got nan"]),
+        (lambda: swarm.Sphere(1.0, temperature="hot"), ["temperature must be a finite number", "got 'hot'"]),
+        (lambda: swarm.Sphere(1.0, temperature=300.0, accommodation=1.1), ["accommodation must be from 0 to 1", "1.1"]),
+        (lambda: swarm.Sphere(1.0, temperature=300.0, accommodation=math.nan), ["accommodation", "0 to 1, got nan"]),
+        (lambda: swarm.Sphere(1.0, accommodation=-0.5), ["accommodation must be from 0 to 1, got -0.5"]),
+        (lambda: swarm.Sphere(1.0, accommodation=0.5), ["with a temperature, got 0.5 and none; give temperature="]),
     ],
 )
 def test_errors_name_the_argument(build, parts):
@@ -130,7 +140,7 @@ TURNED = {
     "plane": lambda n, **turn: swarm.Plane(n, 0.3, **turn),
     "slab": lambda n, **turn: swarm.Slab(n, 0.3, n, **turn),
     "cylinder": lambda n, **turn: swarm.Cylinder(0.3, n, 0.7, **turn),
-    "cone": lambda n, **turn: swarm.Cone(0.3, n, **turn),
+    "cone": lambda n, **turn: swarm.Cone(0.3, n, friction=0.4, **turn),
     "paraboloid": lambda n, **turn: swarm.Paraboloid(0.3, n, **turn),
     "capsule": lambda n, **turn: swarm.Capsule(0.3, 0.4, n, side="outside", **turn),
     "box": lambda n, **turn: swarm.Box((0.3, 0.4, 0.5), n, restitution=0.5, **turn),
@@ -138,7 +148,7 @@ TURNED = {
     "formula": lambda n, **turn: swarm.Formula(
         "(x/a)**2 + y**2 + z**4 - b", parameters={"a": 0.5, "b": 1.5}, bounds=((-2,) * 3, (2,) * 3), center=n, **turn
     ),
-    "sphere": lambda n, **turn: swarm.Sphere(0.3, n, **turn),
+    "sphere": lambda n, **turn: swarm.Sphere(0.3, n, temperature=0, accommodation=0.5, **turn),
     "ellipsoid": lambda n, **turn: swarm.Ellipsoid((0.3, 0.4, 0.5), n, **turn),
     "torus": lambda n, **turn: swarm.Torus(0.7, 0.3, n, **turn),
 }

@@ -1,0 +1,86 @@
+"""Summaries show what lasts of contacts, and the heat of walls, only where there is some."""
+
+import h5py
+import numpy as np
+import pytest
+
+import swarm
+from swarm import summary
+from swarm.output import playback, plots, recording, series, sheet
+
+HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
+FRAMES = 3
+YOUNGER = ("sliding", "sliding_time", "wall_heat")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A trajectory in which nothing slides, and no wall gives heat: a start that never moves."""
+    rest = swarm.Particles([0.3, 0.0, 0.0], [0.0, 0.0, 0.0])
+    swarm.simulate(HOT, rest, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "run.h5", compile="never")
+    return tmp_path / "run.h5"
+
+
+def observed(path, **values):
+    """Put these observables, each with one entry a frame, into a trajectory."""
+    with h5py.File(path, "r+") as file:
+        for name, entries in values.items():
+            file[f"observables/{name}/value"][:] = entries
+
+
+LASTING = {
+    "sliding": [0, 3, 12],
+    "sliding_time": [0.0, 1.0, 3.4],
+    "wall_heat": [[0.0, 0.0], [0.5, 0.0], [0.75, -0.5]],
+    "total_energy": [1.0, 1.5, 1.25],
+}
+
+
+def test_where_nothing_lasts_no_word_is_said(path):
+    assert {"sliding", "wall heat"}.isdisjoint(summary.of_trajectory(path))
+    told = summary.numbers(path)
+    assert [told[name] for name in YOUNGER] == [0, 0.0, [0.0, 0.0]]
+
+
+def test_sliding_and_wall_heat_are_told(path):
+    observed(path, **LASTING)
+    rows, told = summary.of_trajectory(path), summary.numbers(path)
+    assert rows["sliding"] == "12 at the end, 3.4 s in all"
+    assert rows["wall heat"] == "0.75 J from surfaces[0], -0.5 J from surfaces[1]"
+    assert rows["energy drift"].startswith("0.0e+00")
+    assert [told[name] for name in YOUNGER] == [12, 3.4, [0.75, -0.5]]
+    assert told["energy_drift"] == 0.0
+
+
+def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
+    """And the heat of each thermal surface as a power."""
+    drawn = {}
+    monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
+    monkeypatch.setattr(plots.drawing, "lines", lambda axes, view, logarithm, curves: drawn.update({view: curves}))
+    recorded = path.with_suffix(".rrd")
+    for values in ({}, LASTING):
+        observed(path, **values)
+        with swarm.load(path) as trajectory:
+            recording.record(trajectory, recorded, recording.Settings(), overwrite=True)
+            plots.draw(trajectory, path.with_suffix(".png"))
+        by_plot, _ = dict(drawn), drawn.clear()
+        sheet.draw(playback.Playback(recorded), path.with_suffix(".png"), None, False)
+        for found in (by_plot, dict(drawn)):
+            assert ("sliding" in found) == bool(values)
+            assert list(found["heat"]) == ["0_sphere"]
+            times, power = found["heat"]["0_sphere"]
+            np.testing.assert_array_equal(times, [0.5, 1.0])
+            np.testing.assert_array_equal(power, [1.0, 0.5] if values else [0.0, 0.0])
+            if values:
+                np.testing.assert_array_equal(found["sliding"]["all particles"][1], LASTING["sliding"])
+        drawn.clear()
+
+
+def test_a_file_of_an_older_version_is_read(path):
+    with h5py.File(path, "r+") as file:
+        for name in YOUNGER:
+            del file[f"observables/{name}"]
+    assert {"sliding", "wall heat"}.isdisjoint(summary.of_trajectory(path))
+    assert summary.numbers(path)["sliding_time"] == 0.0
+    with swarm.load(path) as trajectory:
+        assert trajectory.observed().keys().isdisjoint(YOUNGER)
