@@ -25,12 +25,13 @@ MIDDLE = 1.0 - 4.0 * OUTER
 PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 SWEEPS = 40
-# r1 moves by round-off only.
-_STILL = 2.0 * _EPSILON
+# The last sweep moves r1 by no more than a step may be off, or than this part of itself: the next one would move it by
+# a hundredth of that.
+_STILL = 64.0 * _EPSILON
 # Round-off of what `defect` compares, in units of the last place of a coordinate.
 _NOISE = 8.0 * _EPSILON
-# The error of a composed step over its defect, measured on all surfaces of the tests: at most so much.
-_ERROR = 1.0
+# The error of a composed step over its defect: between a tenth and this on the surfaces of the tests.
+_ERROR = 0.5
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
@@ -300,21 +301,38 @@ class Swept(NamedTuple):
 
 
 @inlined
-def sweep(friction, held, chain, h, r0, r1, w):
-    """One sweep of (S): the step with the discrete gradients of the last r1."""
+def sweep(friction, held, chain, h, step, allowed):
+    """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w)."""
+    r0, r1, w = step
     taken = split(held, chain, r0, r1, w)
     u, grip = _dragged(friction, held, taken)
     end = r0 + h * u
     moved, size = total(absolute(end - r1)), total(absolute(r0))
     work = grip * math.sqrt(square(u)) if wall_laws.is_given(friction) else 0.0
     # w1 = 2 u - w0 + what friction has taken twice over: u = w0 - b n - grip t, so w1 = w0 - 2 b n - 2 grip t
-    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= _STILL * size))
+    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= select(_STILL * size > allowed, _STILL * size, allowed)))
 
 
 @inlined
 def part(k):
     """The length of step k of the composition, in units of its length."""
     return select(k == 2, MIDDLE, OUTER)
+
+
+@inlined
+def lead(k):
+    """How far the acceleration of step k is beyond the mean one of the step before, over its change in that.
+
+    Constant jerk: the mean of a step is that of its middle, and r1 - r0 - h v0 is h^2/2 times that of its first third.
+    """
+    first, middle, last = _lead(0.0, OUTER, OUTER), _lead(OUTER, OUTER, MIDDLE), _lead(MIDDLE, OUTER, OUTER)
+    turned = _lead(OUTER, MIDDLE, OUTER)
+    return select(k == 1, first, select(k == 2, middle, select(k == 3, turned, select(k == 4, last, 0.0))))
+
+
+@inlined
+def _lead(before, last, now):
+    return (0.5 * last + now / 3.0) / (0.5 * (before + last))
 
 
 # --- The end of a composed step --------------------------------------------------------------------------

@@ -5,6 +5,7 @@ another wall is met, the particle stops) is found one lane at a time: the step i
 ends at the instant to round-off. A lane writes what it gives its walls step by step, so that a halt changes no bit.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +25,13 @@ from .arrays import LANES, STRIDE, following_particle, speed2_scale, table, with
 # What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
 # speed it keeps across the walls, twice its energy, the square of its speed scale, its walls, and where a step is cut.
 R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12, 13, 14, 15, 16, 18
-# The step of this pass: its length and end, what presses there, its impulses, the work of friction.
-H, R1, V1, A1, PRESS1, IMPULSE, WORK = 19, 20, 23, 26, 29, 31, 33
-# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, its work; how
+# The step of this pass: its length and end, what presses there, its impulses, the work of friction,
+# and by how much it may be off.
+H, R1, V1, A1, PRESS1, IMPULSE, WORK, ALLOWED = 19, 20, 23, 26, 29, 31, 33, 34
+# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, its work, the
+# acceleration of the step before; how
 # often the step has been cut.
-FROM, W, END, W1, TAKEN, DRAG, TRIALS, ROWS = 34, 37, 40, 43, 46, 48, 49, 50
+FROM, W, END, W1, TAKEN, DRAG, BEFORE, TRIALS, ROWS = 35, 38, 41, 44, 47, 49, 50, 53, 54
 # Times that a step is cut before the particle is given up: it takes four or so.
 _MOST_TRIALS = 1000
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
@@ -119,24 +122,29 @@ def slide_block(kind, method, chain, gravity, share, lanes):
 @inlined
 def _compose(kind, method, chain, gravity, lanes, live):
     rows, moving = lanes.rows, lanes.moving
-    friction = methods.friction(method)
+    friction, tolerance = methods.friction(method), methods.sliding_tolerance(method)
     for i in range(live):
         v, a = column(rows, V, i), column(rows, A, i)
         h = select(rows[STEP, i] < rows[LEFT, i], rows[STEP, i], rows[LEFT, i])
         h = select(rows[CUT, i] < h, rows[CUT, i], h)
         stop = slides.longest(friction, v, a)
-        rows[H, i] = select(stop < h, stop, h)
+        h = select(stop < h, stop, h)
+        rows[H, i], rows[ALLOWED, i] = h, tolerance * math.sqrt(rows[SCALE2, i]) * h
         put(rows, R1, i, column(rows, R, i))
         put(rows, V1, i, v)
         put(rows, A1, i, a)
+        put(rows, BEFORE, i, a)
         rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i] = 0.0, 0.0, 0.0
         lanes.event[i] = 0
     for k in range(slides.PARTS):
         for i in range(live):
             r, v, h = column(rows, R1, i), column(rows, V1, i), slides.part(k) * rows[H, i]
+            last = column(rows, A1, i)
+            a = last + slides.lead(k) * (last - column(rows, BEFORE, i))
+            put(rows, BEFORE, i, last)
             put(rows, FROM, i, r)
             put(rows, W, i, accelerated(gravity, v, 0.5 * h))
-            put(rows, END, i, r + h * (v + (0.5 * h) * column(rows, A1, i)))
+            put(rows, END, i, r + h * (v + (0.5 * h) * a))
             moving[i] = h != 0.0
         for _sweep in range(slides.SWEEPS):
             some = False
@@ -162,7 +170,7 @@ def _sweep_lane(kind, friction, chain, lanes, i, part):
     rows, moving = lanes.rows, lanes.moving
     held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r0, end, w = column(rows, FROM, i), column(rows, END, i), column(rows, W, i)
-    swept = slides.sweep(friction, held, chain, part * rows[H, i], r0, end, w)
+    swept = slides.sweep(friction, held, chain, part * rows[H, i], (r0, end, w), rows[ALLOWED, i])
     on = moving[i]
     put(rows, END, i, either(on, swept.r, end))
     put(rows, W1, i, either(on, swept.w, column(rows, W1, i)))
@@ -180,7 +188,7 @@ def _sweep_lane(kind, friction, chain, lanes, i, part):
 @inlined
 def _end_steps(kind, method, chain, gravity, lanes, live):
     """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
-    rows, friction, tolerance = lanes.rows, methods.friction(method), methods.sliding_tolerance(method)
+    rows, friction = lanes.rows, methods.friction(method)
     for i in range(live):
         held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
         h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
@@ -191,7 +199,7 @@ def _end_steps(kind, method, chain, gravity, lanes, live):
         v1 = slides.split_at(held, chain, r1, column(rows, V1, i)).along
         v1 = slides.restored(v1, twice - 2.0 * potential(gravity, r1) - keep * keep, scale2)
         force = slides.force(friction, held, chain, gravity, r1, v1)
-        ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), tolerance * np.sqrt(scale2) * h)
+        ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), rows[ALLOWED, i])
         path = slides.Path(r0, v0, r1, v1, h)
         lifted = slides.lets_go(held, force.n, force.m)
         met = slides.meets(chain, 0.0, held, path, events.near(method, r1))
