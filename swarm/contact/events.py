@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, inlined, outlined, scratch
+from ..kernel.jit import by_type, inlined, outlined
 from ..kernel.vector import ZERO, Vec, cross, dot, norm, square
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls

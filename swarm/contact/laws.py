@@ -62,19 +62,19 @@ def _(chain, wall):
 @by_type
 def restitution(laws):
     """The restitution of all walls."""
-    return None
+    return
 
 
 @by_type
 def friction(laws):
     """The friction of all walls."""
-    return None
+    return
 
 
 @by_type
 def thermal(laws):
     """The temperatures of all walls."""
-    return None
+    return
 
 
 restitution.register(Laws, lambda laws: laws.restitution)

@@ -108,13 +108,13 @@ def holds(method):
 @by_type
 def laws(method):
     """The laws of its walls, or None."""
-    return None
+    return
 
 
 @by_type
 def friction(method):
     """Their friction, or None."""
-    return None
+    return
 
 
 @by_type

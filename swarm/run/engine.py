@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import observables
-from ..errors import RunError
-from ..lanes import arrays as lanes
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD, PHASES
 from ..contact.sliding import One, Two
+from ..errors import RunError
+from ..kernel.jit import next_of
+from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import meet, slide
-from ..kernel.jit import next_of
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
