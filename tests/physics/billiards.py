@@ -103,6 +103,26 @@ def sphere_billiard(position, velocity, radius, time):
         return np.array([float(c) for c in end]), np.array([float(c) for c in speed]), impacts
 
 
+def unfolded(r, v, angle, time):
+    """(position, velocity, impacts) in the wedge between y = 0 and the ray at `angle`, by mirror images.
+
+    The flight is straight through the images, each seen past one more wall, and is folded back into the wedge.
+    """
+    with mpmath.workdps(40):
+        side, x, y = mpmath.mpf(angle), mpmath.mpf(r[0]), mpmath.mpf(r[1])
+        z = mpmath.mpc(x, y) + mpmath.mpc(*v[:2].tolist()) * time
+        seen = mpmath.arg(z)
+        # Anticlockwise past the edge the angle goes beyond pi.
+        if x * v[1] - y * v[0] > 0.0 and seen < 0:
+            seen += 2 * mpmath.pi
+        turns = mpmath.floor(seen / side)
+        w, way = mpmath.mpc(*v[:2].tolist()), mpmath.expj(-2 * side * mpmath.ceil(turns / 2))
+        z, w = z * way, w * way
+        if int(turns) % 2:
+            z, w = mpmath.conj(z), mpmath.conj(w)
+        return np.array([float(z.real), float(z.imag)]), np.array([float(w.real), float(w.imag)]), abs(int(turns))
+
+
 def joachimsthal(particles, axes=AXES):
     """(r.Av)^2 - (v.Av)(r.Ar - 1): constant along every billiard in the ellipsoid r.Ar = 1."""
     a = 1.0 / np.array(axes)[:, None] ** 2

@@ -1,0 +1,138 @@
+"""Random numbers that depend on nothing but a seed, a particle and a count: the same for any threads and any resume.
+
+Only + - * / and sqrt of floats, and products of 32-bit words: plain Python, kernels and every machine have the same
+bits. No branches, and loops of fixed length: a lane loop vectorises.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from .jit import inlined, select
+from .vector import Vec
+
+# Philox4x32-10 of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
+_ROUNDS = 10
+_MULTIPLIERS = 0xD2511F53, 0xCD9E8D57
+_WEYL = 0x9E3779B9, 0xBB67AE85  # what is added to the key from round to round
+_WORD = 0xFFFFFFFF
+
+_HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
+# ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
+_LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
+_HALF_PI = 1.5707963267948966
+# (2^k, k): a number below 2^-k is scaled by 2^k, and then is below 1 still.
+_SCALES = tuple((float(1 << k), float(k)) for k in (32, 16, 8, 4, 2, 1))
+# 2/3, 2/5, ...: of 2 artanh(s) less its first term, from the last. Of the rest of a sine and a cosine likewise.
+_ARTANH = tuple(2.0 / n for n in range(21, 1, -2))
+_SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8, 0, -1))
+_COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(8, 1, -1))
+# Adding it and taking it away rounds a small float to an integer, ties to even.
+_ROUNDING = 1.5 * 2.0**52
+
+
+class Uniforms(NamedTuple):
+    """Four independent numbers in (0, 1), each of 52 bits: (k + 1/2)/2^52 for an integer k."""
+
+    normal: Any
+    tangential: Any
+    angle: Any
+    choice: Any
+
+
+@inlined
+def philox(counter, key):
+    """The four 32-bit words of Philox4x32-10 at a counter of four words and a key of two.
+
+    In kernels a product of two words may come out negative, as a signed number of the same 64 bits: with the masks that
+    makes no difference.
+    """
+    a, b, c, d = counter
+    k, l = key  # noqa: E741
+    for _ in range(_ROUNDS):
+        first, second = a * _MULTIPLIERS[0], c * _MULTIPLIERS[1]
+        a, b = ((second >> 32) & _WORD) ^ b ^ k, second & _WORD
+        c, d = ((first >> 32) & _WORD) ^ d ^ l, first & _WORD
+        k, l = (k + _WEYL[0]) & _WORD, (l + _WEYL[1]) & _WORD  # noqa: E741
+    return a, b, c, d
+
+
+@inlined
+def _fraction(high, low):
+    """(k + 1/2)/2^52 of the upper 20 bits of one word and another word: exact, and never 0 or 1."""
+    return ((high >> 12) * 2.0**32 + low + 0.5) * 2.0**-52
+
+
+@inlined
+def uniforms(seed, particle, number):
+    """The random numbers of one event of a particle.
+
+    Of the integers the lower 64 bits count, signed or not, and of `particle` the lower 32.
+    """
+    seed, particle, number = int(seed), int(particle), int(number)
+    key = seed & _WORD, (seed >> 32) & _WORD
+    low, high, who = number & _WORD, (number >> 32) & _WORD, particle & _WORD
+    a, b, c, d = philox((low, high, who, 0), key)
+    e, f, g, h = philox((low, high, who, 1), key)
+    return Uniforms(_fraction(a, b), _fraction(c, d), _fraction(e, f), _fraction(g, h))
+
+
+@inlined
+def logarithm(u):
+    """ln u for u in [2^-63, 1], to one unit in the last place.
+
+    u = 2^e (1 + f) with 1 + f within sqrt(1/2)..sqrt(2), and ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s =
+    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172, whose rounding is small beside f. What is
+    left out is 2 s^22/23 < 2e-18 of R.
+    """
+    e = 0.0
+    for scale, k in _SCALES:
+        small = u * scale < 1.0
+        u, e = select(small, u * scale, u), select(small, e - k, e)
+    small = u < _HALF_ROOT
+    f, e = select(small, u + u, u) - 1.0, select(small, e - 1.0, e)
+    s = f / (2.0 + f)
+    z = s * s
+    rest = 0.0
+    for coefficient in _ARTANH:
+        rest = z * (coefficient + rest)
+    return e * _LN2_HIGH - ((s * (f - rest) - e * _LN2_LOW) - f)
+
+
+@inlined
+def circle(u):
+    """cos(2 pi u) and sin(2 pi u) for u in [0, 1], to two units in the last place.
+
+    4 u = n + y with an integer n and |y| <= 1/2, both exact; Taylor's series at the angle pi y/2, at most pi/4, whose
+    next terms are below 2e-18; then a turn by n quarters.
+    """
+    turns = 4.0 * u
+    n = (turns + _ROUNDING) - _ROUNDING
+    a = (turns - n) * _HALF_PI
+    z = a * a
+    sine, cosine = 0.0, 0.0
+    for coefficient in _SINE:
+        sine = z * (coefficient + sine)
+    for coefficient in _COSINE:
+        cosine = z * (coefficient + cosine)
+    sine, cosine = a + a * sine, 1.0 - z * (0.5 - cosine)
+    odd = (n == 1.0) | (n == 3.0)
+    x, y = select(odd, sine, cosine), select(odd, cosine, sine)
+    return select((n == 1.0) | (n == 2.0), -x, x), select((n == 2.0) | (n == 3.0), -y, y)
+
+
+@inlined
+def flux_maxwellian(n, speed2, u):
+    """The velocity with which a particle leaves a diffuse wall with the unit normal n, against n.
+
+    `speed2` is k_B T/m. The normal speed has the distribution 1 - exp(-w^2/(2 speed2)) of what passes a plane in a gas
+    at rest, the two tangential components are Gaussian (Box and Muller). The tangents are those of Duff et al.,
+    "Building an orthonormal basis, revisited" (JCGT 2017).
+    """
+    sign = math.copysign(1.0, n.z)
+    a = -1.0 / (sign + n.z)
+    b = n.x * n.y * a
+    first = Vec(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x)
+    second = Vec(b, sign + n.y * n.y * a, -n.y)
+    cosine, sine = circle(u.angle)
+    along = math.sqrt(-2.0 * speed2 * logarithm(u.tangential))
+    return along * cosine * first + along * sine * second - math.sqrt(-2.0 * speed2 * logarithm(u.normal)) * n
