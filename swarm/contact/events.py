@@ -20,6 +20,8 @@ PHASES = 6
 FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
 # A particle leaves a wall slower than this part of its own speed: its hops are 1e-4 of a crossing long.
 GRAZING = 5e-5
+# Of a velocity, the part across the walls that is none: its square is round-off of the energy.
+_NO_HOP = 1e-7
 # Parts of an acceleration, of a length and of a time that are none.
 _PRESSED, _NEAR, _INSTANT = 1e-12, 1e-13, 1e-9
 # Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
@@ -131,10 +133,16 @@ def enter(rules, chain, gravity, wall, p):
             return Next(CAREFUL, v, 0.0, twice, wall, -1.0, impulse, 0.0)
         return flies
     if not _loses(rules, wall):
-        return Next(HELD, along, max(away, 0.0), twice, wall, -1.0, impulse, 0.0)
+        return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together.
     e = wall_laws.restitution_of(rules.laws, wall)
     return Next(HELD, along, 0.0, twice - away * away, wall, -1.0, impulse, hop / (1.0 - e))
+
+
+@inlined
+def _kept(across, p):
+    """The speed across its walls that a particle keeps while it slides."""
+    return across if across > _NO_HOP * math.sqrt(own_speed2(p)) else 0.0
 
 
 @outlined
@@ -151,7 +159,7 @@ def _on_edge(rules, chain, gravity, two, p):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
         return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second, 0.0, 0.0)
-    return Next(EDGE, taken.along, math.sqrt(across2), p.twice, two.first, two.second, 0.0, 0.0)
+    return Next(EDGE, taken.along, _kept(math.sqrt(across2), p), p.twice, two.first, two.second, 0.0, 0.0)
 
 
 # --- While it slides -------------------------------------------------------------------------------------
@@ -181,7 +189,7 @@ def after_meeting(rules, held, chain, gravity, wall, p):
         if found.phase != FLYING:
             return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse, 0.0)
     across2 = max(square(p.v) - square(taken.along), 0.0)
-    keep, twice = math.sqrt(across2), p.twice
+    keep, twice = _kept(math.sqrt(across2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
     other = sliding.second(held)
@@ -205,7 +213,7 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
         > 0.0
     ):
         return edge
-    keep, twice = max(away, 0.0), p.twice
+    keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
         keep, twice = 0.0, p.twice - away * away
     return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
@@ -218,7 +226,7 @@ def _(held, rules, chain, gravity, wall, p):
 
 @outlined
 def careful(rules, chain, gravity, wall, p, impulse):
-    """A short step of a particle that several walls hold: (r, v, time used, twice its energy). Adds to impulse[:, 0]."""
+    """A short step of a particle that several walls hold, as a `Landing`. Adds to impulse[:, 0]."""
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
     contacts = touching.Contacts(None, rules.laws, shortest, _TOUCH * rules.size)
     return touching.impact(

@@ -3,8 +3,8 @@
 With w0 = v0 + h G/2 and P the part of w0 that the walls allow, a step of length h is
     r1 = r0 + h u,   w1 = w0 - 2 sum b n - 2 (sum mu b) u/|u|,   u = s P,   s = 1 - (sum mu b)/|P|,            (S)
 where w0 = P + sum b n and n is along the discrete gradient D(r0, r1) of each wall that holds the particle. Without
-friction |w1| = |w0| whatever the error of n; with it the particle loses 2 (sum mu b) |u| of |w|^2, the work of Coulomb's
-force along r1 - r0. The step is symmetric, so Suzuki's composition p h, p h, (1 - 4p) h, p h, p h is of fourth order.
+friction |w1| = |w0| whatever the error of n; with it |w|^2/2 falls by 2 (sum mu b) |u|, the work of friction along
+r1 - r0. The step is symmetric, so Suzuki's composition p h, p h, (1 - 4p) h, p h, p h is of fourth order.
 Sources: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 """
 
@@ -25,13 +25,13 @@ MIDDLE = 1.0 - 4.0 * OUTER
 PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 SWEEPS = 40
-# The last sweep moves r1 by no more than a step may be off, or than this part of itself: the next one would move it by
-# a hundredth of that.
-_STILL = 64.0 * _EPSILON
+# The last sweep moves r1 by no more than this part of itself, or of what a step may be off: the next one would move it
+# by a hundredth of that.
+_STILL, _SLACK = 64.0 * _EPSILON, 0.1
 # Round-off of what `defect` compares, in units of the last place of a coordinate.
 _NOISE = 8.0 * _EPSILON
 # The error of a composed step over its defect: between a tenth and this on the surfaces of the tests.
-_ERROR = 0.5
+_ERROR = 1.0
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
@@ -307,10 +307,11 @@ def sweep(friction, held, chain, h, step, allowed):
     taken = split(held, chain, r0, r1, w)
     u, grip = _dragged(friction, held, taken)
     end = r0 + h * u
-    moved, size = total(absolute(end - r1)), total(absolute(r0))
+    moved, least = total(absolute(end - r1)), _STILL * total(absolute(r0))
+    least = select(least > _SLACK * allowed, least, _SLACK * allowed)
     work = grip * math.sqrt(square(u)) if wall_laws.is_given(friction) else 0.0
     # w1 = 2 u - w0 + what friction has taken twice over: u = w0 - b n - grip t, so w1 = w0 - 2 b n - 2 grip t
-    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= select(_STILL * size > allowed, _STILL * size, allowed)))
+    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= least))
 
 
 @inlined

@@ -79,6 +79,7 @@ class Share(NamedTuple):
     draws: Draws
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
+    seed: int  # of random numbers
 
 
 def empty(walls: int) -> Lanes:
@@ -226,6 +227,15 @@ def move(chain, lanes, source, target):
     for s in range(walls.length(chain)):
         impulse[s, target] = impulse[s, source]
     particle[target] = particle[source]
+
+
+@inlined
+def heat(state, i, wall, before, after):
+    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
+    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
+    pending = state.energy[i] - 0.5 * before
+    state.energy[i] = 0.5 * after + pending
+    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]
 
 
 # --- Between the kernels of a frame ----------------------------------------------------------------------

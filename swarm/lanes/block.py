@@ -7,10 +7,13 @@ depend on which lane or block a particle is in.
 
 from typing import NamedTuple
 
+import numpy as np
+
 from ..contact.events import FLYING
-from ..kernel.gravity import Gravity, Nothing, as_vector
+from ..contact.heat import Draw, exchange
+from ..kernel.gravity import Gravity, Nothing, as_vector, potential
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, select
-from ..kernel.vector import column, put
+from ..kernel.vector import column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import flights
@@ -33,6 +36,9 @@ from .arrays import (
     move,
     retire,
     with_distances,
+)
+from .arrays import (
+    heat as book_heat,
 )
 from .solve import solution, solve
 
@@ -71,7 +77,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
             leave(lanes, live)
             return Status.INTERRUPTED.value, live, drawn
         passes += 1
-        some_arrived, some_hard = _pass(method, chain, gravity, state.multipliers, lanes, live)
+        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
         if some_hard:
             status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
@@ -115,11 +121,12 @@ def _marked(lanes, live):
 
 
 @inlined
-def _pass(method, chain, gravity, multipliers, lanes, live):
+def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     _fly(gravity, method, chain, lanes, live)
     unknown = methods.solves(method)
-    solve(unknown, method, chain, gravity, multipliers, lanes, live)
+    solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
+    _exchange_heat(methods.thermal(method), chain, gravity, share, lanes, live)
     some_arrived, some_hard = False, False
     for i in range(live):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
@@ -187,6 +194,31 @@ def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
     hit = flights.end_fall(chain, lanes.course, 0, i)
     return (hit.wall < 0.0) & (hit.time < lanes.rows[LEFT, i])
+
+
+@by_type
+def _exchange_heat(thermal, chain, gravity, share, lanes, live):
+    """The impacts on thermal walls that accommodate their particles."""
+
+
+@_exchange_heat.register(walls.Chain)
+def _(thermal, chain, gravity, share, lanes, live):
+    rows, state = lanes.rows, share.state
+    for i in range(live):
+        wall, p = lanes.wall[i], index(lanes.particle[i])
+        if wall >= 0.0:
+            r, v = column(rows, R, i), column(rows, V, i)
+            draw = Draw(share.seed, lanes.particle[i], state.impacts[p] + np.int64(rows[HITS, i]))
+            left = exchange(thermal, chain, wall, (r, v), state.mass[p], draw)
+            if left.happens:
+                before, after = rows[OWN, i], square(left.v) + 2.0 * potential(gravity, r)
+                book_heat(state, p, int(wall), before, after)
+                put(rows, V, i, left.v)
+                rows[OWN, i] = after
+                rows[HITS, i] += 1.0
+                lanes.impulse[int(wall), i] += left.impulse
+                # The contact is done, unless a wall at 0 K holds the particle.
+                lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 
 
 @inlined

@@ -1,15 +1,19 @@
-"""Particles at a wall where their contact lasts, or that they meet while they slide: what becomes of them, one by one."""
+"""Particles at a wall where their contact lasts, or that they meet while they slide: what becomes of each."""
 
 import numpy as np
 
 from ..contact import events
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING
+from ..contact.heat import Draw, exchange
 from ..contact.sliding import One, Two
-from ..kernel.jit import inlined, kernel, outlined, scratch
-from ..kernel.vector import column, put
+from ..kernel.gravity import potential
+from ..kernel.jit import by_type_outlined, inlined, kernel, outlined, scratch
+from ..kernel.vector import column, put, square
+from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from .arrays import following_particle, speed2_scale
+from .arrays import heat as book_heat
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
@@ -40,6 +44,8 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
+    if first >= 0.0 and _exchange_heat(methods.thermal(method), chain, gravity, share, i):
+        return True
     if again > _OFTEN:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -69,6 +75,29 @@ def _decide(method, chain, gravity, share, i):
     return again < _MOST
 
 
+@by_type_outlined
+def _exchange_heat(thermal, chain, gravity, share, i):
+    """Whether a thermal wall accommodates a sliding particle: then it flies."""
+    return False
+
+
+@_exchange_heat.register(walls.Chain)
+def _(thermal, chain, gravity, share, i):
+    state, contacts = share.state, share.state.contacts
+    wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
+    left = exchange(thermal, chain, wall, (r, v), state.mass[i], Draw(share.seed, i, state.impacts[i]))
+    if not left.happens:
+        return False
+    book_heat(state, i, int(wall), 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r))
+    put(state.velocity, 0, i, left.v)
+    state.impacts[i] += 1
+    state.impulse[int(wall), i] += left.impulse * state.mass[i]
+    contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i] = -1.0, -1.0, 0.0
+    share.phase[i] = FLYING
+    share.pending[FLYING] += 1
+    return True
+
+
 @inlined
 def _lose(state, i, before, after):
     """Book what is left of twice the energy per mass."""
@@ -79,7 +108,7 @@ def _lose(state, i, before, after):
 
 @kernel
 def careful_block(method, chain, gravity, share):
-    """A short step of each particle that several walls hold, of those that a thread draws: (status, particle, drawn)."""
+    """A short step of each particle that several walls hold: (status, particle, drawn)."""
     following, stop, drawn = 0, 0, 0
     while True:
         following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)

@@ -53,6 +53,8 @@ class Lanes(NamedTuple):
 
 # What a step may end with.
 LIFTED, MET, FAILED, STOPPED = 1, 2, 4, 8
+# What a lane does that cannot go on.
+_GIVEN_UP = -1
 
 
 def empty() -> Lanes:
@@ -77,43 +79,64 @@ def slide_block(kind, method, chain, gravity, share, lanes):
     lanes = with_distances(lanes)
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
-        following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
-        if following == stop:
+        following, stop, drawn, loaded = _refill(
+            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn)
+        )
+        if not loaded:
             break
-        if _load(kind, method, chain, gravity, share, lanes, live, following):
-            live += 1
-        following += 1
+        live += 1
     while live > 0:
         if passes >= share.halt[0]:
-            for i in range(live):
-                _retire(kind, chain, share, lanes, i, _phase(kind))
+            _leave(kind, chain, share, lanes, live)
             return Status.INTERRUPTED.value, 0, drawn
         passes += 1
         _compose(kind, method, chain, gravity, lanes, live)
         _end_steps(kind, method, chain, gravity, lanes, live)
         for i in range(live):
-            _account(kind, method, share.state, lanes, i)
+            _account(method, share.state, lanes, i)
+        # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
-            phase = _phase(kind)
-            if lanes.event[i] != 0:
-                phase = _decide(kind, method, chain, gravity, share.state, lanes, i)
-                if phase < 0:
-                    return Status.STALLED.value, lanes.particle[i], drawn
-            if not lanes.rows[LEFT, i] > 0.0:
-                phase = ARRIVED
+            phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
+            if phase == _GIVEN_UP:
+                return Status.STALLED.value, lanes.particle[i], drawn
             if phase != _phase(kind):
                 _retire(kind, chain, share, lanes, i, phase)
-                loaded = False
-                while not loaded:
-                    following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
-                    if following == stop:
-                        break
-                    loaded = _load(kind, method, chain, gravity, share, lanes, i, following)
-                    following += 1
+                following, stop, drawn, loaded = _refill(
+                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn)
+                )
                 if not loaded:
                     live -= 1
                     _move(lanes, live, i)
     return Status.DONE.value, 0, drawn
+
+
+@outlined
+def _leave(kind, chain, share, lanes, live):
+    """The live lanes back into their particles, which go on when the frame does."""
+    for i in range(live):
+        _retire(kind, chain, share, lanes, i, _phase(kind))
+
+
+@outlined
+def _refill(kind, method, chain, gravity, share, lanes, lane, at):
+    """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one."""
+    following, stop, drawn = at
+    while True:
+        following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
+        if following == stop:
+            return following, stop, drawn, False
+        following += 1
+        if _load(kind, method, chain, gravity, share, lanes, lane, following - 1):
+            return following, stop, drawn, True
+
+
+@inlined
+def _next_phase(kind, method, chain, gravity, state, lanes, i):
+    """What a lane does after a step."""
+    phase = _phase(kind)
+    if lanes.event[i] != 0:
+        phase = _decide(kind, method, chain, gravity, state, lanes, i)
+    return phase if lanes.rows[LEFT, i] > 0.0 or phase == _GIVEN_UP else ARRIVED
 
 
 # --- One composed step of every lane ---------------------------------------------------------------------
@@ -129,7 +152,9 @@ def _compose(kind, method, chain, gravity, lanes, live):
         h = select(rows[CUT, i] < h, rows[CUT, i], h)
         stop = slides.longest(friction, v, a)
         h = select(stop < h, stop, h)
-        rows[H, i], rows[ALLOWED, i] = h, tolerance * math.sqrt(rows[SCALE2, i]) * h
+        # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
+        speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
+        rows[H, i], rows[ALLOWED, i] = h, tolerance * speed * h
         put(rows, R1, i, column(rows, R, i))
         put(rows, V1, i, v)
         put(rows, A1, i, a)
@@ -237,7 +262,7 @@ def _(friction, fine, v, scale2):
 
 
 @inlined
-def _account(kind, method, state, lanes, i):
+def _account(method, state, lanes, i):
     """What a step that is taken gives to the state."""
     rows, p = lanes.rows, lanes.particle[i]
     if not lanes.moving[i]:
@@ -320,7 +345,7 @@ def _retire(kind, chain, share, lanes, i, phase):
     """A lane back into its particle, for what it does next."""
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
     v, keep = column(rows, V, i), rows[KEEP, i]
-    slid = phase == HELD or phase == EDGE or phase == ARRIVED
+    slid = phase not in (FLYING, _GIVEN_UP)
     if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
         held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
         taken = slides.split_at(held, chain, column(rows, R, i), v)
@@ -352,63 +377,63 @@ def _move(lanes, source, target):
 
 @outlined
 def _decide(kind, method, chain, gravity, state, lanes, i):
-    """What a lane does whose step may not be taken as it is: its phase, or -1 where it cannot go on.
+    """What a lane does whose step may not be taken as it is.
 
     The step is cut where the event is, and taken again, until the event is at its start.
     """
     rows, event, h = lanes.rows, lanes.event[i], lanes.rows[H, i]
-    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-    r, v, scale2 = column(rows, R, i), column(rows, V, i), rows[SCALE2, i]
     if event & STOPPED:
-        rows[TWICE, i] -= square(v)
-        _lose(state, lanes, i, square(v))
+        v2 = square(column(rows, V, i))
+        rows[TWICE, i] -= v2
+        _lose(state, lanes, i, v2)
         put(rows, V, i, ZERO)
         return _set_going(kind, method, chain, gravity, state, lanes, i)
     if event & FAILED:
-        rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
-        crossing = method.size / np.sqrt(scale2)
-        if h > _SHORTEST * crossing:
-            return _phase(kind)
-        # Over the edge of a solid: there is no wall beyond it.
-        end = r + h * v
-        if walls.outside(chain, -1.0, end) or not h > 0.0:
-            return -1
-        put(rows, R, i, end)
-        rows[LEFT, i] -= h
-        return FLYING
-    particle = events.Particle(r, v, rows[LEFT, i], rows[TWICE, i], scale2)
-    none, cut = events.weightless(method, gravity, particle), 1.0
+        return _shorten(kind, method, chain, lanes, i)
+    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    r, v = column(rows, R, i), column(rows, V, i)
+    cut = 1.0
     if event & LIFTED:
-        phase, part = _lift(kind, lanes, i, none)
-        if phase >= 0:
+        particle = events.Particle(r, v, rows[LEFT, i], rows[TWICE, i], rows[SCALE2, i])
+        phase, cut = _lift(kind, lanes, i, events.weightless(method, gravity, particle))
+        if phase != _phase(kind):
             return phase
-        cut = part
     if event & MET:
-        near = events.near(method, r)
         path = slides.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
-        met = events.arrival(chain, 0.0, held, path, near)
+        met = events.arrival(chain, 0.0, held, path, events.near(method, r))
         if met.time == 0.0:
             state.contacts.met[lanes.particle[i]] = met.wall
             put(rows, R, i, walls.settle(chain, met.wall, r))
             return EVENT
         cut = min(cut, met.time)
-    rows[CUT, i] = cut * h
-    if not event & LIFTED and cut == 1.0:
-        # A cubic through its ends passes near a wall, but does not meet it.
-        rows[CUT, i] = _RETRY * h
+    # Where a cubic through the ends of the step passes near a wall, but does not meet it, a shorter one is farther.
+    rows[CUT, i] = h * (cut if cut < 1.0 else _RETRY)
     rows[TRIALS, i] += 1.0
-    if rows[TRIALS, i] > _MOST_TRIALS:
-        return -1
-    return _phase(kind)
+    return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _GIVEN_UP
+
+
+@outlined
+def _shorten(kind, method, chain, lanes, i):
+    """A lane whose step has no solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
+    rows, h = lanes.rows, lanes.rows[H, i]
+    rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
+    if h > _SHORTEST * method.size / math.sqrt(rows[SCALE2, i]):
+        return _phase(kind)
+    end = column(rows, R, i) + h * column(rows, V, i)
+    if walls.outside(chain, -1.0, end) or not h > 0.0:
+        return _GIVEN_UP
+    put(rows, R, i, end)
+    rows[LEFT, i] -= h
+    return FLYING
 
 
 @by_type
 def _lift(kind, lanes, i, none):
-    """(what a lane does that its wall lets go now, or -1 and the part of the step after which it does)."""
+    """What a lane does that its walls let go now, or the part of the step after which they do: (phase, part)."""
     rows = lanes.rows
     if rows[PRESS, i] <= none:
         return FLYING, 0.0
-    return -1, _part(rows[PRESS, i], rows[PRESS1, i])
+    return _phase(kind), _part(rows[PRESS, i], rows[PRESS1, i])
 
 
 @_lift.register(slides.Two)
@@ -421,7 +446,7 @@ def _(kind, lanes, i, none):
     if rows[PRESS + 1, i] <= none and rows[PRESS1 + 1, i] < 0.0:
         rows[WALL + 1, i] = -1.0
         return HELD, 0.0
-    return -1, min(_part(rows[PRESS, i], rows[PRESS1, i]), _part(rows[PRESS + 1, i], rows[PRESS1 + 1, i]))
+    return _phase(kind), min(_part(rows[PRESS, i], rows[PRESS1, i]), _part(rows[PRESS + 1, i], rows[PRESS1 + 1, i]))
 
 
 @inlined

@@ -118,6 +118,12 @@ def friction(method):
 
 
 @by_type
+def thermal(method):
+    """Their temperatures, or None."""
+    return
+
+
+@by_type
 def sliding_tolerance(method):
     """The relative error of a crossing, of a particle that slides."""
     return 0.0

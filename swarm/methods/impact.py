@@ -156,6 +156,7 @@ def _(method):
 contract.holds.register(Reflection, lambda method: True)
 contract.holds.register(Chord, lambda method: True)
 contract.friction.register(Reflection, lambda method: wall_laws.friction(method.laws))
+contract.thermal.register(Reflection, lambda method: wall_laws.thermal(method.laws))
 contract.sliding_tolerance.register(Reflection, lambda method: method.sliding_tolerance)
 contract.sliding_tolerance.register(Chord, lambda method: method.sliding_tolerance)
 

@@ -42,6 +42,7 @@ _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 _PARTS = 4
 # (status, particle, what a halt left in the lanes)
 _End = tuple[int, int, lanes.Halted | None]
+_DONE: _End = (int(Status.DONE), 0, None)
 
 
 class Run:
@@ -49,9 +50,9 @@ class Run:
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always",
+        compile: str = "always", seed: int = 0,
     ) -> None:  # fmt: skip
-        n, self._owners = len(particles), scene.owners()
+        n, self._owners, laws = len(particles), scene.owners(), scene.laws()
         self.state = State(
             particles.position,
             particles.velocity,
@@ -60,9 +61,10 @@ class Run:
             np.empty(n),
             np.zeros(n, np.int64),
             np.zeros((len(self._owners), n)),
-            np.zeros(0 if scene.laws() is None else n),
+            np.zeros(0 if laws is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
             _no_contacts(n) if method.may_slide() else None,
+            None if laws is None or laws.thermal is None else np.zeros((len(self._owners), n)),
         )
         self._scene, self._method = scene, method
         self._numbers, self._law = method.numbers(scene), method.law()
@@ -78,6 +80,8 @@ class Run:
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._halt = np.full(1, blocks.NEVER)
         self._phase = np.zeros(n, np.int8)
+        # Kernels have signed numbers, of the same 64 bits.
+        self._seed = seed - 2**64 if seed >= 2**63 else seed
         self._order = np.arange(self._draws)
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(len(self._owners))
@@ -151,7 +155,7 @@ class Run:
         if not self._kinds:
             return self._part(span, draws, mine)
         # Who flies first would have drawn everything when the others are ready to slide.
-        some, end = max(1, self._draws // (_PARTS * self._threads)), (int(Status.DONE), 0, None)
+        some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
         while end[0] == Status.DONE:
             first = min(some * next_of(self._ticket), self._draws)
             if first == self._draws:
@@ -249,7 +253,7 @@ class Run:
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """What a thread shares with the others, and its counts."""
         pending = np.zeros(PHASES, np.int64)
-        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span)
+        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed)
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""

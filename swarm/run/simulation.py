@@ -161,7 +161,9 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
     with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
         session.prepare(task)
         _require_room(task, session)
-        run = Run(scene, task.particles, method, options.thread_count(), options.block_size, options.compile)
+        run = Run(
+            scene, task.particles, method, options.thread_count(), options.block_size, options.compile, options.seed
+        )
         runs.append(run)
         session.restore(run)
         writer = writer_of(task, session, recorder)
