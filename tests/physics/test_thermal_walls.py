@@ -17,7 +17,8 @@ pytestmark = pytest.mark.physics
 
 BOLTZMANN = 1.380649e-23
 ARGON = 6.6e-26
-COLD, HOT = 300.0, 600.0
+# Temperatures are kT [J].
+COLD, HOT = 300.0 * BOLTZMANN, 600.0 * BOLTZMANN
 ERRORS = 3.0
 # Kolmogorov's limit: sqrt(n) D is below it with the probability of three standard errors.
 KOLMOGOROV = 1.82
@@ -26,7 +27,7 @@ WIDTH = 1.0
 
 def spread(temperature):
     """s = sqrt(kT/m) [m/s]."""
-    return math.sqrt(BOLTZMANN * temperature / ARGON)
+    return math.sqrt(temperature / ARGON)
 
 
 def kolmogorov(sample, distribution):
@@ -71,10 +72,10 @@ def test_what_leaves_a_diffuse_wall():
     assert kolmogorov(one, gaussian(s)) <= KOLMOGOROV
     assert kolmogorov(two, gaussian(s)) <= KOLMOGOROV
     energy = 0.5 * ARGON * (out**2 + one**2 + two**2)
-    error = math.sqrt(2.0 / n) * BOLTZMANN * HOT
-    assert abs(energy.mean() - 2.0 * BOLTZMANN * HOT) <= ERRORS * error
+    error = math.sqrt(2.0 / n) * HOT
+    assert abs(energy.mean() - 2.0 * HOT) <= ERRORS * error
     # Gamma distributed, of shape 2: the fourth central moment is 24 (kT)^4, so that of the variance is 20/n.
-    assert abs(energy.var() / (BOLTZMANN * HOT) ** 2 - 2.0) <= ERRORS * math.sqrt(20.0 / n)
+    assert abs(energy.var() / (HOT) ** 2 - 2.0) <= ERRORS * math.sqrt(20.0 / n)
     for a, b in ((out, one), (out, two), (one, two), (out**2, one**2), (one**2, two**2)):
         assert abs(np.corrcoef(a, b)[0, 1]) <= ERRORS / math.sqrt(n)
     # From one particle to the next.
@@ -159,16 +160,14 @@ def test_heat_flows_between_plates():
     # In the stationary gas the mean number of impacts is exactly that; particles are independent.
     assert abs(impacts.mean() - 2.0 * trips) <= ERRORS * impacts.std() / math.sqrt(n)
     cold, hot = result.observables["wall_heat"][-1]
-    quantum = BOLTZMANN * (HOT - COLD)
+    quantum = HOT - COLD
     # What varies: how often, and with what energy each comes and goes.
-    noise = math.hypot(
-        impacts.std() * math.sqrt(n) * quantum, BOLTZMANN * math.sqrt(2.0 * n * trips * (HOT**2 + COLD**2))
-    )
+    noise = math.hypot(impacts.std() * math.sqrt(n) * quantum, math.sqrt(2.0 * n * trips * (HOT**2 + COLD**2)))
     assert noise < 0.02 * 2.0 * quantum * n * trips
     assert abs(hot - 2.0 * quantum * n * trips) <= ERRORS * noise
     assert abs(cold + 2.0 * quantum * n * trips) <= ERRORS * noise
     # A trip at a time, without the noise of how many there are: half of the impacts of each are on the hot plate.
-    noise = BOLTZMANN * math.sqrt(2.0 * n * trips * (HOT**2 + COLD**2)) + n * quantum
+    noise = math.sqrt(2.0 * n * trips * (HOT**2 + COLD**2)) + n * quantum
     assert abs(hot - quantum * impacts.sum()) <= ERRORS * noise
 
 
@@ -186,7 +185,7 @@ def test_the_gas_between_plates_is_stationary():
         assert kolmogorov(w[part], gaussian(s)) <= KOLMOGOROV
     assert kolmogorov(x, lambda a: a / WIDTH + 0.5) <= KOLMOGOROV
     energy = 0.5 * ARGON * (u**2 + v**2 + w**2)
-    mean = 1.5 * BOLTZMANN * math.sqrt(HOT * COLD)
+    mean = 1.5 * math.sqrt(HOT * COLD)
     assert abs(energy.mean() - mean) <= ERRORS * energy.std() / math.sqrt(n)
 
 
@@ -242,7 +241,5 @@ def test_a_particle_has_its_own_numbers():
 
 def test_resumed_is_whole(tmp_path):
     """The number of its next impact is in the checkpoint."""
-    # In units of 1 J: particles of some kg at some m/s.
-    box = swarm.Box((0.5, 0.4, 0.3), temperature=1.0 / BOLTZMANN, accommodation=0.7)
-    scene = swarm.Scene([box])
+    scene = swarm.Scene([swarm.Box((0.5, 0.4, 0.3), temperature=1.0, accommodation=0.7)])
     assert require_resumed_is_whole(tmp_path, scene, swarm.Impact(), n=300, every=20.0) >= 6
