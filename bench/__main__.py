@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, endurance, report, scenes, stability, throughput
+from . import accuracy, bars, compare, contacts, endurance, report, scenes, stability, throughput
 from .peers import race
 
 
@@ -21,6 +21,7 @@ def main() -> None:
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
+    commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -38,6 +39,7 @@ def main() -> None:
         "bars": bars,
         "peers": race,
         "scenes": scenes,
+        "contacts": contacts,
         "endurance": endurance,
     }
     before = report.stolen()
