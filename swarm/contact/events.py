@@ -134,9 +134,13 @@ def enter(rules, chain, gravity, wall, p):
         return flies
     if not _loses(rules, wall):
         return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
-    # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together.
-    e = wall_laws.restitution_of(rules.laws, wall)
-    return Next(HELD, along, 0.0, twice - away * away, wall, -1.0, impulse, hop / (1.0 - e))
+    # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
+    # the particle than to one that slides, and friction as much less.
+    e, speed = wall_laws.restitution_of(rules.laws, wall), norm(along)
+    spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
+    faster = along * (1.0 + spared / speed) if speed > spared else along
+    twice += square(faster) - square(along) - away * away
+    return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse - away, hop / (1.0 - e))
 
 
 @inlined

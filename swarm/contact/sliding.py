@@ -1,10 +1,10 @@
 """Sliding along one wall, or along the edge of two: the converged step of the scheme, composed to fourth order.
 
 With w0 = v0 + h G/2 and P the part of w0 that the walls allow, a step of length h is
-    r1 = r0 + h u,   w1 = w0 - 2 sum b n - 2 (sum mu b) u/|u|,   u = s P,   s = 1 - (sum mu b)/|P|,            (S)
-where w0 = P + sum b n and n is along the discrete gradient D(r0, r1) of each wall that holds the particle. Without
-friction |w1| = |w0| whatever the error of n; with it |w|^2/2 falls by 2 (sum mu b) |u|, the work of friction along
-r1 - r0. The step is symmetric, so Suzuki's composition p h, p h, (1 - 4p) h, p h, p h is of fourth order.
+    r1 = r0 + h P,   w1 = 2 P - w0,   w0 = P + sum b n,                                                        (S)
+where n is along the discrete gradient D(r0, r1) of each wall that holds the particle: |w1| = |w0| whatever the error of
+n. Coulomb's friction slows the particle for h/2 before the step and for h/2 after it. Both are symmetric, so Suzuki's
+composition p h, p h, (1 - 4p) h, p h, p h is of fourth order.
 Sources: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 """
 
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, inlined, select
-from ..kernel.vector import ZERO, Vec, absolute, cross, dot, square, total
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, either, square, total
 from ..surfaces import contract
 from ..surfaces import fold as walls
 from . import laws as wall_laws
@@ -35,7 +35,7 @@ _ERROR = 1.0
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
-_FAST = 1e-3
+_FAST = 1e-6
 _TINY = 2.2250738585072014e-308
 # What sliding asks of every wall.
 NEEDS = (
@@ -197,19 +197,53 @@ def _(held, friction, c):
     return wall_laws.number_of(friction, held.second) * c
 
 
+class Slowed(NamedTuple):
+    """A velocity after friction, and what it has taken of |v|^2."""
+
+    v: Vec
+    lost: float
+
+
 @by_type
-def _dragged(friction, held, taken):
-    """u = s P, and sum mu b"""
-    grip = _grip(friction, held, taken.b, taken.c)
-    speed2 = square(taken.along)
-    moving = speed2 > 0.0
-    speed = math.sqrt(select(moving, speed2, 1.0))
-    return taken.along * select(moving, 1.0 - grip / speed, 0.0), grip
+def slow(friction, held, chain, gravity, r, motion, h):
+    """The velocity after a time h of friction alone; `motion` is (v, the direction in which the particle slides).
+
+    The force of the walls is k s^2 + c at the speed s: the midpoint rule for ds/dt = -(k s^2 + c), with the sum of
+    mu k and mu c of the walls, is a quadratic equation. Back in time gravity may turn a slow particle round between two
+    of these: s is then below 0.
+    """
+    return Slowed(motion[0], 0.0)
 
 
-@_dragged.register(type(None))
-def _(friction, held, taken):
-    return taken.along, 0.0
+@slow.register(walls.Chain)
+def _(friction, held, chain, gravity, r, motion, h):
+    v, towards = motion
+    speed = math.sqrt(square(v))
+    moving = speed > 0.0
+    sign = select(dot(v, towards) < 0.0, -1.0, 1.0)
+    direction = either(moving, v * (sign / select(moving, speed, 1.0)), towards)
+    k, k2 = presses(held, chain, r, direction, ZERO)
+    c, c2 = presses(held, chain, r, ZERO, accelerated(gravity, ZERO, 1.0))
+    # s1 = 2 s - s0 with s = s0 - h/2 (k s^2 + c)
+    a, b = 0.5 * h * _grip(friction, held, k, k2), sign * speed - 0.5 * h * _grip(friction, held, c, c2)
+    root2 = 1.0 + 4.0 * a * b
+    s0, middle = sign * speed, 2.0 * b / (1.0 + math.sqrt(select(root2 > 0.0, root2, 0.0)))
+    s1 = 2.0 * middle - s0
+    return Slowed(v + (s1 - s0) * direction, s0 * s0 - s1 * s1)
+
+
+@by_type
+def direction(friction, v, a):
+    """The direction in which a particle slides: of its velocity, or of what sets it in motion."""
+    return ZERO
+
+
+@direction.register(walls.Chain)
+def _(friction, v, a):
+    moving = square(v) > 0.0
+    way = either(moving, v, a)
+    length = math.sqrt(square(way))
+    return way / select(length > 0.0, length, 1.0)
 
 
 # --- Forces ----------------------------------------------------------------------------------------------
@@ -290,28 +324,24 @@ def _(friction, v, a):
 
 
 class Swept(NamedTuple):
-    """One sweep of a step: r1, w1, what the walls took of w, sum mu b |u|, whether r1 still moves."""
+    """One sweep of a step: r1, w1, what the walls took of w, whether r1 still moves."""
 
     r: Vec
     w: Vec
     b: float
     c: float
-    work: float
     moves: bool
 
 
 @inlined
-def sweep(friction, held, chain, h, step, allowed):
-    """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w)."""
+def sweep(held, chain, h, step, allowed):
+    """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
     taken = split(held, chain, r0, r1, w)
-    u, grip = _dragged(friction, held, taken)
-    end = r0 + h * u
+    end = r0 + h * taken.along
     moved, least = total(absolute(end - r1)), _STILL * total(absolute(r0))
     least = select(least > _SLACK * allowed, least, _SLACK * allowed)
-    work = grip * math.sqrt(square(u)) if wall_laws.is_given(friction) else 0.0
-    # w1 = 2 u - w0 + what friction has taken twice over: u = w0 - b n - grip t, so w1 = w0 - 2 b n - 2 grip t
-    return Swept(end, 2.0 * u - w, taken.b, taken.c, work, not (moved <= least))
+    return Swept(end, 2.0 * taken.along - w, taken.b, taken.c, not (moved <= least))
 
 
 @inlined

@@ -54,8 +54,8 @@ def _decide(method, chain, gravity, share, i):
         found = events.meet(method, One(first), chain, gravity, wall, p)
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
+    state.impulse[int(wall), i] += found.impulse * state.mass[i]
     if found.impulse > 0.0:
-        state.impulse[int(wall), i] += found.impulse * state.mass[i]
         state.impacts[i] += 1
     _lose(state, i, p.twice, found.twice)
     contacts.sliding[i] -= min(found.wait, left)

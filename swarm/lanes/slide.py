@@ -28,10 +28,10 @@ R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12,
 # The step of this pass: its length and end, what presses there, its impulses, the work of friction,
 # and by how much it may be off.
 H, R1, V1, A1, PRESS1, IMPULSE, WORK, ALLOWED = 19, 20, 23, 26, 29, 31, 33, 34
-# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, its work, the
-# acceleration of the step before; how
+# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, the direction in
+# which it slides, the acceleration of the step before; how
 # often the step has been cut.
-FROM, W, END, W1, TAKEN, DRAG, BEFORE, TRIALS, ROWS = 35, 38, 41, 44, 47, 49, 50, 53, 54
+FROM, W, END, W1, TAKEN, TOWARD, BEFORE, TRIALS, ROWS = 35, 38, 41, 44, 47, 49, 52, 55, 56
 # Times that a step is cut before the particle is given up: it takes four or so.
 _MOST_TRIALS = 1000
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
@@ -167,41 +167,49 @@ def _compose(kind, method, chain, gravity, lanes, live):
             last = column(rows, A1, i)
             a = last + slides.lead(k) * (last - column(rows, BEFORE, i))
             put(rows, BEFORE, i, last)
+            toward = slides.direction(friction, v, column(rows, A1, i))
+            held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+            slowed = slides.slow(friction, held, chain, gravity, r, (v, toward), 0.5 * h)
+            v = slowed.v
+            rows[WORK, i] += slowed.lost
+            put(rows, TOWARD, i, toward)
             put(rows, FROM, i, r)
             put(rows, W, i, accelerated(gravity, v, 0.5 * h))
-            put(rows, END, i, r + h * (v + (0.5 * h) * a))
+            put(rows, END, i, r + h * (column(rows, V1, i) + (0.5 * h) * a))
             moving[i] = h != 0.0
         for _sweep in range(slides.SWEEPS):
             some = False
             for i in range(live):
-                some = _sweep_lane(kind, friction, chain, lanes, i, slides.part(k)) | some
+                some = _sweep_lane(kind, chain, lanes, i, slides.part(k)) | some
             if not some:
                 break
         for i in range(live):
             h, w1 = slides.part(k) * rows[H, i], column(rows, W1, i)
-            v0, v1 = column(rows, V1, i), accelerated(gravity, w1, 0.5 * h)
-            put(rows, R1, i, column(rows, END, i))
+            v0, r, v1 = column(rows, V1, i), column(rows, END, i), accelerated(gravity, w1, 0.5 * h)
+            held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+            slowed = slides.slow(friction, held, chain, gravity, r, (v1, column(rows, TOWARD, i)), 0.5 * h)
+            v1 = slowed.v
+            rows[WORK, i] += slowed.lost
+            put(rows, R1, i, r)
             put(rows, V1, i, v1)
             put(rows, A1, i, (v1 - v0) / select(h == 0.0, 1.0, h))
             rows[IMPULSE, i] += 2.0 * rows[TAKEN, i]
             rows[IMPULSE + 1, i] += 2.0 * rows[TAKEN + 1, i]
-            rows[WORK, i] += rows[DRAG, i]
             lanes.event[i] |= select(moving[i], FAILED, 0)
 
 
 @inlined
-def _sweep_lane(kind, friction, chain, lanes, i, part):
+def _sweep_lane(kind, chain, lanes, i, part):
     """One sweep of a lane that still moves: whether it needs another."""
     rows, moving = lanes.rows, lanes.moving
     held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r0, end, w = column(rows, FROM, i), column(rows, END, i), column(rows, W, i)
-    swept = slides.sweep(friction, held, chain, part * rows[H, i], (r0, end, w), rows[ALLOWED, i])
+    swept = slides.sweep(held, chain, part * rows[H, i], (r0, end, w), rows[ALLOWED, i])
     on = moving[i]
     put(rows, END, i, either(on, swept.r, end))
     put(rows, W1, i, either(on, swept.w, column(rows, W1, i)))
     rows[TAKEN, i] = select(on, swept.b, rows[TAKEN, i])
     rows[TAKEN + 1, i] = select(on, swept.c, rows[TAKEN + 1, i])
-    rows[DRAG, i] = select(on, swept.work, rows[DRAG, i])
     more = on & swept.moves
     moving[i] = more
     return more
@@ -219,8 +227,7 @@ def _end_steps(kind, method, chain, gravity, lanes, live):
         h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
         r0, v0, a0 = column(rows, R, i), column(rows, V, i), column(rows, A, i)
         r1 = slides.settle(held, chain, column(rows, R1, i))
-        # Friction has taken 2 (sum mu b) |u| of |w|^2/2 in each part.
-        twice = rows[TWICE, i] - 4.0 * rows[WORK, i]
+        twice = rows[TWICE, i] - rows[WORK, i]
         v1 = slides.split_at(held, chain, r1, column(rows, V1, i)).along
         v1 = slides.restored(v1, twice - 2.0 * potential(gravity, r1) - keep * keep, scale2)
         force = slides.force(friction, held, chain, gravity, r1, v1)
@@ -271,7 +278,7 @@ def _account(method, state, lanes, i):
     _push(state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
     rows[TRIALS, i] = 0.0
     if wall_laws.is_given(methods.friction(method)):
-        _lose(state, lanes, i, 4.0 * rows[WORK, i])
+        _lose(state, lanes, i, rows[WORK, i])
 
 
 @inlined
@@ -383,9 +390,11 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     """
     rows, event, h = lanes.rows, lanes.event[i], lanes.rows[H, i]
     if event & STOPPED:
-        v2 = square(column(rows, V, i))
-        rows[TWICE, i] -= v2
-        _lose(state, lanes, i, v2)
+        # All that is above the potential energy, down to what round-off has added to the kinetic one.
+        lost = rows[TWICE, i] - 2.0 * potential(gravity, column(rows, R, i))
+        rows[TWICE, i] -= lost
+        _lose(state, lanes, i, lost)
+        rows[KEEP, i] = 0.0
         put(rows, V, i, ZERO)
         return _set_going(kind, method, chain, gravity, state, lanes, i)
     if event & FAILED:
