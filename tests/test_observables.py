@@ -106,7 +106,7 @@ def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
     walls, sliding = np.full((2, N), -1.0), random.uniform(size=N)
     # Wall 0, or wall 1, or the edge of both.
     walls[0, 3], walls[0, 40:50], walls[:, -1] = 1.0, 0.0, (0.0, 1.0)
-    contacts = Contacts(walls, np.zeros(N), np.zeros(N), sliding)
+    contacts = Contacts(walls, *np.zeros((4, N)), np.zeros((2, N)), sliding)
     heat = random.normal(size=(2, N))
     lasting = observe(law, scene, state._replace(contacts=contacts, heat=heat))
     assert (lasting["sliding"], lasting["sliding_time"]) == (12, pytest.approx(sliding.sum(), rel=1e-13))

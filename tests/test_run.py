@@ -8,6 +8,7 @@ import pytest
 
 import swarm
 from swarm import observables
+from swarm.contact import events
 from swarm.kernel.jit import kernel, next_of
 from swarm.lanes import arrays as lanes
 from swarm.run.engine import Run
@@ -42,17 +43,19 @@ def test_no_two_threads_draw_the_same():
 @pytest.mark.parametrize("size", [1, 7, 64])
 @pytest.mark.parametrize("n", [1, 63, 64, 65, 200])
 def test_every_particle_that_is_not_done_follows_once(n, size):
-    done = np.random.default_rng(n).random(n) < 0.4
-    draws = lanes.Draws(np.zeros(1, np.int64), size, np.empty(-(-n // size), np.int64))
-    share = lanes.Share(None, done, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0)
+    phase = np.where(np.random.default_rng(n).random(n) < 0.4, events.ARRIVED, events.FLYING).astype(np.int8)
+    number, pending = -(-n // size), np.zeros(events.PHASES, np.int64)
+    draws = lanes.Draws(np.zeros(1, np.int64), np.arange(number), size, np.empty(number, np.int64))
+    share = lanes.Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0)
     i, stop, drawn, found = 0, 0, 0, []
     while True:
-        i, stop, drawn = lanes.following_particle(share, i, stop, drawn)
+        i, stop, drawn = lanes.following_particle(share, events.FLYING, i, stop, drawn)
         if i == stop:
             break
         found.append(i)
         i += 1
-    assert found == np.flatnonzero(~done).tolist()
+    assert found == np.flatnonzero(phase == events.FLYING).tolist()
+    assert pending.sum() == pending[events.ARRIVED] == n - len(found)
     assert draws.mine[:drawn].tolist() == list(range(len(draws.mine)))
 
 

@@ -304,28 +304,26 @@ def test_particles_beyond_an_open_face_have_escaped(side, gravity):
 
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
     """An error that names the particle and its walls, not a hang."""
-    monkeypatch.setattr(blocks, "MOST_HITS", 50.0)
-    start = swarm.Particles([[0.0, 0.5], [0.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
+    monkeypatch.setattr(blocks, "MOST_HITS", 5000.0)
+    monkeypatch.setattr(blocks, "_LOOK", 16)
+    start = swarm.Particles([[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     with pytest.raises(swarm.RunError, match=r"particle 1: .*100 million times"):
-        swarm.simulate(SPHERE, start, swarm.Impact(shortest_flight=1e-3), until=1.0)
+        swarm.simulate(swarm.Scene([swarm.Slab((0, 0, 1), 1e-4)]), start, swarm.Impact(), until=2.0, compile="never")
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_slow_path_contact_loads_its_kernel_and_changes_no_bit(monkeypatch, threads):
-    """A cavity starts without the slow-path kernel; a block with a grazing particle is restarted where it halted."""
+def test_a_contact_that_lasts_loads_its_kernels_and_changes_no_bit(threads):
+    """A run starts without the kernels of sliding; with a grazing particle the others go on where they were."""
     start = swarm.fill(SPHERE, 1100, speed=1.0, seed=6)
     start.position[:, 800], start.velocity[:, 800] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
-    method, ends = swarm.Impact(shortest_flight=1e-2), []
-    for seldom in (True, False):
-        monkeypatch.setattr(swarm.Impact, "seldom_hard", lambda method, scene, seldom=seldom: seldom)
-        ends.append(swarm.simulate(SPHERE, start, method, until=1.2, every=0.4, threads=threads, block_size=512))
-    late, early = ends
-    assert np.array_equal(late.particles.position, early.particles.position)
-    assert np.array_equal(late.particles.velocity, early.particles.velocity)
-    for name, seen in late.observables.items():
-        assert np.array_equal(seen, early.observables[name]), name
-    grazing = swarm.Particles(start.position[:, 800], start.velocity[:, 800])
-    assert swarm.simulate(SPHERE, grazing, method, until=1.2, threads=1).observables["impacts"][-1] > 100
+    both = swarm.simulate(SPHERE, start, swarm.Impact(), until=1.2, every=0.4, threads=threads, block_size=512)
+    assert both.observables["sliding"].tolist() == [0, 1, 1, 1]
+    for some in (np.arange(1100) != 800, np.arange(1100) == 800):
+        part = swarm.Particles(start.position[:, some], start.velocity[:, some])
+        alone = swarm.simulate(SPHERE, part, swarm.Impact(), until=1.2, every=0.4, threads=1)
+        assert np.array_equal(alone.particles.position, both.particles.position[:, some])
+        assert np.array_equal(alone.particles.velocity, both.particles.velocity[:, some])
+        assert np.array_equal(alone.impacts_per_particle, both.impacts_per_particle[some])
 
 
 def test_a_frame_that_begins_at_the_wall_needs_no_slow_path():

@@ -124,6 +124,12 @@ def lane_of(method, rows, i):
     return methods.Lane(column(rows, R, i), column(rows, V, i), rows[LEFT, i], rows[HITS, i], kept)
 
 
+def take(draws: Draws, some: int) -> Array:
+    """The next `some` draws of all threads, for one."""
+    first = min(some * next_of(draws.ticket), draws.order.size)
+    return draws.order[first : first + some]
+
+
 @inlined
 def following_particle(share, phase, i, stop, drawn):
     """(particle, stop, draws so far): the first from i on that is in this phase, of another draw if need be; or stop.

@@ -12,7 +12,7 @@ import numpy as np
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
 from ..kernel.gravity import Gravity, Nothing, as_vector, potential
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, select
+from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined, select
 from ..kernel.vector import column, put, square
 from ..methods import contract as methods
 from ..status import Status
@@ -44,6 +44,8 @@ from .solve import solution, solve
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
+# After so many passes all lanes are looked at for that.
+_LOOK = 4096
 # Passes of a call of `advance_block` that is never halted.
 NEVER = 2**63 - 1
 
@@ -78,8 +80,8 @@ def advance_block(method, chain, gravity, hard, share, lanes):
             return Status.INTERRUPTED.value, live, drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
-        if some_hard:
-            status, lane = _hard_passes(hard, method, chain, gravity, lanes, live)
+        if some_hard or passes % _LOOK == 0:
+            status, lane = _rare(hard, method, chain, gravity, lanes, live)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane], drawn
@@ -98,6 +100,17 @@ def advance_block(method, chain, gravity, hard, share, lanes):
                 live -= 1
                 move(chain, lanes, live, lane)
     return Status.DONE.value, 0, drawn
+
+
+@outlined
+def _rare(hard, method, chain, gravity, lanes, live):
+    """What a pass rarely needs: (worst status, its lane). A particle may meet its walls without end."""
+    if not methods.holds(method):
+        return _hard_passes(hard, method, chain, gravity, lanes, live)
+    for i in range(live):
+        if lanes.rows[HITS, i] > MOST_HITS:
+            return Status.STALLED.value, i
+    return Status.DONE.value, 0
 
 
 @inlined

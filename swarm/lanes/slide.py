@@ -240,8 +240,8 @@ def _end_steps(kind, method, chain, gravity, lanes, live):
         happened = select(lifted, LIFTED, 0) | select(met, MET, 0)
         lanes.event[i] |= select(good, happened, 0)
         lanes.moving[i] = fine
-        # What the end of the frame or an event cuts says nothing of the length. And a step that is to be cut is found so
-        # again after a halt.
+        # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
+        # found so again after a halt.
         whole = (fine & (h == rows[STEP, i])) | (not (ratio <= 1.0))
         rows[STEP, i] = select(whole, slides.next_step(h, ratio), rows[STEP, i])
         rows[CUT, i] = select(fine, np.inf, rows[CUT, i])

@@ -13,7 +13,6 @@ from .. import observables
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD, PHASES
 from ..contact.sliding import One, Two
 from ..errors import RunError
-from ..kernel.jit import next_of
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import meet, slide
@@ -157,10 +156,10 @@ class Run:
         # Who flies first would have drawn everything when the others are ready to slide.
         some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
         while end[0] == Status.DONE:
-            first = min(some * next_of(self._ticket), self._draws)
-            if first == self._draws:
+            order = lanes.take(draws, some)
+            if not order.size:
                 break
-            end = self._part(span, _again(draws, self._order[first : first + some]), mine)
+            end = self._part(span, _again(draws, order), mine)
         return end
 
     def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> _End:

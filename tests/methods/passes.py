@@ -18,7 +18,7 @@ from swarm.surfaces import flights
 
 
 class Pass(NamedTuple):
-    """The state after a pass. `surface` is the wall of the contact or -1, `hard` whether `hard_pass` did it."""
+    """The state after a pass. `surface` is the wall of the contact or -1; if `hard`, it is for `hard_pass` or may last."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -64,7 +64,11 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     contact = call(contract.contact, numbers, chain, gravity, lane, end.wall, solution)
     impulse, wall = np.zeros((len(scene.surfaces), 1)), contact.wall
     hard = wall <= contract.HARD
-    if hard:
+    if hard and contract.holds(numbers):
+        # Another kernel decides whether the contact lasts; it is an impact so far.
+        wall = contract.HARD - wall
+        impulse[int(wall), 0] += contact.impulse
+    elif hard:
         wall, lanes = contract.HARD - wall, _Lanes(impulse, np.zeros((uzawa.RECORDS, 1)))
         lane = contract.Lane(contact.r, contact.v, contact.left, 1.0, own)
         with np.errstate(all="ignore"):
