@@ -74,7 +74,8 @@ def test_leaving_a_ball(push):
     end, velocity = flown(R * np.array([math.sin(theta), 0.0, cosine]), speed * slope_, until - leaves)
     assert result.particles.position[:, 0] == pytest.approx(end, abs=3e-9)
     assert result.particles.velocity[:, 0] == pytest.approx(velocity, abs=3e-9)
-    assert result.observables["sliding_time"][-1] == pytest.approx(leaves, abs=1e-9)
+    # A start that is inside by the last place flies a hop first, of the root of that.
+    assert result.observables["sliding_time"][-1] == pytest.approx(leaves, abs=1e-8)
     assert result.observables["sliding"][-1] == 0
     assert result.observables["impacts"][-1] <= 1
     assert result.observables["energy_error"].max() <= 1e-14
@@ -110,7 +111,8 @@ def test_leaving_a_loop(name, part):
     assert math.hypot(end[0], end[2]) < R * (1.0 - 1e-4), "it flies"
     assert result.particles.position[:, 0] == pytest.approx(end, abs=3e-9)
     assert result.particles.velocity[:, 0] == pytest.approx(velocity, abs=1e-8)
-    assert result.observables["sliding_time"][-1] == pytest.approx(leaves, abs=1e-9)
+    # A start that is inside by the last place flies a hop first, of the root of that.
+    assert result.observables["sliding_time"][-1] == pytest.approx(leaves, abs=1e-8)
     assert result.observables["sliding"][-1] == 0
     assert result.observables["impacts"][-1] <= 1
 
@@ -125,7 +127,7 @@ def test_through_a_loop(name):
     result = run(swarm.Scene([LOOPS[name]], DOWN), start, swarm.Impact(sliding_tolerance=1e-11), period)
     assert result.particles.position[:, 0] == pytest.approx([0.0, 0.0, -R], abs=1e-9)
     assert result.particles.velocity[:, 0] == pytest.approx([push, 0.0, 0.0], abs=1e-8)
-    assert result.observables["sliding_time"][-1] == pytest.approx(period, rel=1e-12)
+    assert result.observables["sliding_time"][-1] == pytest.approx(period, abs=1e-8)
     assert result.observables["impacts"][-1] <= 1
 
 
