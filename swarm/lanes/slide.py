@@ -13,7 +13,7 @@ import numpy as np
 from ..contact import events
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
-from ..contact.events import ARRIVED, EDGE, EVENT, FLYING, HELD
+from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
 from ..kernel.vector import ZERO, column, either, put, square
@@ -32,8 +32,8 @@ H, R1, V1, A1, PRESS1, IMPULSE, WORK, ALLOWED = 19, 20, 23, 26, 29, 31, 33, 34
 # which it slides, the acceleration of the step before; how
 # often the step has been cut.
 FROM, W, END, W1, TAKEN, TOWARD, BEFORE, TRIALS, ROWS = 35, 38, 41, 44, 47, 49, 52, 55, 56
-# Times that a step is cut before the particle is given up: it takes four or so.
-_MOST_TRIALS = 1000
+# Times that a step is cut before the lane is given up: it takes four or so.
+_MOST_TRIALS = 100
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
 _FIRST = 1e-3
 # A step that is tried again is so much shorter; one of this part of a crossing is the shortest.
@@ -52,9 +52,7 @@ class Lanes(NamedTuple):
 
 
 # What a step may end with.
-LIFTED, MET, FAILED, STOPPED = 1, 2, 4, 8
-# What a lane does that cannot go on.
-_GIVEN_UP = -1
+LIFTED, MET, FAILED, STOPPED, STUCK = 1, 2, 4, 8, 16
 
 
 def empty() -> Lanes:
@@ -97,8 +95,6 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
-            if phase == _GIVEN_UP:
-                return Status.STALLED.value, lanes.particle[i], drawn
             if phase != _phase(kind):
                 _retire(kind, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
@@ -136,7 +132,7 @@ def _next_phase(kind, method, chain, gravity, state, lanes, i):
     phase = _phase(kind)
     if lanes.event[i] != 0:
         phase = _decide(kind, method, chain, gravity, state, lanes, i)
-    return phase if lanes.rows[LEFT, i] > 0.0 or phase == _GIVEN_UP else ARRIVED
+    return phase if lanes.rows[LEFT, i] > 0.0 else ARRIVED
 
 
 # --- One composed step of every lane ---------------------------------------------------------------------
@@ -256,6 +252,8 @@ def _end_steps(kind, method, chain, gravity, lanes, live):
         rows[PRESS, i] = select(fine, force.n, rows[PRESS, i])
         rows[PRESS + 1, i] = select(fine, force.m, rows[PRESS + 1, i])
         lanes.event[i] |= _stop(friction, fine, v1, scale2)
+        # Near an apex steps become shorter without end.
+        lanes.event[i] |= select(rows[STEP, i] < _SHORTEST * method.size / math.sqrt(scale2), STUCK, 0)
 
 
 @by_type
@@ -353,7 +351,7 @@ def _retire(kind, chain, share, lanes, i, phase):
     """A lane back into its particle, for what it does next."""
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
     v, keep = column(rows, V, i), rows[KEEP, i]
-    slid = phase not in (FLYING, _GIVEN_UP)
+    slid = phase != FLYING and phase != CAREFUL
     if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
         held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
         taken = slides.split_at(held, chain, column(rows, R, i), v)
@@ -398,8 +396,10 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
         rows[KEEP, i] = 0.0
         put(rows, V, i, ZERO)
         return _set_going(kind, method, chain, gravity, state, lanes, i)
+    if event & STUCK:
+        return _give_up(state, lanes, i)
     if event & FAILED:
-        return _shorten(kind, method, chain, lanes, i)
+        return _shorten(kind, method, chain, state, lanes, i)
     held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v = column(rows, R, i), column(rows, V, i)
     cut = 1.0
@@ -419,11 +419,18 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     # Where a cubic through the ends of the step passes near a wall, but does not meet it, a shorter one is farther.
     rows[CUT, i] = h * (cut if cut < 1.0 else _RETRY)
     rows[TRIALS, i] += 1.0
-    return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _GIVEN_UP
+    return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
+
+
+@inlined
+def _give_up(state, lanes, i):
+    """Leave a lane to the careful way: it is at an apex, or where the walls have no edge."""
+    state.contacts.met[lanes.particle[i]] = lanes.rows[WALL, i]
+    return CAREFUL
 
 
 @outlined
-def _shorten(kind, method, chain, lanes, i):
+def _shorten(kind, method, chain, state, lanes, i):
     """A lane whose step has no solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
     rows, h = lanes.rows, lanes.rows[H, i]
     rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
@@ -431,7 +438,7 @@ def _shorten(kind, method, chain, lanes, i):
         return _phase(kind)
     end = column(rows, R, i) + h * column(rows, V, i)
     if walls.outside(chain, -1.0, end) or not h > 0.0:
-        return _GIVEN_UP
+        return _give_up(state, lanes, i)
     put(rows, R, i, end)
     rows[LEFT, i] -= h
     return FLYING

@@ -18,7 +18,7 @@ from swarm.surfaces import flights
 
 
 class Pass(NamedTuple):
-    """The state after a pass. `surface` is the wall of the contact or -1; if `hard`, it is for `hard_pass` or may last."""
+    """The state after a pass. `surface` is the wall of the contact or -1; `hard`: for `hard_pass`, or may last."""
 
     position: np.ndarray
     velocity: np.ndarray
