@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, inlined, outlined
-from ..kernel.vector import ZERO, Vec, cross, dot, norm, square
+from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
 from . import laws as wall_laws
@@ -25,7 +25,7 @@ _NO_HOP = 1e-7
 # Parts of an acceleration, of a length and of a time that are none.
 _PRESSED, _NEAR, _INSTANT = 1e-12, 1e-13, 1e-9
 # Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
-_SHARPEST = 1e-2
+_SHARPEST = 1e-7
 _EPSILON = 2.220446049250313e-16
 # Walls within this part of the scene's size hold a particle together.
 _TOUCH = 1e-10
@@ -156,7 +156,7 @@ def _on_edge(rules, chain, gravity, two, p):
     across2 = max(square(p.v) - square(taken.along), 0.0)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
     least = weightless(rules, gravity, p)
-    if square(cross(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
+    if square(sliding.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
     n, m = sliding.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
     if not (n > least and m > least):

@@ -142,9 +142,15 @@ def _(held, chain, r, w):
 
 
 @inlined
+def edge(n, m):
+    """n x m, to round-off of its length also where the walls are nearly parallel: n x (m -+ n)."""
+    return cross(n, m - select(dot(n, m) < 0.0, -1.0, 1.0) * n)
+
+
+@inlined
 def _on_edge(n, m, w):
     # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
-    e, cosine, wn, wm = cross(n, m), dot(n, m), dot(w, n), dot(w, m)
+    e, cosine, wn, wm = edge(n, m), dot(n, m), dot(w, n), dot(w, m)
     sine2 = square(e)
     inverse = 1.0 / select(sine2 > _TINY, sine2, _TINY)
     return Held((dot(w, e) * inverse) * e, n, (wn - cosine * wm) * inverse, m, (wm - cosine * wn) * inverse)
@@ -260,7 +266,7 @@ def _(held, chain, r, v, pull):
     one = walls.outward_acceleration(chain, held.first, r, v, pull)
     other = walls.outward_acceleration(chain, held.second, r, v, pull)
     n, m = walls.unit_normal(chain, held.first, r), walls.unit_normal(chain, held.second, r)
-    cosine, sine2 = dot(n, m), square(cross(n, m))
+    cosine, sine2 = dot(n, m), square(edge(n, m))
     inverse = 1.0 / select(sine2 > _TINY, sine2, _TINY)
     return (one - cosine * other) * inverse, (other - cosine * one) * inverse
 

@@ -32,21 +32,26 @@ class Impact(base.Method):
     Args:
         contact_step: length h of the contact step [s], >= 0 and at most the crossing time size/|v|. 0 is the exact
             elastic reflection; h > 0 slides along a chord of the surface, as the paper's scheme does.
-        shortest_flight: where flights are shorter [s], time after time (grazing, whispering gallery, resting, a cusp),
-            the particle slides along its walls in steps of this length, so its cost is bounded.
-            None: 1e-4 of the crossing time, which costs a tangential launch 1e4 steps a crossing and its speed
-            along the wall a relative error (h |v|/R)^2/12 of 8e-10. Under gravity G the crossing time is
-            size/sqrt(|v|^2 + |G| size).
+        shortest_flight: a particle that comes back to the same wall sooner than this [s] (grazing, chattering, resting)
+            slides along it instead. None: 1e-4 of its own crossing time. Every other flight is exact, however short, so
+            that a wedge of 1e-4 rad takes its 31415 impacts.
+        sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The steps of each
+            particle follow from it: some 200 a crossing, and 1/4 power of it more or fewer.
+
+    A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
+    fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering with a restitution e < 1
+    ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing.
 
     Raises:
         SceneError: an argument is out of its range.
 
     Conserves: the energy to round-off that does not grow (each particle knows its energy); never leaves the walls by
-    more than round-off. Where surfaces have a restitution below 1, energy and dissipated energy together.
-    Order: exact for contact_step = 0, otherwise first order in h at an impact; sliding and rolling contacts, which take
-    steps of the shortest flight, are of second order in it.
-    Cost: one square root and one division a flight of a sphere; see `python -m bench throughput`.
-    Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0.
+    more than round-off. With restitution, friction and thermal walls the energy with what was dissipated and less the
+    heat of the walls.
+    Order: exact for contact_step = 0, otherwise first order in h at an impact; sliding is of fourth order, but where three
+    walls or a cusp hold a particle of second, without friction.
+    Cost: one square root and one division a flight of a sphere; see `python -m bench throughput` and `bench contacts`.
+    Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 
     >>> Impact(contact_step=-1.0)
     Traceback (most recent call last):
