@@ -238,6 +238,13 @@ def careful(rules, chain, gravity, wall, p, impulse):
     )
 
 
+@outlined
+def settles(rules, chain, gravity, p, held):
+    """Whether a slow particle is where several walls carry its weight together; each its `held` of it, per mass."""
+    slow = square(p.v) <= GRAZING * GRAZING * own_speed2(p)
+    return slow and touching.are_carried(chain, gravity, p.r, _TOUCH * rules.size, held)
+
+
 @inlined
 def rests(gravity, force):
     """Whether a particle without speed stays where it is."""
@@ -248,7 +255,7 @@ def rests(gravity, force):
 def off_the_wall(chain, wall, r, v):
     """A velocity along a wall that lets the particle go, leaning away from it by more than round-off."""
     n = _normal(chain, wall, r)
-    b, least = dot(v, n), ALLOWED * norm(v)
+    b, least = dot(v, n), 4.0 * _EPSILON * norm(v)
     return v - (b + least) * n if abs(b) <= least else v
 
 

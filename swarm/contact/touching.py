@@ -253,6 +253,22 @@ def _goes_straight(chain, gravity, touch, r, v):
     return speed == 0.0 or _flat(chain, touch.touched, 0)
 
 
+@outlined
+def are_carried(chain, gravity, r, near, held):
+    """Whether several walls within the distance `near` carry the weight of a particle at rest, each its `held`."""
+    count = walls.length(chain)
+    touched, normal, depth = scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64)
+    _depths(chain, 0, r, depth)
+    several = 0
+    for i in range(count):
+        touched[i] = depth[i] >= -near
+        several += touched[i]
+        if touched[i]:
+            put(normal, 0, i, walls.unit_normal(chain, float(i), r))
+    g = accelerated(gravity, ZERO, 1.0)
+    return several > 1 and moves(g) and largest(project(touched, normal, held, g)) <= ALLOWED * largest(g)
+
+
 @by_type
 def _flat(chain, touched, k):
     """Whether every touched wall is flat."""

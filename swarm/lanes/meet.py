@@ -3,12 +3,13 @@
 import numpy as np
 
 from ..contact import events
-from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING
+from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING
 from ..contact.heat import Draw, exchange
-from ..contact.sliding import One, Two
+from ..contact.reflection import loses_energy
+from ..contact.sliding import One, Two, split_at
 from ..kernel.gravity import potential
 from ..kernel.jit import by_type_outlined, inlined, kernel, outlined, scratch
-from ..kernel.vector import column, put, square
+from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
@@ -17,6 +18,8 @@ from .arrays import heat as book_heat
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
+# The step of a particle that several walls carry.
+CARRIED = -1.0
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -39,6 +42,10 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    if not left > 0.0:
+        # It rested where several walls carry it, to the end of the last frame.
+        left, contacts.met[i], contacts.walls[0, i] = share.span, contacts.walls[0, i], -1.0
+        contacts.left[i] = left
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
@@ -46,7 +53,8 @@ def _decide(method, chain, gravity, share, i):
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
     if first >= 0.0 and _exchange_heat(methods.thermal(method), chain, gravity, share, i):
         return True
-    if again > _OFTEN:
+    held = scratch(walls.length(chain), np.float64)
+    if again > _OFTEN or events.settles(method, chain, gravity, p, held):
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
         found = events.enter(method, chain, gravity, wall, p)
@@ -57,6 +65,8 @@ def _decide(method, chain, gravity, share, i):
     state.impulse[int(wall), i] += found.impulse * state.mass[i]
     if found.impulse > 0.0:
         state.impacts[i] += 1
+    if found.phase == EDGE and found.keep == 0.0:
+        _spare(chain, state, i, found, wall)
     _lose(state, i, p.twice, found.twice)
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
@@ -98,6 +108,16 @@ def _(thermal, chain, gravity, share, i):
     return True
 
 
+@outlined
+def _spare(chain, state, i, found, wall):
+    """What the walls of an edge give less to particle i, which chatters, than to one that has no speed across them."""
+    r, v = column(state.position, 0, i), column(state.velocity, 0, i)
+    turned = v - found.impulse * walls.unit_normal(chain, wall, r)
+    taken = split_at(Two(found.wall, found.other), chain, r, turned)
+    state.impulse[int(found.wall), i] += taken.b * state.mass[i]
+    state.impulse[int(found.other), i] += taken.c * state.mass[i]
+
+
 @inlined
 def _lose(state, i, before, after):
     """Book what is left of twice the energy per mass."""
@@ -119,11 +139,31 @@ def careful_block(method, chain, gravity, share):
 
 
 @outlined
+def _rest(method, gravity, share, i, p, held):
+    """Let particle i rest to the end of the frame."""
+    state, contacts = share.state, share.state.contacts
+    for s in range(held.size):
+        state.impulse[s, i] += held[s] * p.left * state.mass[i]
+    if loses_energy(methods.laws(method)):
+        _lose(state, i, p.twice, 2.0 * potential(gravity, p.r))
+        put(state.velocity, 0, i, ZERO)
+    contacts.sliding[i] += p.left
+    contacts.left[i], contacts.keep[i] = 0.0, 0.0
+    contacts.walls[0, i], contacts.walls[1, i], contacts.step[i] = contacts.met[i], -1.0, CARRIED
+    share.phase[i] = ARRIVED
+    share.pending[ARRIVED] += 1
+
+
+@outlined
 def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     given = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
+    held = scratch(walls.length(chain), np.float64)
+    if events.settles(method, chain, gravity, p, held):
+        _rest(method, gravity, share, i, p, held)
+        return
     end = events.careful(method, chain, gravity, contacts.met[i], p, given)
     for s in range(given.shape[0]):
         state.impulse[s, i] += given[s, 0] * state.mass[i]
@@ -134,7 +174,5 @@ def _step(method, chain, gravity, share, i):
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED
     contacts.walls[0, i], contacts.walls[1, i], contacts.step[i], contacts.keep[i] = -1.0, -1.0, 0.0, 0.0
-    if phase == ARRIVED:
-        contacts.walls[0, i] = contacts.met[i]
     share.phase[i] = phase
     share.pending[phase] += 1

@@ -39,7 +39,7 @@ class Impact(base.Method):
             particle follow from it: some 200 a crossing, and 1/4 power of it more or fewer.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
-    fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering with a restitution e < 1
+    fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
     ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing.
 
     Raises:
@@ -48,8 +48,8 @@ class Impact(base.Method):
     Conserves: the energy to round-off that does not grow (each particle knows its energy); never leaves the walls by
     more than round-off. With restitution, friction and thermal walls the energy with what was dissipated and less the
     heat of the walls.
-    Order: exact for contact_step = 0, otherwise first order in h at an impact; sliding is of fourth order, but where three
-    walls or a cusp hold a particle of second, without friction.
+    Order: exact for contact_step = 0, otherwise first order in h at an impact; sliding is of fourth order, and where
+    three walls or a cusp hold a particle of second, without friction.
     Cost: one square root and one division a flight of a sphere; see `python -m bench throughput` and `bench contacts`.
     Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 
@@ -160,6 +160,7 @@ def _(method):
 
 contract.holds.register(Reflection, lambda method: True)
 contract.holds.register(Chord, lambda method: True)
+contract.laws.register(Reflection, lambda method: method.laws)
 contract.friction.register(Reflection, lambda method: wall_laws.friction(method.laws))
 contract.thermal.register(Reflection, lambda method: wall_laws.thermal(method.laws))
 contract.sliding_tolerance.register(Reflection, lambda method: method.sliding_tolerance)

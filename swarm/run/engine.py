@@ -216,6 +216,7 @@ class Run:
         else:
             first, second = contacts.walls >= 0.0
             self._phase[:] = np.where(first, np.where(second, EDGE, HELD), FLYING)
+            self._phase[first & (contacts.step == meet.CARRIED)] = EVENT
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""

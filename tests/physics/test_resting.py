@@ -37,7 +37,7 @@ def test_a_particle_on_the_floor_stays():
 
 def test_a_particle_slides_along_the_floor():
     result = run(planes((0.0, 0.0, -1.0)), swarm.Particles([0.0] * 3, [0.5, -0.25, 0.0]), swarm.Impact(), 1e3)
-    assert (result.particles.position[:, 0] == [500.0, -250.0, 0.0]).all()
+    assert result.particles.position[:, 0] == pytest.approx([500.0, -250.0, 0.0], rel=1e-13)
     assert result.observables["impacts"][-1] <= 2
 
 
@@ -87,21 +87,18 @@ def test_a_corner_holds():
 
 @pytest.mark.parametrize("angle", [1e-3, 0.5, 1.5])
 def test_the_pendulum_in_a_bowl(angle):
-    """After a period 4 sqrt(R/g) K(sin(angle/2)) it is back: late by O(h^2)."""
+    """After a period 4 sqrt(R/g) K(sin(angle/2)) it is back: late by no more than the tolerance a crossing."""
     radius = 0.7
     period = 4.0 * math.sqrt(radius / G) * float(mpmath.ellipk(math.sin(0.5 * angle) ** 2))
     start = swarm.Particles([radius * math.sin(angle), 0.0, -radius * math.cos(angle)], [0.0] * 3)
-    late = []
-    for h in (4e-3, 2e-3, 1e-3):
+    for tolerance in (1e-7, 1e-9):
         # A quarter of a period: at the bottom the way is the speed times the lateness.
-        end = run(BOWL, start, swarm.Impact(shortest_flight=h), 1.25 * period, 0.01)
+        end = run(BOWL, start, swarm.Impact(sliding_tolerance=tolerance), 1.25 * period, 0.01)
         x, _y, z = end.particles.position[:, 0]
-        late.append(abs(x / end.particles.velocity[0, 0]))
+        assert abs(x / end.particles.velocity[0, 0]) <= 10.0 * tolerance * period
         assert math.hypot(x, z) == pytest.approx(radius, abs=4.0 * EPSILON)
         assert end.observables["energy_error"].max() <= 4.0 * EPSILON
         assert end.observables["max_penetration"].max() <= 2.0 * np.spacing(radius)
-    orders = np.log2(np.array(late[:-1]) / late[1:])
-    assert (np.abs(orders - 2.0) <= 0.3).all(), (late, orders)
 
 
 def test_leaving_a_ball():
