@@ -135,12 +135,12 @@ def enter(rules, chain, gravity, wall, p):
     if not _loses(rules, wall):
         return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
-    # the particle than to one that slides, and friction as much less.
+    # the particle than to one that slides, which the caller books, and friction as much less.
     e, speed = wall_laws.restitution_of(rules.laws, wall), norm(along)
     spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
     faster = along * (1.0 + spared / speed) if speed > spared else along
     twice += square(faster) - square(along) - away * away
-    return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse - away, hop / (1.0 - e))
+    return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
 
 @inlined
@@ -240,9 +240,9 @@ def careful(rules, chain, gravity, wall, p, impulse):
 
 @outlined
 def settles(rules, chain, gravity, p, held):
-    """Whether a slow particle is where several walls carry its weight together; each its `held` of it, per mass."""
+    """Whether a slow particle is where several walls carry its weight together; `held` is of `are_carried`."""
     slow = square(p.v) <= GRAZING * GRAZING * own_speed2(p)
-    return slow and touching.are_carried(chain, gravity, p.r, _TOUCH * rules.size, held)
+    return slow and touching.are_carried(chain, gravity, p.r, p.v, _TOUCH * rules.size, held)
 
 
 @inlined

@@ -35,7 +35,7 @@ _ERROR = 1.0
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
-_FAST = 1e-6
+_FAST = 1e-12
 _TINY = 2.2250738585072014e-308
 # What sliding asks of every wall.
 NEEDS = (

@@ -254,8 +254,11 @@ def _goes_straight(chain, gravity, touch, r, v):
 
 
 @outlined
-def are_carried(chain, gravity, r, near, held):
-    """Whether several walls within the distance `near` carry the weight of a particle at rest, each its `held`."""
+def are_carried(chain, gravity, r, v, near, held):
+    """Whether several walls within the distance `near` carry the weight of a particle at rest.
+
+    `held` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
+    """
     count = walls.length(chain)
     touched, normal, depth = scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64)
     _depths(chain, 0, r, depth)
@@ -266,7 +269,11 @@ def are_carried(chain, gravity, r, near, held):
         if touched[i]:
             put(normal, 0, i, walls.unit_normal(chain, float(i), r))
     g = accelerated(gravity, ZERO, 1.0)
-    return several > 1 and moves(g) and largest(project(touched, normal, held, g)) <= ALLOWED * largest(g)
+    project(touched, normal, held[0], -1.0 * v)
+    project(touched, normal, held[1], v)
+    for i in range(count):
+        held[1, i] -= held[0, i]
+    return several > 1 and moves(g) and largest(project(touched, normal, held[0], g)) <= ALLOWED * largest(g)
 
 
 @by_type

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..contact import events
-from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING
+from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.reflection import loses_energy
 from ..contact.sliding import One, Two, split_at
@@ -53,7 +53,7 @@ def _decide(method, chain, gravity, share, i):
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
     if first >= 0.0 and _exchange_heat(methods.thermal(method), chain, gravity, share, i):
         return True
-    held = scratch(walls.length(chain), np.float64)
+    held = scratch((2, walls.length(chain)), np.float64)
     if again > _OFTEN or events.settles(method, chain, gravity, p, held):
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -65,7 +65,7 @@ def _decide(method, chain, gravity, share, i):
     state.impulse[int(wall), i] += found.impulse * state.mass[i]
     if found.impulse > 0.0:
         state.impacts[i] += 1
-    if found.phase == EDGE and found.keep == 0.0:
+    if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(chain, state, i, found, wall)
     _lose(state, i, p.twice, found.twice)
     contacts.sliding[i] -= min(found.wait, left)
@@ -110,12 +110,15 @@ def _(thermal, chain, gravity, share, i):
 
 @outlined
 def _spare(chain, state, i, found, wall):
-    """What the walls of an edge give less to particle i, which chatters, than to one that has no speed across them."""
+    """What its walls give less to particle i, which chatters, than to one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
     turned = v - found.impulse * walls.unit_normal(chain, wall, r)
-    taken = split_at(Two(found.wall, found.other), chain, r, turned)
+    if found.phase == HELD:
+        taken = split_at(One(found.wall), chain, r, turned)
+    else:
+        taken = split_at(Two(found.wall, found.other), chain, r, turned)
+        state.impulse[int(found.other), i] += taken.c * state.mass[i]
     state.impulse[int(found.wall), i] += taken.b * state.mass[i]
-    state.impulse[int(found.other), i] += taken.c * state.mass[i]
 
 
 @inlined
@@ -142,9 +145,11 @@ def careful_block(method, chain, gravity, share):
 def _rest(method, gravity, share, i, p, held):
     """Let particle i rest to the end of the frame."""
     state, contacts = share.state, share.state.contacts
-    for s in range(held.size):
-        state.impulse[s, i] += held[s] * p.left * state.mass[i]
-    if loses_energy(methods.laws(method)):
+    loses = loses_energy(methods.laws(method))
+    for s in range(held.shape[1]):
+        taken = held[1, s] if loses else 0.0
+        state.impulse[s, i] += (held[0, s] * p.left + taken) * state.mass[i]
+    if loses:
         _lose(state, i, p.twice, 2.0 * potential(gravity, p.r))
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.left
@@ -160,7 +165,7 @@ def _step(method, chain, gravity, share, i):
     given = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
-    held = scratch(walls.length(chain), np.float64)
+    held = scratch((2, walls.length(chain)), np.float64)
     if events.settles(method, chain, gravity, p, held):
         _rest(method, gravity, share, i, p, held)
         return

@@ -416,10 +416,25 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
             put(rows, R, i, walls.settle(chain, met.wall, r))
             return EVENT
         cut = min(cut, met.time)
-    # Where a cubic through the ends of the step passes near a wall, but does not meet it, a shorter one is farther.
-    rows[CUT, i] = h * (cut if cut < 1.0 else _RETRY)
+    if not cut < 1.0:
+        # It passes near a wall.
+        return _take(kind, method, chain, gravity, state, lanes, i)
+    rows[CUT, i] = cut * h
     rows[TRIALS, i] += 1.0
     return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
+
+
+@outlined
+def _take(kind, method, chain, gravity, state, lanes, i):
+    """Take a step after all."""
+    rows = lanes.rows
+    put(rows, R, i, column(rows, R1, i))
+    put(rows, V, i, column(rows, V1, i))
+    rows[LEFT, i], rows[CUT, i] = rows[LEFT, i] - rows[H, i], np.inf
+    rows[TWICE, i] -= rows[WORK, i]
+    lanes.moving[i] = True
+    _account(method, state, lanes, i)
+    return _set_going(kind, method, chain, gravity, state, lanes, i)
 
 
 @inlined
