@@ -269,10 +269,13 @@ def are_carried(chain, gravity, r, v, near, held):
         if touched[i]:
             put(normal, 0, i, walls.unit_normal(chain, float(i), r))
     g = accelerated(gravity, ZERO, 1.0)
-    project(touched, normal, held[0], -1.0 * v)
-    project(touched, normal, held[1], v)
-    for i in range(count):
-        held[1, i] -= held[0, i]
+    # v as a sum over the normals: what goes into the walls, then what goes away from them, and again.
+    sign, rest = 1.0, v
+    for _sweep in range(_SWEEPS):
+        rest = sign * project(touched, normal, held[0], sign * rest)
+        for i in range(count):
+            held[1, i] += sign * held[0, i]
+        sign = -sign
     return several > 1 and moves(g) and largest(project(touched, normal, held[0], g)) <= ALLOWED * largest(g)
 
 
