@@ -12,7 +12,7 @@ import numpy as np
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
-from ..kernel.vector import ZERO, Vec, dot, largest, moves, norm, put, square, total
+from ..kernel.vector import ZERO, Vec, absolute, dot, largest, moves, norm, put, square, total
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
 from . import laws as wall_laws
@@ -171,6 +171,18 @@ def _settled(chain, wall, touch, r):
         holds = i == int(wall) and touch.held[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
             r = walls.settle(chain, float(i), r)
+    return r
+
+
+@outlined
+def inside(chain, r, outside):
+    """A point that is no more than round-off outside of the walls, moved until it is not; `outside` is written to."""
+    for _sweep in range(_SWEEPS):
+        _depths(chain, 0, r, outside)
+        i = np.argmax(outside)
+        if outside[i] <= _EPSILON * total(absolute(r)):
+            break
+        r = walls.settle(chain, float(i), r)
     return r
 
 

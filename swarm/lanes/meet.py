@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..contact import events
+from ..contact import events, touching
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.reflection import loses_energy
@@ -142,7 +142,7 @@ def careful_block(method, chain, gravity, share):
 
 
 @outlined
-def _rest(method, gravity, share, i, p, held):
+def _rest(method, chain, gravity, share, i, p, held):
     """Let particle i rest to the end of the frame."""
     state, contacts = share.state, share.state.contacts
     loses = loses_energy(methods.laws(method))
@@ -150,7 +150,10 @@ def _rest(method, gravity, share, i, p, held):
         taken = held[1, s] if loses else 0.0
         state.impulse[s, i] += (held[0, s] * p.left + taken) * state.mass[i]
     if loses:
-        _lose(state, i, p.twice, 2.0 * potential(gravity, p.r))
+        # Round-off that its walls have gathered, which nothing takes back from now on
+        r = touching.inside(chain, p.r, held[0])
+        put(state.position, 0, i, r)
+        _lose(state, i, p.twice, 2.0 * potential(gravity, r))
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.left
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
@@ -167,7 +170,7 @@ def _step(method, chain, gravity, share, i):
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
     if events.settles(method, chain, gravity, p, held):
-        _rest(method, gravity, share, i, p, held)
+        _rest(method, chain, gravity, share, i, p, held)
         return
     end = events.careful(method, chain, gravity, contacts.met[i], p, given)
     for s in range(given.shape[0]):

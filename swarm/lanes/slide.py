@@ -315,9 +315,8 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
     rows[STEP, lane], rows[KEEP, lane], rows[TWICE, lane] = contacts.step[i], contacts.keep[i], twice
     if begins:
         held = slides.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane])
-        along = slides.split_at(held, chain, r, v).along
-        rows[KEEP, lane] = np.sqrt(max(square(v) - square(along), 0.0))
-        v = along
+        # Frames show the speed that is kept across the walls too.
+        v = slides.split_at(held, chain, r, v).along
     put(rows, R, lane, r)
     put(rows, V, lane, v)
     phase = _set_going(kind, method, chain, gravity, state, lanes, lane)

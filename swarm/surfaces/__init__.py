@@ -2,9 +2,10 @@
 
 To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a NamedTuple of its numbers,
 for kernels. For the type of the numbers register, with contract.py, which describes all functions: `phi`, `gradient`
-and one of `first_hit`, `course` and `bend`; for methods with steps in contact also `hessian` and `farthest_push`. All
-others have a default. Then name the class in ALL_SURFACES below. examples/own_surface.py is a complete surface; if a
-method needs a function that is missing, an error says so before the run.
+and one of `first_hit`, `course` and `bend`; for `Impact`, which slides along walls, and methods with steps in contact
+also `hessian`, and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES below.
+examples/own_surface.py is a complete surface; if a method needs a function that is missing, an error says so before the
+run.
 """
 
 # First, so that what follows from `bend` and from `hessian` is registered with them.
