@@ -1,6 +1,6 @@
 """Contacts that last: sliding, resting, chattering and wedges, each figure beside its bar.
 
-Seconds are of `simulate`, compiled, on one thread, minimum and median of repeats. Beside each scene are `Penalty` and
+Seconds are of `simulate`, compiled, on two threads, minimum and median of repeats. Beside each scene are `Penalty` and
 plain Verlet in it without losses, and the median over the particles of the distance at the end from a refined run.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 
 import swarm
 from swarm import scene_file
+from swarm.lanes.arrays import LANES
 from swarm.methods.base import Method
 from swarm.run.engine import Run
 from swarm.surfaces import Surface
@@ -33,8 +34,9 @@ _STEP, _STIFFNESS = 1e-3, 1e5
 _SETTLED = 10.0
 # The impacts in Galperin's wedge where the heavy mass is 100^n times the light one.
 _PI_DIGITS = (3, 31, 314, 3141, 31415)
-# The composed step is to cost at most this.
-_STEP_BAR = "60"
+# Composed steps of each lane that are timed together; before them come those of particles that begin to slide.
+_STEPS, _BEGIN = 1_000, 100
+_THREADS = 2
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,13 @@ def cases() -> dict[str, Case]:
         "cone with a lid": Case(cone, 1_000, 2.0, "0.1"),
         "sphere as a bowl": Case(bowl, 1_000, 2.0, "0.1"),
         "vessel with a ring": Case(vessel, 3_000, 3.0, "3"),
-        "hopper": Case(scene_file.read(HOPPER).scene, 5_000, 1.0),
+        "hopper": Case(_with(scene_file.read(HOPPER).scene, friction=0.0), 5_000, 1.0),
     }
 
 
 def _run(scene: swarm.Scene, particles: swarm.Particles, method: Method, until: float) -> swarm.Result:
     """The end alone, compiled."""
-    return swarm.simulate(scene, particles, method, until=until, threads=1, progress=False, compile="always")
+    return swarm.simulate(scene, particles, method, until=until, threads=_THREADS, progress=False, compile="always")
 
 
 def _seconds(scene: swarm.Scene, particles: swarm.Particles, method: Method, until: float) -> Callable[[], float]:
@@ -135,14 +137,13 @@ def lasting(name: str, case: Case, quick: bool) -> list[Row]:
 
 def at_rest(quick: bool) -> list[Row]:
     """The hopper with friction until all rest; and a frame of ten thousand grains that do."""
-    hopper = _with(scene_file.read(HOPPER).scene, friction=FRICTION)
+    hopper = scene_file.read(HOPPER).scene
     grains = swarm.fill(hopper, 20 if quick else 5_000, speed=SPEED, seed=0)
     figures = in_turn({"settling": _seconds(hopper, grains, _impact(), _SETTLED)}, 1 if quick else 3)
     end = _run(hopper, grains, _impact(), _SETTLED)
     moving = float(np.any(end.particles.velocity != 0.0, axis=0).sum())
-    what = f"hopper, friction {FRICTION:g}, {_SETTLED:g} s"
+    what = f"hopper, friction {hopper.surfaces[0].friction:g}, {_SETTLED:g} s"
     rows = [Row(what, *figures["settling"], "s", "5"), Row("  still moving", moving, moving, "particles", "0")]
-
     box = swarm.Scene([dataclasses.replace(swarm.Box((0.5, 0.5, 0.5)), restitution=0.5)], GRAVITY)
     box = _with(box, friction=FRICTION)
     count, method, frame = (20 if quick else 10_000), _impact(), 0.01
@@ -202,26 +203,30 @@ def launches(count: int) -> dict[str, tuple[Surface, swarm.Particles]]:
     return {name: (surface, _along(surface, points)) for name, (surface, points) in surfaces.items()}
 
 
-def sliding(quick: bool, steps_of: Callable[[Run], int] | None = None) -> list[Row]:
-    """What a second of sliding costs; what a composed step costs, where `steps_of` counts them."""
-    # TODO: give `steps_of`, as soon as a run counts its sliding steps.
-    count, until, method = (20 if quick else 10_000), 1.0, _impact()
-    rows = []
-    for name, (surface, particles) in launches(count).items():
-        scene = swarm.Scene([surface], GRAVITY)
-
-        def measure(scene: swarm.Scene = scene, particles: swarm.Particles = particles) -> float:
-            with Run(scene, particles.copy(), method, 1, None) as run:
+def sliding(quick: bool) -> list[Row]:
+    """What a composed step costs: of as many particles as two threads have lanes, halted after so many passes."""
+    rows, method, forever = [], _impact(), 1e3
+    for threads in (1, _THREADS):
+        count, steps, rounds = threads * LANES, 20 if quick else _STEPS, 2 if quick else 20
+        for name, (surface, particles) in launches(count).items():
+            scene = swarm.Scene([surface], GRAVITY)
+            with Run(scene, particles, method, threads, LANES) as run:
                 run.advance(0.0, 0.0)
-                start = time.perf_counter()
-                run.advance(method.span("until", until), until)
-                seconds = time.perf_counter() - start
-                return 1e6 * seconds / count if steps_of is None else 1e9 * seconds / steps_of(run)
 
-        figures = in_turn({name: measure}, 1 if quick else 10)[name]
-        unit, bar = ("us/particle-second", "") if steps_of is None else ("ns/step", _STEP_BAR)
-        slid = float(_run(scene, particles, method, until).observables["sliding_time"][-1]) / count
-        rows += [Row(f"sliding, {name}", *figures, unit, bar), Row("  of which in contact", slid, slid, "s", "1")]
+                def measure(run: Run = run, passes: int = steps, count: int = count) -> float:
+                    run.halt(passes)
+                    start = time.perf_counter()
+                    run.advance(method.span("until", forever), forever)
+                    return 1e9 * (time.perf_counter() - start) / (passes * count)
+
+                measure(passes=_BEGIN)
+                before = run.state.contacts.sliding.sum()
+                best, median = repeated(measure, rounds)
+                slid = (run.state.contacts.sliding.sum() - before) / count
+                each = rounds * steps / slid
+            what = f"composed step, {name}, {threads} thread{'s' * (threads > 1)}"
+            rows.append(Row(what, best, median, "ns/step", "60" if threads == _THREADS else ""))
+            rows.append(Row("  steps in a second", each, each, "a particle"))
     return rows
 
 

@@ -115,6 +115,7 @@ class Contacts(NamedTuple):
         keep: (N,) the speed across its walls that it has again when it leaves them [m/s].
         left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
         events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
+        short_steps: (N,) of this frame, where several walls hold it or a cusp.
         sliding: (N,) how long it has slid, or rested, since the start [s].
     """
 
@@ -124,6 +125,7 @@ class Contacts(NamedTuple):
     keep: Floats
     left: Floats
     events: Floats
+    short_steps: Floats
     sliding: Floats
 
 

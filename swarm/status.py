@@ -25,8 +25,8 @@ _SENTENCES = {
     Status.DONE: "the block reached the frame time",
     Status.INTERRUPTED: "the run was interrupted",
     Status.UNSOLVED: "the contact equations of a step were not solved; a smaller dt or a softer penalty helps",
-    Status.STALLED: "the particle met its walls 100 million times within one frame, as in a cusp or in a gap that is "
-    "too thin to resolve; start it elsewhere, or use more frames",
+    Status.STALLED: "the particle meets its walls without end, as in a cusp or in a gap that is too thin to resolve; "
+    "start it elsewhere, or use more frames",
     Status.TOO_FAST: "a step is longer than the thinnest solid, so that the particle could jump over it",
     Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",

@@ -68,6 +68,13 @@ def test_scenes_quick():
 
 
 @pytest.mark.long
+def test_contacts_quick():
+    told = printed("contacts")
+    for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
+        assert row in told
+
+
+@pytest.mark.long
 def test_accuracy_quick():
     told = printed("accuracy")
     assert "sphere: Choose Impact" in told

@@ -81,7 +81,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
         if some_hard or passes % _LOOK == 0:
-            status, lane = _rare(hard, method, chain, gravity, lanes, live)
+            status, lane = _rare(hard, method, chain, gravity, state, lanes, live)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane], drawn
@@ -103,12 +103,13 @@ def advance_block(method, chain, gravity, hard, share, lanes):
 
 
 @outlined
-def _rare(hard, method, chain, gravity, lanes, live):
+def _rare(hard, method, chain, gravity, state, lanes, live):
     """What a pass rarely needs: (worst status, its lane). A particle may meet its walls without end."""
     if not methods.holds(method):
         return _hard_passes(hard, method, chain, gravity, lanes, live)
     for i in range(live):
         if lanes.rows[HITS, i] > MOST_HITS:
+            put(state.position, 0, lanes.particle[i], column(lanes.rows, R, i))
             return Status.STALLED.value, i
     return Status.DONE.value, 0
 

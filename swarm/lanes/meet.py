@@ -18,6 +18,8 @@ from .arrays import heat as book_heat
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
+# Short steps of a particle in a frame: seconds.
+_MOST_SHORT_STEPS = 1e7
 # The step of a particle that several walls carry.
 CARRIED = -1.0
 # It has moved on after this part of a crossing.
@@ -138,6 +140,8 @@ def careful_block(method, chain, gravity, share):
         if following == stop:
             return Status.DONE.value, 0, drawn
         _step(method, chain, gravity, share, following)
+        if share.state.contacts.short_steps[following] > _MOST_SHORT_STEPS:
+            return Status.STALLED.value, following, drawn
         following += 1
 
 
@@ -172,6 +176,7 @@ def _step(method, chain, gravity, share, i):
     if events.settles(method, chain, gravity, p, held):
         _rest(method, chain, gravity, share, i, p, held)
         return
+    contacts.short_steps[i] += 1.0
     end = events.careful(method, chain, gravity, contacts.met[i], p, given)
     for s in range(given.shape[0]):
         state.impulse[s, i] += given[s, 0] * state.mass[i]

@@ -214,6 +214,7 @@ class Run:
         if contacts is None or not self._kinds:
             self._phase.fill(FLYING)
         else:
+            contacts.short_steps.fill(0.0)
             first, second = contacts.walls >= 0.0
             self._phase[:] = np.where(first, np.where(second, EDGE, HELD), FLYING)
             self._phase[first & (contacts.step == meet.CARRIED)] = EVENT
@@ -237,6 +238,13 @@ class Run:
     def _failure(self, status: Status, particle: int, moment: float) -> str:
         """The sentence about a frame that failed."""
         sentence = f"the frame at {moment:g} s failed at particle {particle}: {status.sentence}"
+        if status == Status.STALLED:
+            place = self.state.position[:, particle]
+            wall = int(np.argmax(self._scene.distances_outside(place[:, None])[:, 0]))
+            sentence += (
+                f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at "
+                f"surfaces[{wall}] ({type(self._scene.surfaces[wall]).__name__})"
+            )
         if status == Status.TOO_FAST:
             sentence += f", {self._method.too_fast(self._scene)}"
         multipliers = self.state.multipliers
@@ -356,8 +364,8 @@ def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
 
 
 def _no_contacts(n: int) -> Contacts:
-    met, step, keep, left, sliding = np.zeros((5, n))
-    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), sliding)
+    met, step, keep, left, short_steps, sliding = np.zeros((6, n))
+    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), short_steps, sliding)
 
 
 def _no_sweeps(n: int) -> Multipliers:
