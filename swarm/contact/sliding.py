@@ -25,13 +25,16 @@ MIDDLE = 1.0 - 4.0 * OUTER
 PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 SWEEPS = 40
-# The last sweep moves r1 by no more than this part of itself, or of what a step may be off: the next one would move it
-# by a hundredth of that.
+# The last sweep but one leaves r1 off by no more than this part of itself, or of what a step may be off.
 _STILL, _SLACK = 64.0 * _EPSILON, 0.1
+# A sweep leaves so many times the turn of the velocity in a composed step, over |v|, of what r1 was off: a third of it,
+# half that of the longest part, where the wall is as curved along the path as across.
+_GAIN = 1.5
 # Round-off of what `defect` compares, in units of the last place of a coordinate.
 _NOISE = 8.0 * _EPSILON
-# The error of a composed step over its defect: between a tenth and this on the surfaces of the tests.
-_ERROR = 1.0
+# The error of a composed step over its defect: the error of ten crossings on the surfaces of the tests is then 1 to 8
+# times what is allowed in one.
+_ERROR = 0.3
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
@@ -126,6 +129,18 @@ def split(held, chain, r0, r1, w):
 def _(held, chain, r0, r1, w):
     n, m = walls.step_normal(chain, held.first, r0, r1), walls.step_normal(chain, held.second, r0, r1)
     return _on_edge(n, m, w)
+
+
+@by_type
+def along(held, chain, r0, r1, w):
+    """The part P of it alone, which needs no lengths of normals."""
+    return split(held, chain, r0, r1, w).along
+
+
+@along.register(One)
+def _(held, chain, r0, r1, w):
+    g = walls.inner_gradient(chain, held.first, r0, r1)
+    return w - (dot(w, g) / square(g)) * g
 
 
 @by_type
@@ -329,31 +344,40 @@ def _(friction, v, a):
 # --- A step ----------------------------------------------------------------------------------------------
 
 
+@inlined
+def still(r, v, taken, allowed):
+    """How far the last sweep but one may move r1, if the walls take so much of v in a composed step."""
+    least = _STILL * total(absolute(r))
+    least = select(least > _SLACK * allowed, least, _SLACK * allowed)
+    turn, whole = _GAIN * total(absolute(taken)), total(absolute(v))
+    return select(turn < whole, least * whole / select(turn > 0.0, turn, 1.0), least)
+
+
 class Swept(NamedTuple):
-    """One sweep of a step: r1, w1, what the walls took of w, whether r1 still moves."""
+    """One sweep of a step: r1, and whether it needs more than one other."""
 
     r: Vec
-    w: Vec
-    b: float
-    c: float
     moves: bool
 
 
 @inlined
-def sweep(held, chain, h, step, allowed):
+def sweep(held, chain, h, step, still):
     """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
-    taken = split(held, chain, r0, r1, w)
-    end = r0 + h * taken.along
-    moved, least = total(absolute(end - r1)), _STILL * total(absolute(r0))
-    least = select(least > _SLACK * allowed, least, _SLACK * allowed)
-    return Swept(end, 2.0 * taken.along - w, taken.b, taken.c, not (moved <= least))
+    end = r0 + h * along(held, chain, r0, r1, w)
+    return Swept(end, not (total(absolute(end - r1)) <= still))
 
 
 @inlined
 def part(k):
     """The length of step k of the composition, in units of its length."""
     return select(k == 2, MIDDLE, OUTER)
+
+
+@inlined
+def inverse_part(k):
+    """One over it."""
+    return select(k == 2, 1.0 / MIDDLE, 1.0 / OUTER)
 
 
 @inlined
@@ -445,9 +469,9 @@ def _may_meet(surface, path, near):
 @inlined
 def _level(surface, r, v):
     """The level of a wall, its rate of change, and the length of its gradient."""
-    scale = math.sqrt(square(contract.slope(surface, r)))
-    rate = scale * dot(contract.unit_normal(surface, r), v)
-    return contract.level_of(surface, contract.inner(surface, r)), rate, scale
+    n = contract.unit_normal(surface, r)
+    scale = abs(dot(n, contract.slope(surface, r)))
+    return contract.level_of(surface, contract.inner(surface, r)), scale * dot(n, v), scale
 
 
 @by_type

@@ -25,13 +25,12 @@ from .arrays import LANES, STRIDE, following_particle, speed2_scale, table, with
 # What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
 # speed it keeps across the walls, twice its energy, the square of its speed scale, its walls, and where a step is cut.
 R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12, 13, 14, 15, 16, 18
-# The step of this pass: its length and end, what presses there, its impulses, the work of friction,
-# and by how much it may be off.
-H, R1, V1, A1, PRESS1, IMPULSE, WORK, ALLOWED = 19, 20, 23, 26, 29, 31, 33, 34
-# The part of the composition under way: start, w0, the last guess of the end, w1, what the walls took, the direction in
-# which it slides, the acceleration of the step before; how
-# often the step has been cut.
-FROM, W, END, W1, TAKEN, TOWARD, BEFORE, TRIALS, ROWS = 35, 38, 41, 44, 47, 49, 52, 55, 56
+# The step of this pass: its length, how far the composition has come, what presses at its end, its impulses, the work of
+# friction, by how much it may be off, and by how much the last sweep but one.
+H, R1, V1, PRESS1, IMPULSE, WORK, ALLOWED, STILL = 19, 20, 23, 26, 28, 30, 31, 32
+# The part of the composition under way: w0, the last guess of its end, the direction in which it slides; the changes of
+# velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut.
+W, END, TOWARD, CHANGE, BEFORE, TRIALS, ROWS = 33, 36, 39, 42, 45, 48, 49
 # Times that a step is cut before the lane is given up: it takes four or so.
 _MOST_TRIALS = 100
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
@@ -142,6 +141,7 @@ def _next_phase(kind, method, chain, gravity, state, lanes, i):
 def _compose(kind, method, chain, gravity, lanes, live):
     rows, moving = lanes.rows, lanes.moving
     friction, tolerance = methods.friction(method), methods.sliding_tolerance(method)
+    rubs = wall_laws.is_given(friction)
     for i in range(live):
         v, a = column(rows, V, i), column(rows, A, i)
         h = select(rows[STEP, i] < rows[LEFT, i], rows[STEP, i], rows[LEFT, i])
@@ -151,28 +151,30 @@ def _compose(kind, method, chain, gravity, lanes, live):
         # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
         speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
         rows[H, i], rows[ALLOWED, i] = h, tolerance * speed * h
-        put(rows, R1, i, column(rows, R, i))
+        r, taken = column(rows, R, i), accelerated(gravity, ZERO, 1.0) - a
+        rows[STILL, i] = slides.still(r, v, h * taken, rows[ALLOWED, i])
+        put(rows, R1, i, r)
         put(rows, V1, i, v)
-        put(rows, A1, i, a)
-        put(rows, BEFORE, i, a)
+        put(rows, CHANGE, i, h * a)
+        put(rows, BEFORE, i, h * a)
         rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i] = 0.0, 0.0, 0.0
         lanes.event[i] = 0
     for k in range(slides.PARTS):
         for i in range(live):
             r, v, h = column(rows, R1, i), column(rows, V1, i), slides.part(k) * rows[H, i]
-            last = column(rows, A1, i)
-            a = last + slides.lead(k) * (last - column(rows, BEFORE, i))
+            last = column(rows, CHANGE, i)
+            change = last + slides.lead(k) * (last - column(rows, BEFORE, i))
             put(rows, BEFORE, i, last)
-            toward = slides.direction(friction, v, column(rows, A1, i))
-            held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-            slowed = slides.slow(friction, held, chain, gravity, r, (v, toward), 0.5 * h)
-            v = slowed.v
-            rows[WORK, i] += slowed.lost
-            put(rows, TOWARD, i, toward)
-            put(rows, FROM, i, r)
+            put(rows, END, i, r + h * (v + (0.5 * slides.part(k)) * change))
+            if rubs:
+                toward = slides.direction(friction, v, last)
+                held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+                slowed = slides.slow(friction, held, chain, gravity, r, (v, toward), 0.5 * h)
+                v = slowed.v
+                rows[WORK, i] += slowed.lost
+                put(rows, TOWARD, i, toward)
             put(rows, W, i, accelerated(gravity, v, 0.5 * h))
-            put(rows, END, i, r + h * (column(rows, V1, i) + (0.5 * h) * a))
-            moving[i] = h != 0.0
+            moving[i] = True
         for _sweep in range(slides.SWEEPS):
             some = False
             for i in range(live):
@@ -180,17 +182,20 @@ def _compose(kind, method, chain, gravity, lanes, live):
             if not some:
                 break
         for i in range(live):
-            h, w1 = slides.part(k) * rows[H, i], column(rows, W1, i)
-            v0, r, v1 = column(rows, V1, i), column(rows, END, i), accelerated(gravity, w1, 0.5 * h)
+            h, w, v0, r0 = slides.part(k) * rows[H, i], column(rows, W, i), column(rows, V1, i), column(rows, R1, i)
             held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-            slowed = slides.slow(friction, held, chain, gravity, r, (v1, column(rows, TOWARD, i)), 0.5 * h)
-            v1 = slowed.v
-            rows[WORK, i] += slowed.lost
+            # The last sweep
+            taken = slides.split(held, chain, r0, column(rows, END, i), w)
+            r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
+            if rubs:
+                slowed = slides.slow(friction, held, chain, gravity, r, (v1, column(rows, TOWARD, i)), 0.5 * h)
+                v1 = slowed.v
+                rows[WORK, i] += slowed.lost
             put(rows, R1, i, r)
             put(rows, V1, i, v1)
-            put(rows, A1, i, (v1 - v0) / select(h == 0.0, 1.0, h))
-            rows[IMPULSE, i] += 2.0 * rows[TAKEN, i]
-            rows[IMPULSE + 1, i] += 2.0 * rows[TAKEN + 1, i]
+            put(rows, CHANGE, i, slides.inverse_part(k) * (v1 - v0))
+            rows[IMPULSE, i] += 2.0 * taken.b
+            rows[IMPULSE + 1, i] += 2.0 * taken.c
             lanes.event[i] |= select(moving[i], FAILED, 0)
 
 
@@ -199,13 +204,10 @@ def _sweep_lane(kind, chain, lanes, i, part):
     """One sweep of a lane that still moves: whether it needs another."""
     rows, moving = lanes.rows, lanes.moving
     held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-    r0, end, w = column(rows, FROM, i), column(rows, END, i), column(rows, W, i)
-    swept = slides.sweep(held, chain, part * rows[H, i], (r0, end, w), rows[ALLOWED, i])
+    r0, end, w = column(rows, R1, i), column(rows, END, i), column(rows, W, i)
+    swept = slides.sweep(held, chain, part * rows[H, i], (r0, end, w), rows[STILL, i])
     on = moving[i]
     put(rows, END, i, either(on, swept.r, end))
-    put(rows, W1, i, either(on, swept.w, column(rows, W1, i)))
-    rows[TAKEN, i] = select(on, swept.b, rows[TAKEN, i])
-    rows[TAKEN + 1, i] = select(on, swept.c, rows[TAKEN + 1, i])
     more = on & swept.moves
     moving[i] = more
     return more
