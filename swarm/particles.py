@@ -116,6 +116,8 @@ class Contacts(NamedTuple):
         left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
         events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
         short_steps: (N,) of this frame, where several walls hold it or a cusp.
+        resting: (N,) bool, whether it is at rest, for good.
+        load: (walls, N) what each wall carries of it then, per mass [m/s^2].
         sliding: (N,) how long it has slid, or rested, since the start [s].
     """
 
@@ -126,6 +128,8 @@ class Contacts(NamedTuple):
     left: Floats
     events: Floats
     short_steps: Floats
+    resting: NDArray[np.bool_]
+    load: Floats
     sliding: Floats
 
 

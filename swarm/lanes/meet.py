@@ -20,8 +20,6 @@ from .arrays import heat as book_heat
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
-# The step of a particle that several walls carry.
-CARRIED = -1.0
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -44,10 +42,6 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
-    if not left > 0.0:
-        # It rested where several walls carry it, to the end of the last frame.
-        left, contacts.met[i], contacts.walls[0, i] = share.span, contacts.walls[0, i], -1.0
-        contacts.left[i] = left
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
@@ -147,11 +141,12 @@ def careful_block(method, chain, gravity, share):
 
 @outlined
 def _rest(method, chain, gravity, share, i, p, held):
-    """Let particle i rest to the end of the frame."""
+    """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
     loses = loses_energy(methods.laws(method))
     for s in range(held.shape[1]):
         taken = held[1, s] if loses else 0.0
+        contacts.load[s, i] = held[0, s]
         state.impulse[s, i] += (held[0, s] * p.left + taken) * state.mass[i]
     if loses:
         # Round-off that its walls have gathered, which nothing takes back from now on
@@ -161,7 +156,7 @@ def _rest(method, chain, gravity, share, i, p, held):
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.left
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
-    contacts.walls[0, i], contacts.walls[1, i], contacts.step[i] = contacts.met[i], -1.0, CARRIED
+    contacts.walls[0, i], contacts.walls[1, i], contacts.resting[i] = contacts.met[i], -1.0, True
     share.phase[i] = ARRIVED
     share.pending[ARRIVED] += 1
 

@@ -25,8 +25,8 @@ from .arrays import LANES, STRIDE, following_particle, speed2_scale, table, with
 # What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
 # speed it keeps across the walls, twice its energy, the square of its speed scale, its walls, and where a step is cut.
 R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12, 13, 14, 15, 16, 18
-# The step of this pass: its length, how far the composition has come, what presses at its end, its impulses, the work of
-# friction, by how much it may be off, and by how much the last sweep but one.
+# The step of this pass: its length, how far the composition has come, what presses at its end, its impulses, the work
+# of friction, by how much it may be off, and by how much the last sweep but one.
 H, R1, V1, PRESS1, IMPULSE, WORK, ALLOWED, STILL = 19, 20, 23, 26, 28, 30, 31, 32
 # The part of the composition under way: w0, the last guess of its end, the direction in which it slides; the changes of
 # velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut.
@@ -35,8 +35,8 @@ W, END, TOWARD, CHANGE, BEFORE, TRIALS, ROWS = 33, 36, 39, 42, 45, 48, 49
 _MOST_TRIALS = 100
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
 _FIRST = 1e-3
-# A step that is tried again is so much shorter; one of this part of a crossing is the shortest.
-_RETRY, _SHORTEST = 0.25, 1e-10
+# A step that is tried again is so much shorter; one of this part of a crossing, or of the size, is the shortest.
+_RETRY, _SHORTEST, _NO_WAY = 0.25, 1e-10, 1e-15
 # Friction has stopped a particle where this part of |v|^2 is left.
 _STOPPED = 1e-24
 
@@ -254,8 +254,11 @@ def _end_steps(kind, method, chain, gravity, lanes, live):
         rows[PRESS, i] = select(fine, force.n, rows[PRESS, i])
         rows[PRESS + 1, i] = select(fine, force.m, rows[PRESS + 1, i])
         lanes.event[i] |= _stop(friction, fine, v1, scale2)
-        # Near an apex steps become shorter without end.
-        lanes.event[i] |= select(rows[STEP, i] < _SHORTEST * method.size / math.sqrt(scale2), STUCK, 0)
+        # Near an apex steps become shorter without end, in time or, of a slow particle, in length.
+        step = rows[STEP, i]
+        way2 = step * step * (square(v1) + step * step * square(accelerated(gravity, ZERO, 1.0)))
+        short = (step < _SHORTEST * method.size / math.sqrt(scale2)) | (way2 < (_NO_WAY * method.size) ** 2)
+        lanes.event[i] |= select(short, STUCK, 0)
 
 
 @by_type
@@ -340,7 +343,11 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     if not rows[STEP, i] > 0.0:
         rows[STEP, i] = _FIRST * method.size / np.sqrt(rows[SCALE2, i])
     if square(v) == 0.0 and events.rests(gravity, force):
-        state.contacts.sliding[lanes.particle[i]] += left
+        p, contacts = lanes.particle[i], state.contacts
+        contacts.sliding[p] += left
+        contacts.resting[p], contacts.load[int(rows[WALL, i]), p] = True, force.n
+        if rows[WALL + 1, i] >= 0.0:
+            contacts.load[int(rows[WALL + 1, i]), p] = force.m
         _push(state, lanes, i, force.n * left, force.m * left)
         rows[LEFT, i] = 0.0
         return ARRIVED

@@ -62,7 +62,7 @@ class Run:
             np.zeros((len(self._owners), n)),
             np.zeros(0 if laws is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
-            _no_contacts(n) if method.may_slide() else None,
+            _no_contacts(len(self._owners), n) if method.may_slide() else None,
             None if laws is None or laws.thermal is None else np.zeros((len(self._owners), n)),
         )
         self._scene, self._method = scene, method
@@ -115,7 +115,7 @@ class Run:
         time to write a frame [s].
         """
         if not self._cut_short:
-            self._begin()
+            self._begin(span)
         if self._tier.is_plain:
             if self._tier.left <= 0.0:
                 self._choose_tier()
@@ -208,16 +208,22 @@ class Run:
         self._ticket[0] = 0
         self._share(0.0)
 
-    def _begin(self) -> None:
-        """Whether each particle begins a frame in flight or along its walls."""
+    def _begin(self, span: float) -> None:
+        """Whether each particle begins a frame in flight, along its walls or at rest."""
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             self._phase.fill(FLYING)
         else:
             contacts.short_steps.fill(0.0)
             first, second = contacts.walls >= 0.0
-            self._phase[:] = np.where(first, np.where(second, EDGE, HELD), FLYING)
-            self._phase[first & (contacts.step == meet.CARRIED)] = EVENT
+            self._phase.fill(FLYING)
+            self._phase[first] = HELD
+            self._phase[second] = EDGE
+            if contacts.resting.any():
+                # What is at rest costs this much.
+                self._phase[contacts.resting] = ARRIVED
+                self.state.impulse[:] += contacts.load * (span * self.state.mass)
+                contacts.sliding[:] += span * contacts.resting
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
@@ -363,9 +369,10 @@ def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
     return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
 
 
-def _no_contacts(n: int) -> Contacts:
+def _no_contacts(walls: int, n: int) -> Contacts:
     met, step, keep, left, short_steps, sliding = np.zeros((6, n))
-    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), short_steps, sliding)
+    resting, load = np.zeros(n, np.bool_), np.zeros((walls, n))
+    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), short_steps, resting, load, sliding)
 
 
 def _no_sweeps(n: int) -> Multipliers:
