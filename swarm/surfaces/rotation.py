@@ -1,5 +1,6 @@
 """Rotations as unit quaternions (w, x, y, z): what an argument may say, and what follows from it."""
 
+import functools
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -132,7 +133,17 @@ class Rotated(NamedTuple):
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:
     """What kernels take of a surface whose own axes are these columns."""
-    return body if np.array_equal(axes, np.eye(3)) else Rotated(body, *map(vec, axes.tolist()))
+    if np.array_equal(axes, np.eye(3)):
+        return body
+    right = np.rint(axes)
+    swapped = by_right_angles(body, right) if np.abs(axes - right).max() <= _ROUND_OFF else None
+    return Rotated(body, *map(vec, axes.tolist())) if swapped is None else swapped
+
+
+@functools.singledispatch
+def by_right_angles(body: Any, axes: NDArray[np.float64]) -> Any:
+    """The numbers of a surface whose own axes are other axes of the scene, or their opposites; None: it has none."""
+    return None
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:

@@ -13,6 +13,7 @@ from ...kernel.jit import by_type, inlined, select
 from ...kernel.vector import Vec, absolute, cross, dot, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
+from ..rotation import by_right_angles
 from ..surface import side_sign
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
@@ -43,6 +44,13 @@ def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, 
     sign = side_sign(side)
     kind = ConvexQuadric if min(sign * a) >= 0.0 else QuadricNumbers
     return kind(vec(center), a, b, level, scale, sign)
+
+
+@by_right_angles.register(QuadricNumbers)
+def _(body: QuadricNumbers, axes: Any) -> QuadricNumbers:
+    b = None if body.b is None else vec((axes @ np.array(body.b)).tolist())
+    center, a = axes @ np.array(body.center), abs(axes) @ np.array(body.a)
+    return body._replace(center=vec(center.tolist()), a=vec(a.tolist()), b=b)
 
 
 @inlined
