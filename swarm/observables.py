@@ -169,16 +169,14 @@ def drift(seen: dict[str, Any]) -> float:
     return float(change / abs(energy[0]) if energy[0] else change)
 
 
-def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
+def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise.
 
-    `owners` says which surface each wall belongs to.
+    `owners` says which surface each wall belongs to, `lasts` whether a contact has lasted in this run.
     """
-    multipliers, contacts = state.multipliers, state.contacts
-    impulse, heat = (
-        np.bincount(owners, weights=np.zeros(len(owners)) if rows is None else rows.sum(axis=1))
-        for rows in (state.impulse, state.heat)
-    )
+    multipliers, contacts = state.multipliers, state.contacts if lasts else None
+    impulse = np.bincount(owners, weights=state.impulse.sum(axis=1))
+    heat = np.zeros_like(impulse) if state.heat is None else np.bincount(owners, weights=state.heat.sum(axis=1))
     loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
@@ -195,7 +193,7 @@ def summary(partial: Floats, state: State, owners: list[int]) -> dict[str, Any]:
         "max_penetration": depth,
         "impacts": int(state.impacts.sum()),
         "impulse": impulse,
-        "sliding": 0 if contacts is None else int((contacts.walls[0] >= 0.0).sum()),
+        "sliding": 0 if contacts is None else int(np.count_nonzero(contacts.phase)),
         "sliding_time": 0.0 if contacts is None else float(contacts.sliding.sum()),
         "wall_heat": heat,
         **loops,

@@ -109,6 +109,7 @@ class Contacts(NamedTuple):
     """What lasts of each particle's contacts, of methods in which a particle may slide.
 
     Attributes:
+        phase: (N,) int8, how it begins the next frame: in flight, along one wall or two, or at rest (ARRIVED).
         walls: (2, N) the walls that hold it, as numbers; -1 for none. Two are an edge.
         met: (N,) the wall at which it is to be decided what becomes of it.
         step: (N,) its next sliding step [s]; 0 where the walls decide.
@@ -116,11 +117,11 @@ class Contacts(NamedTuple):
         left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
         events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
         short_steps: (N,) of this frame, where several walls hold it or a cusp.
-        resting: (N,) bool, whether it is at rest, for good.
-        load: (walls, N) what each wall carries of it then, per mass [m/s^2].
+        load: (walls, N) what each wall carries of it at rest, per mass [m/s^2].
         sliding: (N,) how long it has slid, or rested, since the start [s].
     """
 
+    phase: NDArray[np.int8]
     walls: Floats
     met: Floats
     step: Floats
@@ -128,7 +129,6 @@ class Contacts(NamedTuple):
     left: Floats
     events: Floats
     short_steps: Floats
-    resting: NDArray[np.bool_]
     load: Floats
     sliding: Floats
 

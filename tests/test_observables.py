@@ -36,7 +36,7 @@ def observe(law, scene, state, blocks=1):
     size = len(partial) * observables.CHUNK if blocks == 1 else observables.CHUNK
     for k in reversed(range(1 if blocks == 1 else len(partial))):
         observables.observe(law, scene.chain(), scene.pull(), state, np.array([k]), size, partial)
-    return observables.summary(partial, state, list(range(len(state.impulse))))
+    return observables.summary(partial, state, list(range(len(state.impulse))), True)
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
     assert (lasting["sliding"], lasting["sliding_time"]) == (12, pytest.approx(sliding.sum(), rel=1e-13))
     assert lasting["wall_heat"] == pytest.approx(heat.sum(axis=1), rel=1e-12)
     partial = np.zeros((1, observables.ROWS))
-    of_one = observables.summary(partial, state._replace(heat=heat), [0, 0])
+    of_one = observables.summary(partial, state._replace(heat=heat), [0, 0], True)
     assert of_one["wall_heat"] == pytest.approx([heat.sum()], rel=1e-12)
     for name in found.keys() - {"sliding", "sliding_time", "wall_heat"}:
         assert np.array_equal(found[name], lasting[name]), name

@@ -256,7 +256,9 @@ def rest_of_frame(contacts, i):
 @rest_of_frame.register(Contacts)
 def _(contacts, i):
     left = contacts.left[i]
-    contacts.left[i], contacts.walls[0, i], contacts.walls[1, i] = 0.0, -1.0, -1.0
+    # Where nothing lasts none of these arrays is written: their memory is not even there.
+    if left > 0.0:
+        contacts.left[i] = 0.0
     return left
 
 

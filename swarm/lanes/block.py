@@ -80,7 +80,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
             return Status.INTERRUPTED.value, live, drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
-        if some_hard or passes % _LOOK == 0:
+        if some_hard or (methods.holds(method) and passes % _LOOK == 0):
             status, lane = _rare(hard, method, chain, gravity, state, lanes, live)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
@@ -145,7 +145,7 @@ def _pass(method, chain, gravity, share, lanes, live):
     for i in range(live):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
         contact = methods.contact(method, chain, gravity, lane, lanes.wall[i], found)
-        arrived, hard = _end(method, chain, lanes, i, contact)
+        arrived, hard = _end(method, chain, lanes, i, lanes.wall[i], contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
 
@@ -248,12 +248,12 @@ def _flight(method, chain, gravity, lanes, i, hit):
 
 
 @inlined
-def _end(method, chain, lanes, i, contact):
+def _end(method, chain, lanes, i, met, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
     _put(lanes, i, contact)
     _count(method, lanes, i, contact)
     lanes.wall[i] = contact.wall
-    _add_impulse(chain.rest, chain, lanes.impulse, i, _wall_of(method, contact), contact.impulse)
+    _add_impulse(chain.rest, chain, lanes.impulse, i, _wall_of(method, met, contact), contact.impulse)
     hard = contact.wall <= methods.HARD
     if methods.holds(method):
         # What lasts is another kernel's.
@@ -262,11 +262,9 @@ def _end(method, chain, lanes, i, contact):
 
 
 @inlined
-def _wall_of(method, contact):
+def _wall_of(method, met, contact):
     """The wall that gives an impulse: one whose contact lasts too."""
-    if methods.holds(method):
-        return select(contact.wall <= methods.HARD, methods.HARD - contact.wall, contact.wall)
-    return contact.wall
+    return met if methods.holds(method) else contact.wall
 
 
 @inlined

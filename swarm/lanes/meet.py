@@ -76,6 +76,7 @@ def _decide(method, chain, gravity, share, i):
     contacts.step[i] = contacts.step[i] if same else 0.0
     contacts.walls[0, i] = found.wall if slides else -1.0
     contacts.walls[1, i] = found.other if slides else -1.0
+    contacts.phase[i] = phase if phase in (HELD, EDGE) else FLYING
     share.phase[i] = phase
     share.pending[phase] += 1
     return again < _MOST
@@ -98,7 +99,7 @@ def _(thermal, chain, gravity, share, i):
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     state.impulse[int(wall), i] += left.impulse * state.mass[i]
-    contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i] = -1.0, -1.0, 0.0
+    contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.phase[i] = FLYING
     share.pending[FLYING] += 1
     return True
@@ -156,7 +157,7 @@ def _rest(method, chain, gravity, share, i, p, held):
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.left
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
-    contacts.walls[0, i], contacts.walls[1, i], contacts.resting[i] = contacts.met[i], -1.0, True
+    contacts.phase[i] = ARRIVED
     share.phase[i] = ARRIVED
     share.pending[ARRIVED] += 1
 
@@ -181,6 +182,6 @@ def _step(method, chain, gravity, share, i):
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED
-    contacts.walls[0, i], contacts.walls[1, i], contacts.step[i], contacts.keep[i] = -1.0, -1.0, 0.0, 0.0
+    contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
     share.phase[i] = phase
     share.pending[phase] += 1

@@ -345,7 +345,7 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
         contacts.sliding[p] += left
-        contacts.resting[p], contacts.load[int(rows[WALL, i]), p] = True, force.n
+        contacts.phase[p], contacts.load[int(rows[WALL, i]), p] = ARRIVED, force.n
         if rows[WALL + 1, i] >= 0.0:
             contacts.load[int(rows[WALL + 1, i]), p] = force.m
         _push(state, lanes, i, force.n * left, force.m * left)
@@ -370,6 +370,10 @@ def _retire(kind, chain, share, lanes, i, phase):
     put(share.state.velocity, 0, p, v)
     contacts.walls[0, p] = rows[WALL, i] if slid else -1.0
     contacts.walls[1, p] = rows[WALL + 1, i] if slid else -1.0
+    if phase != ARRIVED:
+        contacts.phase[p] = phase if slid else FLYING
+    elif contacts.phase[p] != ARRIVED:
+        contacts.phase[p] = _phase(kind)
     contacts.left[p] = rows[LEFT, i] if phase != ARRIVED else 0.0
     contacts.step[p] = rows[STEP, i] if slid else 0.0
     contacts.keep[p] = keep

@@ -215,15 +215,12 @@ class Run:
             self._phase.fill(FLYING)
         else:
             contacts.short_steps.fill(0.0)
-            first, second = contacts.walls >= 0.0
-            self._phase.fill(FLYING)
-            self._phase[first] = HELD
-            self._phase[second] = EDGE
-            if contacts.resting.any():
+            self._phase[:] = contacts.phase
+            rests = contacts.phase == ARRIVED
+            if rests.any():
                 # What is at rest costs this much.
-                self._phase[contacts.resting] = ARRIVED
                 self.state.impulse[:] += contacts.load * (span * self.state.mass)
-                contacts.sliding[:] += span * contacts.resting
+                contacts.sliding[:] += span * rests
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
@@ -327,13 +324,13 @@ class Run:
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
         contacts = self.state.contacts
-        if contacts is not None and ((contacts.walls >= 0.0).any() or (contacts.left > 0.0).any()):
+        if contacts is not None and (contacts.phase.any() or (contacts.left > 0.0).any()):
             self._kinds = set(_KINDS)
             self._choose_tier()
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
-        seen = observables.summary(self._partial, self.state, self._owners)
+        seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
         is_open = self._far < math.inf
         escaped = self._tier.kernel(observables.count_escaped)(*self._escaping) if is_open else 0
         return {**seen, "escaped": int(escaped)}
@@ -370,9 +367,9 @@ def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:
+    phase, load = np.zeros(n, np.int8), np.zeros((walls, n))
     met, step, keep, left, short_steps, sliding = np.zeros((6, n))
-    resting, load = np.zeros(n, np.bool_), np.zeros((walls, n))
-    return Contacts(np.full((2, n), -1.0), met, step, keep, left, np.zeros((2, n)), short_steps, resting, load, sliding)
+    return Contacts(phase, np.zeros((2, n)), met, step, keep, left, np.zeros((2, n)), short_steps, load, sliding)
 
 
 def _no_sweeps(n: int) -> Multipliers:

@@ -1,6 +1,7 @@
 """Resting and sliding under gravity: floors, bowls, slopes, grooves, corners, and leaving a ball."""
 
 import math
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 from physics.billiards import EPSILON, run
 
 import swarm
+from swarm.scene_file import read
 
 pytestmark = pytest.mark.physics
 
+SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 G = 9.81
 DOWN = (0.0, 0.0, -G)
 # Out of reach, but not far: it sets the scene's size, and so the default shortest flight.
@@ -117,3 +120,29 @@ def test_leaving_a_ball():
         assert end.observables["energy_error"].max() <= 1e-14
     assert errors[0] <= 1e-3, errors
     assert errors[2] <= 1e-5, errors
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_hopper_settles(threads):
+    """With friction every grain comes to rest, those that reach the tip of the cone too, and costs nothing after."""
+    scene = read(SCENES / "hopper.toml").scene
+    start = swarm.fill(scene, 1500, speed=1.0, seed=0)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=4.0, every=1.0, threads=threads, compile="always")
+    seen = result.observables
+    assert seen["sliding"].tolist()[-2:] == [1500, 1500]
+    assert (result.particles.velocity == 0.0).all()
+    assert seen["impacts"][-1] == seen["impacts"][-2]
+    assert seen["energy_error"].max() <= 1e-12
+    assert seen["max_penetration"].max() <= 1e-13
+
+
+@pytest.mark.parametrize(
+    "normals", [((0.0, 0.0, -1.0),), ((1.0, 0.0, -1.0), (-1.0, 0.0, -1.0))], ids=["floor", "groove"]
+)
+def test_what_rests_is_carried_frame_by_frame(normals):
+    scene = planes(*normals)
+    seen = run(scene, swarm.Particles([0.0] * 3, [0.0] * 3, 2.0), swarm.Impact(), 4.0, 0.5).observables
+    share = 2.0 * G * 0.5 / (len(normals) * abs(np.array(normals[0])[2]) / np.linalg.norm(normals[0]))
+    for s in range(len(normals)):
+        assert np.diff(seen["impulse"][:, s]) == pytest.approx(share, rel=1e-13)
+    assert seen["sliding_time"] == pytest.approx(seen["time"], abs=1e-7)
