@@ -6,6 +6,7 @@ from conftest import EPSILON, call, numbers_of, scene_of, wall_point
 
 import swarm
 from swarm import observables
+from swarm.contact import events
 from swarm.contact.regularisation import regularisation
 from swarm.particles import Contacts, State
 from swarm.surfaces import contract
@@ -103,10 +104,10 @@ def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
     scene, law, state, found = seen
     assert (found["sliding"], found["sliding_time"], found["wall_heat"].tolist()) == (0, 0.0, [0.0, 0.0])
     random = np.random.default_rng(7)
-    walls, sliding = np.full((2, N), -1.0), random.uniform(size=N)
-    # Wall 0, or wall 1, or the edge of both.
-    walls[0, 3], walls[0, 40:50], walls[:, -1] = 1.0, 0.0, (0.0, 1.0)
-    contacts = Contacts(walls, *np.zeros((4, N)), np.zeros((2, N)), sliding)
+    phase, sliding = np.zeros(N, np.int8), random.uniform(size=N)
+    phase[3], phase[40:50], phase[-1] = events.HELD, events.EDGE, events.ARRIVED  # which is to rest
+    two, four = np.zeros((2, N)), np.zeros((4, N))
+    contacts = Contacts(phase, two, *four, two, np.zeros(N), two, sliding)
     heat = random.normal(size=(2, N))
     lasting = observe(law, scene, state._replace(contacts=contacts, heat=heat))
     assert (lasting["sliding"], lasting["sliding_time"]) == (12, pytest.approx(sliding.sum(), rel=1e-13))

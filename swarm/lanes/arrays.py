@@ -279,7 +279,7 @@ def hand_over(contacts, i, left, wall):
 def _(contacts, i, left, wall):
     if not left > 0.0:
         return ARRIVED
-    contacts.left[i], contacts.met[i] = left, methods.HARD - wall
+    contacts.left[i], contacts.met[i] = left, wall
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
     return EVENT
 

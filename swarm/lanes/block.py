@@ -145,7 +145,7 @@ def _pass(method, chain, gravity, share, lanes, live):
     for i in range(live):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
         contact = methods.contact(method, chain, gravity, lane, lanes.wall[i], found)
-        arrived, hard = _end(method, chain, lanes, i, lanes.wall[i], contact)
+        arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
 
@@ -248,23 +248,14 @@ def _flight(method, chain, gravity, lanes, i, hit):
 
 
 @inlined
-def _end(method, chain, lanes, i, met, contact):
+def _end(method, chain, lanes, i, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
     _put(lanes, i, contact)
     _count(method, lanes, i, contact)
+    _add_impulse(chain.rest, chain, lanes.impulse, i, contact.wall, contact.impulse)
     lanes.wall[i] = contact.wall
-    _add_impulse(chain.rest, chain, lanes.impulse, i, _wall_of(method, met, contact), contact.impulse)
-    hard = contact.wall <= methods.HARD
-    if methods.holds(method):
-        # What lasts is another kernel's.
-        return hard | (not (contact.left > 0.0)), False
-    return not (contact.left > 0.0), hard
-
-
-@inlined
-def _wall_of(method, met, contact):
-    """The wall that gives an impulse: one whose contact lasts too."""
-    return met if methods.holds(method) else contact.wall
+    hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
+    return contact.lasts | (not (contact.left > 0.0)), hard
 
 
 @inlined
@@ -282,8 +273,7 @@ def _count(method, lanes, i, contact):
     rows[HITS, i] += contact.hits
     if methods.dissipates(method):
         rows[OWN, i] = contact.twice_energy
-    gone = methods.holds(method) & (contact.wall <= methods.HARD)
-    lanes.marked[i] = gone | (not (contact.left > 0.0))
+    lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
 
 
 @by_type

@@ -241,6 +241,7 @@ def _(method, chain, gravity, lane, wall, solution):
         select(step, given, 0.0),
         select(new, 1.0, 0.0),
         0.0,
+        False,
     )
 
 
@@ -272,4 +273,4 @@ def _(method, chain, gravity, lane, wall, lanes, i):
     budget = energies.Budget(2.0 * lane.own.over_mass, lane.own.energy, 1.0 / h * (2.0 / h * norm(reaction)))
     factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
     left = lane.left - cut.used
-    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, 0.0), Status.DONE.value
+    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, 0.0, False), Status.DONE.value

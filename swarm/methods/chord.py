@@ -55,13 +55,14 @@ def _(method, chain, gravity, lane, wall, solution):
     h, turned = _step(method, lane), solution.turned
     r, v, stays = chord_end(chain, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
     hit = wall >= 0.0
-    chord = hit & stays & (turned.impulse > 2.0 * lane.own.slow) & (not solution.unsolved)
+    chord = hit & stays & (turned.impulse > lane.own.slow) & (not solution.unsolved)
     return contract.Contact(
         select(chord, r, kept(lane.r)),
         select(chord, v, kept(lane.v)),
         lane.left - select(chord, h, 0.0),
-        select(hit & (not chord), contract.HARD - wall, wall),
+        wall,
         select(chord, turned.impulse, 0.0),
         select(chord, 1.0, 0.0),
         lane.own.energy.twice,
+        hit & (not chord),
     )

@@ -66,7 +66,8 @@ class Sweep(NamedTuple):
 class Contact(NamedTuple):
     """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
 
-    Where contacts may lose energy, twice_energy is twice the energy per mass that is left.
+    Where contacts may lose energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
+    particles on walls, `lasts` says that another kernel decides what follows, at this wall.
     """
 
     r: Vec
@@ -76,6 +77,7 @@ class Contact(NamedTuple):
     impulse: float
     hits: float
     twice_energy: float
+    lasts: Any
 
 
 # --- What a lane keeps -----------------------------------------------------------------------------------
@@ -101,7 +103,7 @@ def dissipates(method):
 
 @by_type
 def holds(method):
-    """Whether a particle may stay on a wall: its numbers are `Held`, and a contact that lasts is HARD."""
+    """Whether a particle may stay on a wall: its numbers are `Held`."""
     return False
 
 

@@ -218,6 +218,7 @@ def contact(lane, wall, taken):
         select(step, taken.impulse, 0.0),
         select(step & taken.new, 1.0, 0.0),
         0.0,
+        False,
     )
 
 
@@ -234,10 +235,10 @@ def _(method, chain, gravity, lane, wall, lanes, i):
     r, v, solved = careful_step(method, chain, gravity, lane, lanes.impulse, i)
     new = select(walls.outside(chain, -1.0, lane.r), 0.0, 1.0)
     status = Status.DONE.value if solved else Status.UNSOLVED.value
-    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, new, 0.0), status
+    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, new, 0.0, False), status
 
 
 @inlined
 def refused(lane, status):
     """A hard step that is not taken, for this reason."""
-    return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0), status
+    return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status

@@ -125,7 +125,7 @@ class Reflection(NamedTuple):
 
 
 class ImpactOwn(NamedTuple):
-    """What a lane keeps: its energy, and the speed [m/s] away from a wall below which a contact may last."""
+    """What a lane keeps: its energy, and twice the speed [m/s] away from a wall below which a contact may last."""
 
     energy: Energy
     slow: float
@@ -142,8 +142,8 @@ def _(method, mass, energy, v):
     moving = twice_energy > 0.0
     half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
     speed2 = square(v) + method.fall2
-    # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it.
-    slow = 0.5 * (method.shortest_flight * speed2 + method.shortest_length * math.sqrt(speed2)) / method.size
+    # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; this is twice that speed.
+    slow = (method.shortest_flight * speed2 + method.shortest_length * math.sqrt(speed2)) / method.size
     return twice_energy, half_inverse, slow
 
 
@@ -183,13 +183,14 @@ def _(method, chain, gravity, lane, hit):
 def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
-    slow = hit & (bounce.away <= lane.own.slow)
+    impulse = select(hit, bounce.impulse, 0.0)
     return contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
-        select(slow, contract.HARD - wall, wall),
-        select(hit, bounce.impulse, 0.0),
-        select(hit & (bounce.impulse > 0.0), 1.0, 0.0),
+        wall,
+        impulse,
+        select(impulse > 0.0, 1.0, 0.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
+        hit & (bounce.twice_away <= lane.own.slow),
     )

@@ -138,7 +138,7 @@ def _(method, chain, lane, cut, wall, lanes, i):
 @inlined
 def _after(r, v, left, hits):
     """The contact, whose impulses were added one by one."""
-    return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0)
+    return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0, False)
 
 
 # --- Steps that are cut at the impact --------------------------------------------------------------------

@@ -84,6 +84,7 @@ class Run:
         self._order = np.arange(self._draws)
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(len(self._owners))
+        self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
         self._cut_short = False
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
@@ -150,16 +151,20 @@ class Run:
 
     def _share(self, span: float) -> _End:
         """Advance and observe what one thread draws."""
-        draws, mine = self._lanes()
+        draws = self._drawing()
+        # To make lanes takes as long as all else that Python does of a small frame.
+        try:
+            mine = self._lanes.pop()
+        except IndexError:
+            mine = lanes.empty(len(self._owners))
         if not self._kinds:
-            return self._part(span, draws, mine)
-        # Who flies first would have drawn everything when the others are ready to slide.
-        some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
-        while end[0] == Status.DONE:
-            order = lanes.take(draws, some)
-            if not order.size:
-                break
-            end = self._part(span, _again(draws, order), mine)
+            end = self._part(span, draws, mine)
+        else:
+            # Who flies first would have drawn everything when the others are ready to slide.
+            some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
+            while end[0] == Status.DONE and (order := lanes.take(draws, some)).size:
+                end = self._part(span, _again(draws, order), mine)
+        self._lanes.append(mine)
         return end
 
     def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> _End:
@@ -256,10 +261,9 @@ class Run:
             sentence += f" {self._method.failure(moment, left, multipliers.sweeps[particle], stored)}"
         return sentence
 
-    def _lanes(self) -> tuple[lanes.Draws, lanes.Lanes]:
-        """Arrays of one thread: its draws and its lanes."""
-        draws = lanes.Draws(self._ticket, self._order, self._size, np.empty(self._draws, np.int64))
-        return draws, lanes.empty(len(self._owners))
+    def _drawing(self) -> lanes.Draws:
+        """The draws of one thread."""
+        return lanes.Draws(self._ticket, self._order, self._size, np.empty(self._draws, np.int64))
 
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """What a thread shares with the others, and its counts."""
@@ -287,7 +291,7 @@ class Run:
 
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
-        draws, mine = self._lanes()
+        draws, mine = self._drawing(), lanes.empty(len(self._owners))
         share = self._shared(0.0, draws)
         yield blocks.advance_block, self._flying(share, mine)
         for phase in self._kinds:

@@ -63,10 +63,9 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     solution = contract.Solution(kappa, unsolved, turned)
     contact = call(contract.contact, numbers, chain, gravity, lane, end.wall, solution)
     impulse, wall = np.zeros((len(scene.surfaces), 1)), contact.wall
-    hard = wall <= contract.HARD
-    if hard and contract.holds(numbers):
+    hard = wall <= contract.HARD or contact.lasts
+    if contact.lasts:
         # Another kernel decides whether the contact lasts; it is an impact so far.
-        wall = contract.HARD - wall
         impulse[int(wall), 0] += contact.impulse
     elif hard:
         wall, lanes = contract.HARD - wall, _Lanes(impulse, np.zeros((uzawa.RECORDS, 1)))
