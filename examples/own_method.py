@@ -59,12 +59,12 @@ def _(method, chain, gravity, lane, wall, solution):
     # v1 = v0 - 2 (v0.n) n where v0.n > 0
     impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
     hits = select(wall >= 0.0, 1.0, 0.0)
-    return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0)
+    return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0, False)
 
 
 @contract.hard_pass.register(MirrorNumbers)
 def _(method, chain, gravity, lane, wall, lanes, i):
-    return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0), Status.STALLED.value
+    return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0, False), Status.STALLED.value
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ class Impact(base.Method):
             slides along it instead. None: 1e-4 of its own crossing time. Every other flight is exact, however short, so
             that a wedge of 1e-4 rad takes its 31415 impacts.
         sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The steps of each
-            particle follow from it: some 200 a crossing, and 1/4 power of it more or fewer.
+            particle follow from it: some 150 a crossing, and 1/4 power of it more or fewer.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
     fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
