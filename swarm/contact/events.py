@@ -8,11 +8,11 @@ from ..kernel.jit import by_type, inlined, outlined
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
+from . import hold, sliding, touching
 from . import laws as wall_laws
-from . import sliding, touching
+from .hold import One, Two
 from .projection import ALLOWED
 from .reflection import Energy, exact
-from .sliding import One, Two
 
 # What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
 # decided; or it is left to `careful`.
@@ -152,13 +152,13 @@ def _kept(across, p):
 @outlined
 def _on_edge(rules, chain, gravity, two, p):
     """What becomes of a particle in an edge: it slides there if both walls press on it."""
-    taken = sliding.split_at(two, chain, p.r, p.v)
+    taken = hold.split_at(two, chain, p.r, p.v)
     across2 = max(square(p.v) - square(taken.along), 0.0)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
     least = weightless(rules, gravity, p)
-    if square(sliding.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
+    if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
-    n, m = sliding.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
+    n, m = hold.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
     if not (n > least and m > least):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
@@ -184,7 +184,7 @@ def after_meeting(rules, held, chain, gravity, wall, p):
     impulse = p.left
     away = -dot(_normal(chain, wall, p.r), p.v)
     slow = GRAZING * math.sqrt(own_speed2(p))
-    taken = sliding.split_at(held, chain, p.r, p.v)
+    taken = hold.split_at(held, chain, p.r, p.v)
     flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
@@ -196,7 +196,7 @@ def after_meeting(rules, held, chain, gravity, wall, p):
     keep, twice = _kept(math.sqrt(across2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
-    other = sliding.second(held)
+    other = hold.second(held)
     return Next(EDGE if other >= 0.0 else HELD, taken.along, keep, twice, held.first, other, impulse, 0.0)
 
 
@@ -278,7 +278,7 @@ def arrival(chain, number, held, path, near):
 @arrival.register(walls.Chain)
 def _(chain, number, held, path, near):
     later = arrival(chain.rest, number + 1.0, held, path, near)
-    if sliding.is_held_by(held, number):
+    if hold.is_held_by(held, number):
         return later
     time = _deep_after(chain.first, path, near)
     if time <= later.time:

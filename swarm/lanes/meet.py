@@ -5,8 +5,8 @@ import numpy as np
 from ..contact import events, touching
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
+from ..contact.hold import One, Two, split_at
 from ..contact.reflection import loses_energy
-from ..contact.sliding import One, Two, split_at
 from ..kernel.gravity import potential
 from ..kernel.jit import by_type_outlined, inlined, kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square

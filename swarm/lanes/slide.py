@@ -6,57 +6,56 @@ ends at the instant to round-off. A lane writes what it gives its walls step by 
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import events
-from ..contact import laws as wall_laws
+from ..contact import events, hold
 from ..contact import sliding as slides
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
-from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
-from ..kernel.vector import ZERO, column, either, put, square
+from ..kernel.gravity import potential
+from ..kernel.jit import by_type, index, inlined, kernel, outlined
+from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
-from .arrays import LANES, STRIDE, following_particle, speed2_scale, table, with_distances
+from .arrays import LANES, following_particle, speed2_scale, with_distances
+from .compose import (
+    CUT,
+    FAILED,
+    KEEP,
+    LEFT,
+    LIFTED,
+    MET,
+    PRESS,
+    PRESS1,
+    R1,
+    SCALE2,
+    SHORTEST,
+    STEP,
+    STOPPED,
+    STUCK,
+    TRIALS,
+    TWICE,
+    V1,
+    WALL,
+    WORK,
+    A,
+    H,
+    R,
+    V,
+    account,
+    compose,
+    end_steps,
+    lose,
+    push,
+)  # fmt: skip
 
-# What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
-# speed it keeps across the walls, twice its energy, the square of its speed scale, its walls, and where a step is cut.
-R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12, 13, 14, 15, 16, 18
-# The step of this pass: its length, how far the composition has come, what presses at its end, its impulses, the work
-# of friction, by how much it may be off, and by how much the last sweep but one.
-H, R1, V1, PRESS1, IMPULSE, WORK, ALLOWED, STILL = 19, 20, 23, 26, 28, 30, 31, 32
-# The part of the composition under way: w0, the last guess of its end, the direction in which it slides; the changes of
-# velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut.
-W, END, TOWARD, CHANGE, BEFORE, TRIALS, ROWS = 33, 36, 39, 42, 45, 48, 49
 # Times that a step is cut before the lane is given up: it takes four or so.
 _MOST_TRIALS = 100
 # The first step of a particle that begins to slide, in crossings; the walls correct it.
 _FIRST = 1e-3
-# A step that is tried again is so much shorter; one of this part of a crossing, or of the size, is the shortest.
-_RETRY, _SHORTEST, _NO_WAY = 0.25, 1e-10, 1e-15
-# Friction has stopped a particle where this part of |v|^2 is left.
-_STOPPED = 1e-24
-
-
-class Lanes(NamedTuple):
-    """Arrays of one column a lane."""
-
-    rows: Array  # (ROWS, stride)
-    particle: Array  # int64
-    moving: Array  # bool, whether the sweeps of a step go on
-    event: Array  # int64, what the step of this pass may end with
-
-
-# What a step may end with.
-LIFTED, MET, FAILED, STOPPED, STUCK = 1, 2, 4, 8, 16
-
-
-def empty() -> Lanes:
-    """Lanes for one block."""
-    return Lanes(table(ROWS), np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64))
+# A step that is tried again is so much shorter.
+_RETRY = 0.25
 
 
 @by_type
@@ -64,7 +63,7 @@ def _phase(kind):
     return HELD
 
 
-_phase.register(slides.Two, lambda kind: EDGE)
+_phase.register(hold.Two, lambda kind: EDGE)
 
 
 @kernel
@@ -87,10 +86,10 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             _leave(kind, chain, share, lanes, live)
             return Status.INTERRUPTED.value, 0, drawn
         passes += 1
-        _compose(kind, method, chain, gravity, lanes, live)
-        _end_steps(kind, method, chain, gravity, lanes, live)
+        compose(kind, method, chain, gravity, lanes, live)
+        end_steps(kind, method, chain, gravity, lanes, live)
         for i in range(live):
-            _account(method, share.state, lanes, i)
+            account(method, share.state, lanes, i)
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
@@ -134,174 +133,6 @@ def _next_phase(kind, method, chain, gravity, state, lanes, i):
     return phase if lanes.rows[LEFT, i] > 0.0 else ARRIVED
 
 
-# --- One composed step of every lane ---------------------------------------------------------------------
-
-
-@inlined
-def _compose(kind, method, chain, gravity, lanes, live):
-    rows, moving = lanes.rows, lanes.moving
-    friction, tolerance = methods.friction(method), methods.sliding_tolerance(method)
-    rubs = wall_laws.is_given(friction)
-    for i in range(live):
-        v, a = column(rows, V, i), column(rows, A, i)
-        h = select(rows[STEP, i] < rows[LEFT, i], rows[STEP, i], rows[LEFT, i])
-        h = select(rows[CUT, i] < h, rows[CUT, i], h)
-        stop = slides.longest(friction, v, a)
-        h = select(stop < h, stop, h)
-        # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
-        speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
-        rows[H, i], rows[ALLOWED, i] = h, tolerance * speed * h
-        r, taken = column(rows, R, i), accelerated(gravity, ZERO, 1.0) - a
-        rows[STILL, i] = slides.still(r, v, h * taken, rows[ALLOWED, i])
-        put(rows, R1, i, r)
-        put(rows, V1, i, v)
-        put(rows, CHANGE, i, h * a)
-        put(rows, BEFORE, i, h * a)
-        rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i] = 0.0, 0.0, 0.0
-        lanes.event[i] = 0
-    for k in range(slides.PARTS):
-        for i in range(live):
-            r, v, h = column(rows, R1, i), column(rows, V1, i), slides.part(k) * rows[H, i]
-            last = column(rows, CHANGE, i)
-            change = last + slides.lead(k) * (last - column(rows, BEFORE, i))
-            put(rows, BEFORE, i, last)
-            put(rows, END, i, r + h * (v + (0.5 * slides.part(k)) * change))
-            if rubs:
-                toward = slides.direction(friction, v, last)
-                held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-                slowed = slides.slow(friction, held, chain, gravity, r, (v, toward), 0.5 * h)
-                v = slowed.v
-                rows[WORK, i] += slowed.lost
-                put(rows, TOWARD, i, toward)
-            put(rows, W, i, accelerated(gravity, v, 0.5 * h))
-            moving[i] = True
-        for _sweep in range(slides.SWEEPS):
-            some = False
-            for i in range(live):
-                some = _sweep_lane(kind, chain, lanes, i, slides.part(k)) | some
-            if not some:
-                break
-        for i in range(live):
-            h, w, v0, r0 = slides.part(k) * rows[H, i], column(rows, W, i), column(rows, V1, i), column(rows, R1, i)
-            held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-            # The last sweep
-            taken = slides.split(held, chain, r0, column(rows, END, i), w)
-            r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
-            if rubs:
-                slowed = slides.slow(friction, held, chain, gravity, r, (v1, column(rows, TOWARD, i)), 0.5 * h)
-                v1 = slowed.v
-                rows[WORK, i] += slowed.lost
-            put(rows, R1, i, r)
-            put(rows, V1, i, v1)
-            put(rows, CHANGE, i, slides.inverse_part(k) * (v1 - v0))
-            rows[IMPULSE, i] += 2.0 * taken.b
-            rows[IMPULSE + 1, i] += 2.0 * taken.c
-            lanes.event[i] |= select(moving[i], FAILED, 0)
-
-
-@inlined
-def _sweep_lane(kind, chain, lanes, i, part):
-    """One sweep of a lane that still moves: whether it needs another."""
-    rows, moving = lanes.rows, lanes.moving
-    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-    r0, end, w = column(rows, R1, i), column(rows, END, i), column(rows, W, i)
-    swept = slides.sweep(held, chain, part * rows[H, i], (r0, end, w), rows[STILL, i])
-    on = moving[i]
-    put(rows, END, i, either(on, swept.r, end))
-    more = on & swept.moves
-    moving[i] = more
-    return more
-
-
-# --- Its end ---------------------------------------------------------------------------------------------
-
-
-@inlined
-def _end_steps(kind, method, chain, gravity, lanes, live):
-    """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
-    rows, friction = lanes.rows, methods.friction(method)
-    for i in range(live):
-        held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-        h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
-        r0, v0, a0 = column(rows, R, i), column(rows, V, i), column(rows, A, i)
-        r1 = slides.settle(held, chain, column(rows, R1, i))
-        twice = rows[TWICE, i] - rows[WORK, i]
-        v1 = slides.split_at(held, chain, r1, column(rows, V1, i)).along
-        v1 = slides.restored(v1, twice - 2.0 * potential(gravity, r1) - keep * keep, scale2)
-        force = slides.force(friction, held, chain, gravity, r1, v1)
-        ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), rows[ALLOWED, i])
-        path = slides.Path(r0, v0, r1, v1, h)
-        lifted = slides.lets_go(held, force.n, force.m)
-        met = slides.meets(chain, 0.0, held, path, events.near(method, r1))
-        good = (ratio <= 1.0) & (lanes.event[i] == 0)
-        fine = good & (not lifted) & (not met)
-        happened = select(lifted, LIFTED, 0) | select(met, MET, 0)
-        lanes.event[i] |= select(good, happened, 0)
-        lanes.moving[i] = fine
-        # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
-        # found so again after a halt.
-        whole = (fine & (h == rows[STEP, i])) | (not (ratio <= 1.0))
-        rows[STEP, i] = select(whole, slides.next_step(h, ratio), rows[STEP, i])
-        rows[CUT, i] = select(fine, np.inf, rows[CUT, i])
-        rows[LEFT, i] -= select(fine, h, 0.0)
-        rows[TWICE, i] = select(fine, twice, rows[TWICE, i])
-        put(rows, R1, i, r1)
-        put(rows, V1, i, v1)
-        rows[PRESS1, i], rows[PRESS1 + 1, i] = force.n, force.m
-        put(rows, R, i, either(fine, r1, r0))
-        put(rows, V, i, either(fine, v1, v0))
-        put(rows, A, i, either(fine, force.acceleration, a0))
-        rows[PRESS, i] = select(fine, force.n, rows[PRESS, i])
-        rows[PRESS + 1, i] = select(fine, force.m, rows[PRESS + 1, i])
-        lanes.event[i] |= _stop(friction, fine, v1, scale2)
-        # Near an apex steps become shorter without end, in time or, of a slow particle, in length.
-        step = rows[STEP, i]
-        way2 = step * step * (square(v1) + step * step * square(accelerated(gravity, ZERO, 1.0)))
-        short = (step < _SHORTEST * method.size / math.sqrt(scale2)) | (way2 < (_NO_WAY * method.size) ** 2)
-        lanes.event[i] |= select(short, STUCK, 0)
-
-
-@by_type
-def _stop(friction, fine, v, scale2):
-    """Whether friction has stopped a particle."""
-    return select(fine & (square(v) <= _STOPPED * scale2), STOPPED, 0)
-
-
-@_stop.register(type(None))
-def _(friction, fine, v, scale2):
-    return 0
-
-
-@inlined
-def _account(method, state, lanes, i):
-    """What a step that is taken gives to the state."""
-    rows, p = lanes.rows, lanes.particle[i]
-    if not lanes.moving[i]:
-        return
-    state.contacts.sliding[p] += rows[H, i]
-    _push(state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
-    rows[TRIALS, i] = 0.0
-    if wall_laws.is_given(methods.friction(method)):
-        _lose(state, lanes, i, rows[WORK, i])
-
-
-@inlined
-def _push(state, lanes, i, first, second):
-    """Impulses per mass to the walls that hold a lane."""
-    rows, p = lanes.rows, lanes.particle[i]
-    state.impulse[int(rows[WALL, i]), p] += first * state.mass[p]
-    if rows[WALL + 1, i] >= 0.0:
-        state.impulse[int(rows[WALL + 1, i]), p] += second * state.mass[p]
-
-
-@inlined
-def _lose(state, lanes, i, twice):
-    """Book twice the energy per mass that a lane has lost; its row knows what is left."""
-    p = lanes.particle[i]
-    state.energy[p] = 0.5 * lanes.rows[TWICE, i]
-    state.dissipated[p] += 0.5 * twice * state.mass[p]
-
-
 # --- Into lanes and out of them --------------------------------------------------------------------------
 
 
@@ -319,9 +150,9 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
     rows[WALL, lane], rows[WALL + 1, lane] = contacts.walls[0, i], contacts.walls[1, i]
     rows[STEP, lane], rows[KEEP, lane], rows[TWICE, lane] = contacts.step[i], contacts.keep[i], twice
     if begins:
-        held = slides.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane])
+        held = hold.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane])
         # Frames show the speed that is kept across the walls too.
-        v = slides.split_at(held, chain, r, v).along
+        v = hold.split_at(held, chain, r, v).along
     put(rows, R, lane, r)
     put(rows, V, lane, v)
     phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
@@ -335,7 +166,7 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
 def _set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; what it does next, which may be to rest."""
     rows, friction = lanes.rows, methods.friction(method)
-    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
     force = slides.force(friction, held, chain, gravity, r, v)
     put(rows, A, i, force.acceleration)
@@ -348,7 +179,7 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
         contacts.phase[p], contacts.load[int(rows[WALL, i]), p] = ARRIVED, force.n
         if rows[WALL + 1, i] >= 0.0:
             contacts.load[int(rows[WALL + 1, i]), p] = force.m
-        _push(state, lanes, i, force.n * left, force.m * left)
+        push(state, lanes, i, force.n * left, force.m * left)
         rows[LEFT, i] = 0.0
         return ARRIVED
     return _phase(kind)
@@ -361,9 +192,9 @@ def _retire(kind, chain, share, lanes, i, phase):
     v, keep = column(rows, V, i), rows[KEEP, i]
     slid = phase != FLYING and phase != CAREFUL
     if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
-        held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-        taken = slides.split_at(held, chain, column(rows, R, i), v)
-        v = v + keep * slides.inward(held, taken.n, taken.m)
+        held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+        taken = hold.split_at(held, chain, column(rows, R, i), v)
+        v = v + keep * hold.inward(held, taken.n, taken.m)
     if phase == FLYING:
         v = events.off_the_wall(chain, rows[WALL, i], column(rows, R, i), v)
     put(share.state.position, 0, p, column(rows, R, i))
@@ -404,7 +235,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
         # All that is above the potential energy, down to what round-off has added to the kinetic one.
         lost = rows[TWICE, i] - 2.0 * potential(gravity, column(rows, R, i))
         rows[TWICE, i] -= lost
-        _lose(state, lanes, i, lost)
+        lose(state, lanes, i, lost)
         rows[KEEP, i] = 0.0
         put(rows, V, i, ZERO)
         return _set_going(kind, method, chain, gravity, state, lanes, i)
@@ -412,7 +243,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
         return _give_up(state, lanes, i)
     if event & FAILED:
         return _shorten(kind, method, chain, state, lanes, i)
-    held = slides.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v = column(rows, R, i), column(rows, V, i)
     cut = 1.0
     if event & LIFTED:
@@ -445,7 +276,7 @@ def _take(kind, method, chain, gravity, state, lanes, i):
     rows[LEFT, i], rows[CUT, i] = rows[LEFT, i] - rows[H, i], np.inf
     rows[TWICE, i] -= rows[WORK, i]
     lanes.moving[i] = True
-    _account(method, state, lanes, i)
+    account(method, state, lanes, i)
     return _set_going(kind, method, chain, gravity, state, lanes, i)
 
 
@@ -461,7 +292,7 @@ def _shorten(kind, method, chain, state, lanes, i):
     """A lane whose step has no solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
     rows, h = lanes.rows, lanes.rows[H, i]
     rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
-    if h > _SHORTEST * method.size / math.sqrt(rows[SCALE2, i]):
+    if h > SHORTEST * method.size / math.sqrt(rows[SCALE2, i]):
         return _phase(kind)
     end = column(rows, R, i) + h * column(rows, V, i)
     if walls.outside(chain, -1.0, end) or not h > 0.0:
@@ -480,7 +311,7 @@ def _lift(kind, lanes, i, none):
     return _phase(kind), _part(rows[PRESS, i], rows[PRESS1, i])
 
 
-@_lift.register(slides.Two)
+@_lift.register(hold.Two)
 def _(kind, lanes, i, none):
     rows = lanes.rows
     if rows[PRESS, i] <= none and rows[PRESS1, i] < 0.0:

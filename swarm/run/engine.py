@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD, PHASES
-from ..contact.sliding import One, Two
+from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
-from ..lanes import meet, slide
+from ..lanes import compose, meet, slide
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
+from . import failures
 from .tiers import Tier
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
@@ -143,7 +144,7 @@ class Run:
         if status == Status.INTERRUPTED:
             self._keep([left for *_, left in ends if left is not None])
         elif status != Status.DONE:
-            raise RunError(self._failure(Status(status), particle, moment))
+            raise RunError(failures.of_frame(self._scene, self._method, self.state, (Status(status), particle), moment))
         elif span > 0.0:
             self._halted = lanes.none_halted(len(self._owners))
             self._pace = seconds * (others + helps) / span
@@ -243,24 +244,6 @@ class Run:
         threads = 1 if self._tier.is_plain else max(1, self._threads - (writing > _MUCH_WRITING * work))
         return threads - helps if work > _LITTLE_WORK else 0, helps
 
-    def _failure(self, status: Status, particle: int, moment: float) -> str:
-        """The sentence about a frame that failed."""
-        sentence = f"the frame at {moment:g} s failed at particle {particle}: {status.sentence}"
-        if status == Status.STALLED:
-            place = self.state.position[:, particle]
-            wall = int(np.argmax(self._scene.distances_outside(place[:, None])[:, 0]))
-            sentence += (
-                f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at "
-                f"surfaces[{wall}] ({type(self._scene.surfaces[wall]).__name__})"
-            )
-        if status == Status.TOO_FAST:
-            sentence += f", {self._method.too_fast(self._scene)}"
-        multipliers = self.state.multipliers
-        if status == Status.UNCONVERGED and multipliers is not None:
-            left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-            sentence += f" {self._method.failure(moment, left, multipliers.sweeps[particle], stored)}"
-        return sentence
-
     def _drawing(self) -> lanes.Draws:
         """The draws of one thread."""
         return lanes.Draws(self._ticket, self._order, self._size, np.empty(self._draws, np.int64))
@@ -283,7 +266,7 @@ class Run:
                 self._gravity,
                 share,
             )
-        return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, slide.empty())
+        return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, compose.empty())
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
@@ -341,23 +324,7 @@ class Run:
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
-        failed = f"the frame at {moment:g} s failed at particle"
-        position, size = self.state.position, self._scene.finite_size()
-        # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
-        if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
-            good = np.isfinite(position).all(axis=0) & np.isfinite(self.state.velocity).all(axis=0)
-            raise RunError(f"{failed} {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
-        if seen["max_penetration"] <= self._deepest:
-            return
-        distances = self._scene.distances_outside(position)
-        # Far out in an open scene the round-off of a position is that of its own size.
-        outside = distances > self._deepest / size * np.maximum(np.abs(position).max(axis=0), size)
-        if outside.any():
-            wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
-            raise RunError(
-                f"{failed} {particle}: it is {distances[wall, particle]:.3g} m outside surfaces[{wall}] "
-                f"({type(self._scene.surfaces[wall]).__name__})"
-            )
+        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment)
 
 
 def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:

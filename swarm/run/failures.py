@@ -1,0 +1,55 @@
+"""Sentences about frames that failed."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..errors import RunError
+from ..methods.base import Method
+from ..particles import State
+from ..scene import Scene
+from ..status import Status
+
+
+def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float) -> str:
+    """The sentence about a frame that ended with this status and particle."""
+    status, particle = end
+    sentence = f"{_failed(moment)} {particle}: {status.sentence}"
+    if status == Status.STALLED:
+        place = state.position[:, particle]
+        wall = int(np.argmax(scene.distances_outside(place[:, None])[:, 0]))
+        sentence += f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
+    if status == Status.TOO_FAST:
+        sentence += f", {method.too_fast(scene)}"
+    multipliers = state.multipliers
+    if status == Status.UNCONVERGED and multipliers is not None:
+        left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
+        sentence += f" {method.failure(moment, left, multipliers.sweeps[particle], stored)}"
+    return sentence
+
+
+def require_admissible(scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float) -> None:
+    """Raise a RunError where a state is not finite, or deeper than `deepest` [m] in a wall."""
+    position, size = state.position, scene.finite_size()
+    # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
+    if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+        good = np.isfinite(position).all(axis=0) & np.isfinite(state.velocity).all(axis=0)
+        raise RunError(f"{_failed(moment)} {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
+    if seen["max_penetration"] <= deepest:
+        return
+    distances = scene.distances_outside(position)
+    # Far out in an open scene the round-off of a position is that of its own size.
+    outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
+    if outside.any():
+        wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
+        depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
+        raise RunError(f"{_failed(moment)} {particle}: it is {depth}")
+
+
+def _failed(moment: float) -> str:
+    return f"the frame at {moment:g} s failed at particle"
+
+
+def _named(scene: Scene, wall: int) -> str:
+    return f"surfaces[{wall}] ({type(scene.surfaces[wall]).__name__})"
