@@ -33,9 +33,9 @@ _STILL, _SLACK = 64.0 * _EPSILON, 0.1
 _GAIN = 1.5
 # Round-off of what `defect` compares, in units of the last place of a coordinate.
 _NOISE = 8.0 * _EPSILON
-# The error of a composed step over its defect: the error of ten crossings on the surfaces of the tests is then 1 to 8
+# The error of a composed step over its defect: the error of ten crossings on the surfaces of the tests is then 1 to 4
 # times what is allowed in one.
-_ERROR = 0.3
+_ERROR = 0.7
 # Steps change by no more than these factors, and aim at this part of the tolerance.
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
