@@ -90,7 +90,7 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                 pace.stuck[i] += 1
                 pace.action[i] = blow.AGAIN
             elif pace.body[i] >= 0 and (pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]):
-                pace.action[i] = blow.judge(touching, chain, rule, lanes, pace, i)
+                pace.action[i] = blow.judge(touching, chain, rule, lanes, pace, i, 2.0 * hold.tolerated(rule, pace, i))
             if pace.body[i] >= 0:
                 if pace.action[i] == blow.FAILED or pace.stuck[i] > _STUCK:
                     status = Status.UNSOLVED if pace.action[i] == blow.FAILED else Status.STALLED

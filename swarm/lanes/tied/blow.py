@@ -12,6 +12,8 @@ from ...surfaces import fold as walls
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
 # A bracket of the time of impact this narrow, as a part of a whole step, is a point; and of a step from a wall to itself.
 _NARROW, _SHORTEST = 1e-13, 1e-5
+# Trials that find most times of impact.
+_QUICK = 6
 # A step whose ties have no solution is halved this often.
 _HALVED = 2.0**-20
 # A contact this many times round-off away from its wall takes part in a blow.
@@ -40,7 +42,7 @@ def point_of(touching, r, k, i):
 
 
 @outlined
-def judge(touching, chain, rule, lanes, pace, i):
+def judge(touching, chain, rule, lanes, pace, i, larger):
     """What becomes of a lane whose trial step ends outside, has no solution, or looks for the time of an impact."""
     tau, low = pace.step[i], pace.low[i]
     pace.stuck[i] += 1
@@ -49,11 +51,13 @@ def judge(touching, chain, rule, lanes, pace, i):
         pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
         return AGAIN if tau > _HALVED * rule.dt else FAILED
     first, point, wall = math.inf, -1, -1
+    # The forces of contacts that last leave a part of it.
+    room = rule.room if pace.held[i] == 0 else larger
     for k in range(touching.plain.size):
         c, u = point_of(touching, lanes.r1, k, i), point_of(touching, lanes.v1, k, i)
         for w in range(walls.length(chain)):
             distance = walls.distance(chain, float(w), c)
-            if not distance <= rule.room:
+            if not distance <= room:
                 time = _newton(chain, w, (c, u), distance, tau)
                 if not low < time < tau:
                     time = 0.5 * (low + tau)
@@ -61,6 +65,9 @@ def judge(touching, chain, rule, lanes, pace, i):
                     first, point, wall = time, k, w
     if wall < 0:
         return _inside(touching, chain, rule, lanes, pace, i)
+    # Newton's method converges slowly where velocities of the scheme have a part along the ties: then by halves too.
+    halves = pace.stuck[i] > _QUICK and pace.stuck[i] % 2 == 0
+    first = 0.5 * (low + tau) if halves else first
     pace.high[i], pace.point[i], pace.wall[i], pace.trial[i] = tau, point, wall, first
     if tau - low <= _NARROW * rule.dt:
         pace.trial[i] = low
@@ -84,7 +91,8 @@ def _inside(touching, chain, rule, lanes, pace, i):
         return STRIKE
     time = _newton(chain, wall, (c, u), distance, tau)
     pace.low[i] = tau
-    pace.trial[i] = time if tau < time < pace.high[i] else 0.5 * (tau + pace.high[i])
+    halves = pace.stuck[i] > _QUICK and pace.stuck[i] % 2 == 0
+    pace.trial[i] = time if tau < time < pace.high[i] and not halves else 0.5 * (tau + pace.high[i])
     return AGAIN
 
 
