@@ -45,7 +45,7 @@ def test_a_job(tmp_path):
     assert job.method == swarm.Impact()
     assert (job.run.until, job.run.every) == (1.0, 0.5)
     assert job.text == GOOD
-    np.testing.assert_array_equal(job.particles().position, swarm.fill(job.scene, 10, speed=0.5).position)
+    np.testing.assert_array_equal(job.start().position, swarm.fill(job.scene, 10, speed=0.5).position)
 
 
 def test_laws_of_walls_and_their_seed(tmp_path):
@@ -59,7 +59,7 @@ def test_laws_of_walls_and_their_seed(tmp_path):
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
 def test_shipped_scenes_are_read(path):
     job = scene_file.read(path)
-    assert (job.scene.gaps(job.particles().position) <= 0.0).all()
+    assert (job.scene.gaps(job.start().position) <= 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -145,21 +145,21 @@ def test_shipped_scenes_are_read(path):
 def test_bad_input_names_the_key(tmp_path, old, new, message):
     assert old in GOOD
     with pytest.raises(swarm.SceneError, match=message):
-        read(tmp_path, GOOD.replace(old, new)).particles()
+        read(tmp_path, GOOD.replace(old, new)).start()
 
 
 def test_particles_from_files(tmp_path):
     csv = tmp_path / "start.csv"
     csv.write_text("x,y,z,vx,vy,vz,mass\n0.1,0,0,1,0,0,2\n")
     source = GOOD.replace("count = 10\nspeed = 0.5", 'from = "{}"')
-    particles = read(tmp_path, source.format("start.csv")).particles()
+    particles = read(tmp_path, source.format("start.csv")).start()
     assert (particles.position[0, 0], particles.mass[0]) == (0.1, 2.0)
 
     scene = swarm.Scene(surfaces=[swarm.Sphere(0.5)])
     result = swarm.simulate(scene, particles, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "start.h5")
-    last = read(tmp_path, source.format("start.h5")).particles()
+    last = read(tmp_path, source.format("start.h5")).start()
     np.testing.assert_array_equal(last.position, result.particles.position)
-    first = read(tmp_path, source.format('start.h5"\nframe = 0 #')).particles()
+    first = read(tmp_path, source.format('start.h5"\nframe = 0 #')).start()
     np.testing.assert_array_equal(first.position, particles.position)
 
     for text, message in (
@@ -170,4 +170,4 @@ def test_particles_from_files(tmp_path):
         with pytest.raises(swarm.SceneError, match=message):
             read(tmp_path, source.format(text))
     with pytest.raises(swarm.SceneError, match=r"cannot read .*absent\.csv"):
-        read(tmp_path, source.format("absent.csv")).particles()
+        read(tmp_path, source.format("absent.csv")).start()

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..particles import Floats, Particles
-from .body import Body
+from .body import Body, Pairs
 
 
 class Bodies:
@@ -39,6 +39,11 @@ class Bodies:
     def contact_points(self) -> Floats:
         """(3, K, n) the points that can touch walls."""
         return np.einsum("kp,xpn->xkn", self.body.contacts, self.position)
+
+    def bonds(self) -> Pairs:
+        """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
+        n = len(self)
+        return (self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2)
 
     def particles(self) -> Particles:
         """All points as particles: point p of copy i is number p n + i. The mass of each is its row's sum in M."""

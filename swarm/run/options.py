@@ -3,7 +3,7 @@
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import checks
 from ..errors import SceneError
@@ -14,6 +14,9 @@ from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
 from .tiers import CHOICES
+
+if TYPE_CHECKING:
+    from ..bodies.state import Bodies
 
 # At shorter intervals [s] a run would do little but save checkpoints.
 _OFTEN = 0.01
@@ -99,9 +102,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles are its own copy."""
+    """A run, checked; the particles, or the bodies and their points as particles, are its own copy."""
 
     scene: Scene
     particles: Particles
     method: Method
     options: RunOptions
+    bodies: "Bodies | None" = None

@@ -66,7 +66,7 @@ class Session:
             return
         from ..output import checkpoint
         from ..output.lock import only_writer
-        from ..output.writer import descriptions
+        from ..output.writer import body_text, descriptions
 
         overwrite, until = task.options.overwrite, task.options.until
         paths.check_target(self._trajectory, overwrite or self._resumes)
@@ -76,7 +76,8 @@ class Session:
                 f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
                 "replace; move it away, or choose another name for the trajectory"
             )
-        self.identity = {"start": checkpoint.digest_of(task.particles), "seed": task.options.seed}
+        body = "" if task.bodies is None else body_text(task.bodies.body)
+        self.identity = {"start": checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
         if not self._resumes:

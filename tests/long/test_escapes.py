@@ -97,7 +97,7 @@ def report(name, began, capsys):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_nothing_escapes_in_the_shipped_scenes(path, capsys):
     began, job = clock.perf_counter(), scene_file.read(path)
-    checked(job.scene, job.particles(), job.method, job.run.until, path.stem)
+    checked(job.scene, job.start(), job.method, job.run.until, path.stem)
     report(path.stem, began, capsys)
 
 

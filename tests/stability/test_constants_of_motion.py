@@ -26,7 +26,7 @@ def shipped(name, number):
     """
     job = scene_file.read(SCENES / f"{name}.toml")
     surfaces = [replace(s, restitution=1.0) if s.restitution < 1.0 else s for s in job.scene.surfaces]
-    particles = job.particles()
+    particles = job.start()
     few = swarm.Particles(
         *(column[..., :number] for column in (particles.position, particles.velocity, particles.mass))
     )
