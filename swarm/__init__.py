@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
+    from .bodies.body import Body
+    from .bodies.elastic import elastic
+    from .bodies.placing import place
+    from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
+    from .bodies.state import Bodies
+    from .bodies.strain import Strain
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
     from .frames import Frame
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
+    from .motion import Oscillation, Rotation, Translation
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .run.simulation import Result, simulate
@@ -38,11 +45,18 @@ __version__ = VERSION
 
 # A module of the package and the public names that it defines.
 _HOMES = {
+    "bodies.body": ("Body",),
+    "bodies.elastic": ("elastic",),
+    "bodies.placing": ("place",),
+    "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
+    "bodies.state": ("Bodies",),
+    "bodies.strain": ("Strain",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
     "frames": ("Frame",),
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
+    "motion": ("Oscillation", "Rotation", "Translation"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -55,10 +69,12 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "AugmentedLagrangian", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory", "Cylinder", "Ellipsoid",
-    "FileError", "Formula", "Frame", "Impact", "Midpoint", "OwnSurface", "Paraboloid", "Particles", "Penalty", "Plane",
-    "Quadric", "Result", "RunError", "Scene", "SceneError", "Slab", "Sphere", "SwarmError", "Torus", "Trajectory",
-    "Trapezoidal", "Verlet", "WallTimeError", "__version__", "contact_history", "fill", "load", "simulate",
+    "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory", "Cylinder",
+    "Ellipsoid", "FileError", "Formula", "Frame", "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid",
+    "Particles", "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab",
+    "Sphere", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
+    "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "load", "place", "rigid", "simulate",
+    "tetrahedron",
 ]  # fmt: skip
 
 

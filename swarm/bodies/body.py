@@ -1,41 +1,29 @@
-"""What a body is: base points with masses, links, springs and an elastic strain energy, and the points that touch walls.
+"""What a body is: base points with masses, what ties them together, and the points that touch walls.
 
 A body is P base points r_p with a constant mass matrix M (P, P), times the identity of R^3. Pairs of them are tied by
     links      |r_i - r_j| stays as it is,
     springs    V = k (|r_i - r_j| - l)^2/2,
-    strains    V = (s - s0).K (s - s0)/2 of the squares s of the lengths of edges: an elastic solid made of tetrahedra of
-               Saint Venant and Kirchhoff has exactly this energy, because the strain of each is linear in its s.
+    a strain   V = (s - s0).K (s - s0)/2 of the squares s of the lengths of edges: an elastic solid made of tetrahedra
+               of Saint Venant and Kirchhoff has exactly this energy, because the strain of each is linear in its s.
 A contact point is a fixed linear combination sum b_p r_p, so a polyhedron of a hundred corners still has four points.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..errors import SceneError
+from ..motion import Motion
 from ..particles import Floats
-
-Pairs = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Strain:
-    """The elastic energy V = (s - s0).K (s - s0)/2 of the squares s of the lengths of edges.
-
-    Attributes:
-        edges: (E, 2) pairs of points.
-        rest: (E,) s0, the squares of their lengths without stress [m^2].
-        stiffness: (E, E) K, symmetric and positive definite [N/m^3].
-    """
-
-    edges: Pairs
-    rest: Floats
-    stiffness: Floats
+from ..surfaces.surface import Surface
+from . import checked, tied
+from .checked import Pairs, Spring
+from .strain import Strain
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Body:
     """Points tied together: the template of all copies that `place` makes.
 
@@ -43,75 +31,90 @@ class Body:
         points: (P, 3) base points, as they are at rest [m].
         mass: one number or (P,) [kg], above 0; or
         mass_matrix: (P, P) [kg], symmetric and positive definite.
-        links: pairs (i, j) of points whose distance never changes.
-        springs: (i, j, stiffness [N/m], rest length [m]).
-        contacts: what can touch a wall: numbers of points, or rows (K, P) of coefficients; None: every point.
+        links: pairs (i, j) of points whose distance never changes; no link may follow from the others.
+        springs: (i, j, stiffness above 0 [N/m], rest length 0 or more [m]).
+        contacts: what can touch a wall: numbers of points, or rows (K, P) of coefficients that add up to 1; None: every
+            point that is not anchored.
         strain: elastic energy of edges, as `elastic` makes it.
-        anchors: number of a point -> None, fixed in space, or a motion that leads it.
-        guides: (number of a point, surface): the point stays on that surface.
-        cavities: (surface, carrier, point): the surface moves with the point `carrier`, its origin; it holds `point`.
+        anchors: number of a point -> None, fixed in space, or a Translation, Oscillation or Rotation that leads it.
+        guides: (number of a point, surface without edges): the point stays on that surface, and starts on it.
+        cavities: (surface without edges, carrier, point): the surface moves with the point `carrier`, its origin, and
+            holds `point` on its admissible side.
         faces: (F, 3) triangles of contact points, for pictures.
 
     Raises:
-        SceneError: an argument is out of its range.
+        SceneError: an argument is out of its range; a link is redundant; led points leave the reach of their links.
+
+    >>> Body([(0, 0, 0), (0, 0, -1), (1, 0, -1)], mass=2.0, links=[(0, 1), (1, 2)], anchors={0: None})
+    Body(3 points, 2 links, 1 anchors, 2 contacts)
     """
 
     points: Floats
     mass_matrix: Floats
     links: Pairs
-    springs: tuple[tuple[int, int, float, float], ...]
+    springs: tuple[Spring, ...]
     contacts: Floats  # (K, P)
     strain: Strain | None
-    anchors: Mapping[int, Any]
-    guides: tuple[tuple[int, Any], ...]
-    cavities: tuple[tuple[Any, int, int], ...]
-    faces: Pairs = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    anchors: Mapping[int, Motion | None]
+    guides: tuple[tuple[int, Surface], ...]
+    cavities: tuple[tuple[Surface, int, int], ...]
+    faces: Pairs
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # a body is described by what it has; most have few of these
         self,
         points: ArrayLike,
         mass: ArrayLike | None = None,
-        links: Sequence[tuple[int, int]] = (),
-        springs: Sequence[tuple[int, int, float, float]] = (),
+        links: Iterable[Sequence[int]] = (),
+        springs: Iterable[Sequence[float]] = (),
         contacts: ArrayLike | None = None,
         *,
         mass_matrix: ArrayLike | None = None,
         strain: Strain | None = None,
-        anchors: Mapping[int, Any] | None = None,
-        guides: Sequence[tuple[int, Any]] = (),
-        cavities: Sequence[tuple[Any, int, int]] = (),
-        faces: ArrayLike = (),
+        anchors: Mapping[int, Motion | None] | None = None,
+        guides: Iterable[tuple[int, Surface]] = (),
+        cavities: Iterable[tuple[Surface, int, int]] = (),
+        faces: Iterable[Sequence[int]] = (),
     ) -> None:
-        points = np.array(points, dtype=np.float64)
-        count = len(points)
-        matrix = np.diag(np.broadcast_to(np.asarray(mass, dtype=np.float64), (count,)))
-        if mass_matrix is not None:
-            matrix = np.array(mass_matrix, dtype=np.float64)
-        touching = np.eye(count)
-        if contacts is not None:
-            given = np.asarray(contacts)
-            touching = np.eye(count)[given.astype(np.int64)] if given.ndim == 1 else given.astype(np.float64)
+        places = checked.points(points)
+        count = len(places)
+        led = checked.anchors(anchors, count)
+        touching = checked.contacts(contacts, count, led)
         values = {
-            "points": points,
-            "mass_matrix": matrix,
-            "links": np.array(links, dtype=np.int64).reshape(-1, 2),
-            "springs": tuple((int(i), int(j), float(k), float(rest)) for i, j, k, rest in springs),
+            "points": places,
+            "mass_matrix": checked.mass_matrix(mass, mass_matrix, count),
+            "links": checked.links(links, places),
+            "springs": checked.springs(springs, places),
             "contacts": touching,
-            "strain": strain,
-            "anchors": dict(anchors or {}),
-            "guides": tuple(guides),
-            "cavities": tuple(cavities),
-            "faces": np.array(faces, dtype=np.int64).reshape(-1, 3),
+            "strain": _of_body(strain, count),
+            "anchors": led,
+            "guides": checked.guides(guides, places, led),
+            "cavities": checked.cavities(cavities, places),
+            "faces": checked.numbers("faces", faces, 3, len(touching)),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        tied.require_reachable(self.points, self.links, self.anchors)
+        tied.require_independent(self.points, self.links, self.anchors, self.guides)
 
     def __len__(self) -> int:
         """Number of base points P."""
         return len(self.points)
+
+    def __repr__(self) -> str:
+        parts = {name: len(getattr(self, name)) for name in ("links", "springs", "anchors", "contacts", "faces")}
+        return f"Body({', '.join([f'{len(self)} points', *(f'{n} {name}' for name, n in parts.items() if n)])})"
 
     def bonds(self) -> Pairs:
         """(B, 2) all pairs that are tied, for readers that draw them."""
         springs = np.array([spring[:2] for spring in self.springs], dtype=np.int64).reshape(-1, 2)
         strains = np.zeros((0, 2), np.int64) if self.strain is None else self.strain.edges
         return np.concatenate([self.links, springs, strains])
+
+
+def _of_body(strain: Strain | None, count: int) -> Strain | None:
+    if strain is None:
+        return None
+    if not isinstance(strain, Strain):
+        raise SceneError(f"strain must be a swarm.Strain or None, got {strain!r:.200}")
+    checked.numbers("strain.edges", strain.edges.tolist(), 2, count)
+    return strain

@@ -3,28 +3,50 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import checks
+from ..errors import SceneError
 from ..particles import Floats, Particles
-from .body import Body, Pairs
+from . import checked
+from .body import Body
+from .checked import Pairs
+
+# How exactly a link must have its length at the start, relative.
+_LINK = 1e-9
 
 
 class Bodies:
     """n copies of a body.
 
     Args:
-        body: the template.
-        position: (3, P, n) [m], rows x, y, z of every point of every copy.
-        velocity: (3, P, n) [m/s].
+        body: the template; its places of anchored points are the first of all: each copy is led from its own.
+        position: (3, P, n) or, of one copy, (3, P) [m], rows x, y, z of every point; the links have their lengths.
+        velocity: the same shape [m/s].
 
     The arrays are copied, in C order.
 
     Raises:
-        SceneError: wrong shapes, no copy, or a value that is not finite or beyond 1e100.
+        SceneError: wrong shapes, no copy, a value that is not finite or beyond 1e100, a link that is not as long as the
+            template's, a guided point that is not on its surface.
+
+    >>> import swarm
+    >>> rod = swarm.dumbbell(length=2.0, mass=1.0)
+    >>> Bodies(rod, rod.points.T, np.zeros((3, 2)))
+    Bodies(1 of 2 points)
     """
 
     def __init__(self, body: Body, position: ArrayLike, velocity: ArrayLike) -> None:
+        if not isinstance(body, Body):
+            raise SceneError(f"body must be a swarm.Body, got {body!r:.200}")
         self.body = body
-        self.position = np.array(position, dtype=np.float64, order="C")
-        self.velocity = np.array(velocity, dtype=np.float64, order="C")
+        self.position = _rows("position", position, len(body))
+        self.velocity = _rows("velocity", velocity, len(body))
+        if self.velocity.shape != self.position.shape:
+            raise SceneError(
+                f"velocity must have the shape of position, {self.position.shape}, got {self.velocity.shape}"
+            )
+        _require_lengths(body, self.position)
+        for k, (point, surface) in enumerate(body.guides):
+            checked.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
 
     def copy(self) -> "Bodies":
         """The same bodies, checked again, with arrays of their own."""
@@ -38,15 +60,44 @@ class Bodies:
 
     def contact_points(self) -> Floats:
         """(3, K, n) the points that can touch walls."""
-        return np.einsum("kp,xpn->xkn", self.body.contacts, self.position)
+        return np.asarray(np.einsum("kp,xpn->xkn", self.body.contacts, self.position))
 
     def bonds(self) -> Pairs:
         """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
         n = len(self)
-        return (self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2)
+        return np.asarray((self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2))
 
     def particles(self) -> Particles:
-        """All points as particles: point p of copy i is number p n + i. The mass of each is its row's sum in M."""
-        n, mass = len(self), self.body.mass_matrix.sum(axis=1)
+        """All points as particles: point p of copy i is number p n + i.
+
+        Their masses are the diagonal of the mass matrix, scaled to the mass of the body: always above 0.
+        """
+        matrix = self.body.mass_matrix
+        mass = np.diagonal(matrix) * (matrix.sum() / np.trace(matrix))
         flat = self.position.reshape(3, -1), self.velocity.reshape(3, -1)
-        return Particles(*flat, np.repeat(mass, n))
+        return Particles(*flat, np.repeat(mass, len(self)))
+
+
+def _rows(name: str, value: ArrayLike, count: int) -> Floats:
+    rows = np.array(checks.array(name, value), order="C")
+    if rows.ndim == 2:
+        rows = rows[:, :, None]
+    if rows.ndim != 3 or rows.shape[:2] != (3, count) or not rows.shape[2]:
+        raise SceneError(
+            f"{name} must have shape (3, {count}, n), rows x, y, z of the {count} points of n copies, at least one, "
+            f"got {np.shape(value)}"
+        )
+    return checked.finite(name, rows)
+
+
+def _require_lengths(body: Body, position: Floats) -> None:
+    """Raise unless every link of every copy is as long as the template's."""
+    for k, (i, j) in enumerate(body.links.tolist()):
+        wanted = np.sqrt(((body.points[i] - body.points[j]) ** 2).sum())
+        lengths = np.sqrt(((position[:, i] - position[:, j]) ** 2).sum(axis=0))
+        off = np.abs(lengths - wanted) > _LINK * wanted
+        for copy in np.flatnonzero(off)[:1]:
+            raise SceneError(
+                f"position must keep the lengths of the links to {_LINK:g}, got {lengths[copy]:.12g} m for links[{k}], "
+                f"{(i, j)}, of copy {copy} ({off.sum()} such), which is {wanted:.12g} m long"
+            )

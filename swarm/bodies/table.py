@@ -16,7 +16,8 @@ from ..errors import SceneError
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
-from .body import Body, Strain
+from .body import Body
+from .strain import Strain
 
 if TYPE_CHECKING:
     from .state import Bodies
@@ -126,12 +127,13 @@ class Elastic(Made):
     young: float
     poisson: float
     density: float
+    mass: str = "lumped"
 
     def body(self) -> Body:
         """A block of tetrahedra."""
         from .elastic import block, elastic
 
-        return elastic(block(self.lengths, self.cells), self.young, self.poisson, self.density)
+        return elastic(block(self.lengths, self.cells), self.young, self.poisson, self.density, self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +182,7 @@ class Points(Made):
             raise SceneError(f"{placed[0]}: is of copies at random; add count = ..., or give velocity = ... instead")
         position = np.array(self.points)
         velocity = np.zeros_like(position) if self.velocity is None else np.array(self.velocity)
-        return Bodies(self.body(), position.T[:, :, None], velocity.T[:, :, None])
+        return Bodies(self.body(), position.T, velocity.T)
 
 
 KINDS: dict[str, type[Made]] = {

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.body import Body, Pairs
+from ..bodies.body import Body
+from ..bodies.checked import Pairs
 from ..particles import Floats
 
 # Triangles whose normals differ by less lie in one face of a polyhedron, without a line between them.
@@ -63,16 +64,11 @@ def _lines(body: Body) -> Pairs:
         return np.unique(np.sort(body.bonds(), axis=1), axis=0)
     corners = (body.contacts @ body.points)[body.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.sqrt((normals**2).sum(axis=1, keepdims=True))
+    normals /= np.maximum(np.sqrt((normals**2).sum(axis=1, keepdims=True)), np.finfo(np.float64).tiny)
     beside: dict[tuple[int, ...], list[Floats]] = {}
     for face, normal in zip(body.faces.tolist(), normals, strict=True):
         for k in range(3):
             beside.setdefault(tuple(sorted((face[k - 1], face[k]))), []).append(normal)
     bends = body.strain is not None or len(body.springs) > 0
-    return np.array(
-        [
-            edge
-            for edge, sides in beside.items()
-            if bends or np.abs(sides[0] - sides[-1]).max() > _FLAT or len(sides) == 1
-        ]
-    )
+    kept = [edge for edge, sides in beside.items() if bends or len(sides) == 1 or np.ptp(sides, axis=0).max() > _FLAT]
+    return np.array(kept, dtype=np.int64).reshape(-1, 2)

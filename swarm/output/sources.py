@@ -12,7 +12,7 @@ from ..errors import SceneError
 # LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
 # RuntimeError.
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError)
-_PACKAGES = {"record": "rerun-sdk scikit-image contourpy", "plot": "matplotlib scikit-image"}
+_PACKAGES = {"record": "rerun-sdk scikit-image contourpy", "plot": "matplotlib scikit-image", "bodies": "scipy"}
 
 
 class DamagedError(SceneError):

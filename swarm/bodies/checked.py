@@ -1,0 +1,288 @@
+"""Checks of a body's arguments: each returns the value in its final type or raises a `SceneError` that names it."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import checks
+from ..errors import SceneError
+from ..motion import Motion
+from ..particles import Floats
+from ..surfaces.surface import SIDES, Surface
+
+Pairs = NDArray[np.int64]
+Spring = tuple[int, int, float, float]
+
+# Two points nearer than this, relative to their coordinates, have no direction to each other.
+_SAME_PLACE = 1e-12
+# The round-off of a matrix that was assembled, and of rows of coefficients, relative to their largest entry.
+_ROUND_OFF = 1e-12
+# How far from its surface a guided point may start, relative to the surface's size.
+_ON_SURFACE = 1e-9
+
+
+def points(value: ArrayLike) -> Floats:
+    """`value` as (P, 3) places."""
+    rows = np.array(checks.array("points", value))
+    if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
+        hint = "; transpose it" if rows.ndim == 2 and rows.shape[0] == 3 else ""
+        raise SceneError(f"points must have shape (P, 3), one row a point, got {rows.shape}{hint}")
+    return finite("points", rows)
+
+
+def finite(name: str, values: Floats) -> Floats:
+    """`values` if all are finite and at most 1e100."""
+    # NaN compares as false.
+    bad = np.argwhere(~(np.abs(values) <= checks.LARGEST))
+    if len(bad):
+        where = ", ".join(map(str, bad[0]))
+        raise SceneError(
+            f"{name} must hold finite numbers of at most {checks.LARGEST:g}, got {values[tuple(bad[0])]:g} at [{where}]"
+        )
+    return values
+
+
+def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) -> Floats:
+    """The (P, P) mass matrix from the masses or from itself."""
+    if (mass is None) == (matrix is None):
+        came = "neither" if mass is None else "both"
+        raise SceneError(f"a body needs one of mass and mass_matrix, got {came}")
+    if mass is not None:
+        masses = checks.array("mass", mass)
+        if masses.shape not in ((), (count,)):
+            raise SceneError(f"mass must be one number or have shape ({count},), got shape {masses.shape}")
+        return np.diag(_masses("mass", np.broadcast_to(masses, (count,))))
+    rows = np.array(checks.array("mass_matrix", matrix))  # type: ignore[arg-type]
+    if rows.shape != (count, count):
+        raise SceneError(f"mass_matrix must have shape ({count}, {count}), got {rows.shape}")
+    finite("mass_matrix", rows)
+    _masses("the diagonal of mass_matrix", np.diagonal(rows))
+    return _positive_definite("mass_matrix", symmetric("mass_matrix", rows))
+
+
+def _masses(name: str, masses: Floats) -> Floats:
+    allowed = (masses >= checks.SMALLEST) & (masses <= checks.LARGEST)
+    if not allowed.all():
+        first = int(np.argmin(allowed))
+        raise SceneError(
+            f"{name} must be finite and above 0, got {masses[first]:g} for point {first}; it may be from "
+            f"{checks.SMALLEST:g} to {checks.LARGEST:g} kg"
+        )
+    return masses
+
+
+def symmetric(name: str, matrix: Floats) -> Floats:
+    """`matrix` if it is symmetric; made so to the last bit."""
+    off = np.abs(matrix - matrix.T)
+    if off.max() > _ROUND_OFF * np.abs(matrix).max():
+        i, j = (int(k) for k in np.unravel_index(off.argmax(), off.shape))
+        raise SceneError(
+            f"{name} must be symmetric, got {matrix[i, j]:g} at [{i}, {j}] and {matrix[j, i]:g} at [{j}, {i}]"
+        )
+    return 0.5 * (matrix + matrix.T)
+
+
+def _positive_definite(name: str, matrix: Floats) -> Floats:
+    # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
+    scale = np.sqrt(np.diagonal(matrix))
+    values, vectors = np.linalg.eigh(matrix / scale / scale[:, None])
+    if values[0] < _ROUND_OFF:
+        mode = vectors[:, 0] / scale
+        first = int(np.abs(mode).argmax())
+        kind = "is singular" if values[0] > -_ROUND_OFF else "has a negative eigenvalue"
+        raise SceneError(
+            f"{name} must be positive definite, got one that {kind}: a motion, largest at point {first}, has "
+            f"{'no' if values[0] > -_ROUND_OFF else 'a negative'} kinetic energy"
+        )
+    return matrix
+
+
+def not_negative(name: str, matrix: Floats) -> None:
+    """Raise if a symmetric matrix has a negative eigenvalue beyond round-off."""
+    try:
+        # Far faster than eigenvalues, which say where it is wrong.
+        np.linalg.cholesky(matrix + _ROUND_OFF * np.abs(matrix).max() * np.eye(len(matrix)))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(matrix)
+        k = int(np.abs(vectors[:, 0]).argmax())
+        raise SceneError(
+            f"{name} must have no negative eigenvalue, got {values[0]:g}: a strain, largest at edge {k}, has a "
+            "negative energy, so the body would burst"
+        ) from None
+
+
+def point(name: str, value: Any, count: int | None) -> int:
+    """`value` as the number of one of `count` points."""
+    number = checks.count(name, value, least=0)
+    if count is not None and number >= count:
+        raise SceneError(f"{name} must be the number of a point, from 0 to {count - 1}, got {number}")
+    return number
+
+
+def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pairs:
+    """`rows` as (N, width) numbers of points, no point twice in a row and no row twice; count None: of any body."""
+    found: dict[frozenset[int], int] = {}
+    result = []
+    for k, row in enumerate(rows):
+        parts = entries(f"{name}[{k}]", row, width, "numbers of points")
+        given = [point(f"{name}[{k}][{i}]", part, count) for i, part in enumerate(parts)]
+        if len(set(given)) < width:
+            raise SceneError(f"{name}[{k}] must name {width} different points, got {tuple(given)}")
+        first = found.setdefault(frozenset(given), k)
+        if first < k:
+            raise SceneError(f"{name}[{k}], {tuple(given)}, is there already as {name}[{first}]; leave one of them out")
+        result.append(given)
+    return np.array(result, dtype=np.int64).reshape(-1, width)
+
+
+def entries(name: str, row: Any, width: int, what: str) -> tuple[Any, ...]:
+    """`row` as a tuple of `width` parts."""
+    try:
+        parts = tuple(row)
+    except TypeError:
+        raise SceneError(f"{name} must be {width} {what}, got {row!r}") from None
+    if len(parts) != width:
+        raise SceneError(f"{name} must be {width} {what}, got {len(parts)}: {row!r:.200}")
+    return parts
+
+
+def links(rows: Iterable[Any], places: Floats) -> Pairs:
+    """`rows` as (L, 2) pairs of points at different places."""
+    pairs = numbers("links", rows, 2, len(places))
+    for k, (i, j) in enumerate(pairs.tolist()):
+        if _at_one_place(places[i], places[j]):
+            raise SceneError(
+                f"links[{k}], {(i, j)}, must tie points at different places, got both at {places[i].tolist()}; a link "
+                "has no direction there"
+            )
+    return pairs
+
+
+def _at_one_place(first: Floats, second: Floats) -> bool:
+    return bool(np.abs(first - second).max() <= _SAME_PLACE * max(np.abs(first).max(), np.abs(second).max()))
+
+
+def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
+    """`rows` as springs (i, j, stiffness, rest length)."""
+    result = []
+    for k, row in enumerate(rows):
+        given = entries(f"springs[{k}]", row, 4, "values (i, j, stiffness, rest length)")
+        i, j = (point(f"springs[{k}][{n}]", given[n], len(places)) for n in range(2))
+        if i == j:
+            raise SceneError(f"springs[{k}] must name 2 different points, got {(i, j)}")
+        stiffness = checks.positive(f"springs[{k}][2], its stiffness,", given[2])
+        rest = checks.magnitude(f"springs[{k}][3], its rest length,", given[3])
+        checks.magnitude(f"springs[{k}][2], its stiffness,", stiffness)
+        if rest > 0.0 and _at_one_place(places[i], places[j]):
+            raise SceneError(
+                f"springs[{k}] must tie points at different places, got {(i, j)}, both at {places[i].tolist()}, and a "
+                f"rest length of {rest:g} m: its force has no direction there"
+            )
+        result.append((i, j, stiffness, rest))
+    return tuple(result)
+
+
+def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Floats:
+    """`value`, numbers of points or rows of coefficients, as (K, P) coefficients; no contact twice."""
+    held = set(anchored)
+    if value is None:
+        return np.eye(count)[[p for p in range(count) if p not in held]]
+    rows = np.array(checks.array("contacts", value))
+    if rows.ndim == 1:
+        chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
+        rows = np.eye(count)[chosen]
+    if rows.ndim != 2 or rows.shape[1] != count:
+        raise SceneError(f"contacts must be numbers of points or have shape (K, {count}), got shape {rows.shape}")
+    finite("contacts", rows)
+    sums, sizes = rows.sum(axis=1), np.abs(rows).sum(axis=1)
+    for k in np.flatnonzero(np.abs(sums - 1.0) > _ROUND_OFF * np.maximum(sizes, 1.0)).tolist():
+        raise SceneError(
+            f"contacts[{k}], its coefficients, must add up to 1, got {sums[k]:g}: the point must move with its body"
+        )
+    for k, row in enumerate(rows):
+        if set(np.flatnonzero(row).tolist()) <= held:
+            raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
+    _first, index = np.unique(rows, axis=0, return_index=True)
+    for k in sorted(set(range(len(rows))) - set(index.tolist())):
+        first = int(np.argmax((rows == rows[k]).all(axis=1)))
+        raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")
+    return rows
+
+
+def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | None]:
+    """`value` as motions of points."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise SceneError(f"anchors must be a mapping of points to None or a motion, got {type(value).__name__}")
+    for key, motion in value.items():
+        point("a key of anchors", key, count)
+        if motion is not None and not isinstance(motion, Motion):
+            raise SceneError(
+                f"anchors[{key}] must be None, for a point that is fixed, or a Translation, Oscillation or Rotation, "
+                f"got {motion!r:.200}"
+            )
+    if len(value) == count:
+        raise SceneError(f"anchors must leave a point that can move, got all {count} points of the body")
+    return {int(key): motion for key, motion in value.items()}
+
+
+def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tuple[tuple[int, Surface], ...]:
+    """`rows` as (point, surface), each point on its surface."""
+    held = set(anchored)
+    result = []
+    for k, row in enumerate(rows):
+        given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
+        number = point(f"guides[{k}][0]", given[0], len(places))
+        surface = _smooth(f"guides[{k}][1]", given[1])
+        if number in held:
+            raise SceneError(f"guides[{k}] must hold a point that can move, got {number}, which is anchored")
+        on_surface(f"guides[{k}]: point {number}", surface, places[number, :, None])
+        result.append((number, surface))
+    return tuple(result)
+
+
+def on_surface(name: str, surface: Surface, places: Floats) -> None:
+    """Raise unless places (3, N) are on the surface."""
+    slopes = np.sqrt((surface.gradient(places) ** 2).sum(axis=0))
+    values = surface.phi(places)
+    off = np.abs(values) / np.maximum(slopes, np.finfo(np.float64).tiny)
+    room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
+    for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
+        which = f" of copy {i}" if places.shape[1] > 1 else ""
+        raise SceneError(
+            f"{name}{which} must start on its surface, within {_ON_SURFACE:g} of its size, got "
+            f"{places[:, i].tolist()}, where phi of {surface!r} is {values[i]:.3g}"
+        )
+
+
+def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
+    """`rows` as (surface, carrier, point), each point on the admissible side."""
+    result = []
+    for k, row in enumerate(rows):
+        given = entries(f"cavities[{k}]", row, 3, "values (surface, carrier, point)")
+        surface = _smooth(f"cavities[{k}][0]", given[0])
+        carrier, held = (point(f"cavities[{k}][{n}]", given[n], len(places)) for n in (1, 2))
+        if carrier == held:
+            raise SceneError(f"cavities[{k}] must name a carrier and another point, got {carrier} for both")
+        gap = SIDES[getattr(surface, "side", "inside")] * surface.phi((places[held] - places[carrier])[:, None])[0]
+        if not gap <= 0.0:
+            raise SceneError(
+                f"cavities[{k}]: point {held} must start on the admissible side of its surface, got a gap of "
+                f"{gap:.3g}; the surface's origin is point {carrier}"
+            )
+        result.append((surface, carrier, held))
+    return tuple(result)
+
+
+def _smooth(name: str, surface: Any) -> Surface:
+    if not isinstance(surface, Surface):
+        raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {surface!r:.200}")
+    walls = len(surface.walls())
+    if walls > 1:
+        raise SceneError(
+            f"{name} must be a surface without edges, got {surface!r} of {walls} walls; give one for each wall"
+        )
+    return surface

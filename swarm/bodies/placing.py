@@ -1,0 +1,139 @@
+"""Random bodies, uniform over all admissible places and orientations."""
+
+import numpy as np
+
+from .. import checks
+from ..errors import SceneError
+from ..particles import Floats
+from ..scene import Scene
+from .body import Body
+from .state import Bodies
+
+# Points whose gaps are found at once.
+_BATCH = 1 << 19
+# The search ends after this many points if fewer than one body in a million was admissible.
+_TRIES = 20_000_000
+# How many points of each side and link are kept out of solids, which can be between corners.
+_SAMPLES = 8
+
+
+def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float = 0.0, seed: int = 0) -> Bodies:
+    """n copies of a body at random, uniform over the places and orientations at which it is within the walls.
+
+    The copies do not notice each other. Within means that all contact points are; where there are solids, so are points
+    of the links and of the sides of the faces.
+
+    Args:
+        scene: its volume must be bounded.
+        body: without anchors, guides and cavities.
+        n: number of copies, 1 or more.
+        speed: |v| of every centre of mass [m/s], from 0 to 1e100, in a direction uniform on the sphere.
+        spin: |omega| of every copy [rad/s], from 0 to 1e100, about its centre of mass and an axis uniform on the
+            sphere.
+        seed: the same seed gives the same bodies.
+
+    Raises:
+        SceneError: an argument is out of its range, the volume is open, or the body does not fit in it.
+
+    >>> import swarm
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> place(cavity, swarm.tetrahedron(edge=0.1, mass=1.0), 10, speed=0.5, spin=3.0, seed=1)
+    Bodies(10 of 4 points)
+    """
+    _require_free(body)
+    n = checks.count("n", n)
+    checks.particles_fit("n", n * len(body))
+    speed, spin = checks.magnitude("speed", speed), checks.magnitude("spin", spin)
+    random = np.random.default_rng(checks.seed("seed", seed))
+    # About the middle of what must be within, which is in any box around the scene.
+    probes = _probes(scene, body)
+    turns, middles = _places(scene, probes, n, random)
+    middle = probes.mean(axis=0)
+    position = _turned(turns, body.points - middle) + middles[:, None]
+    velocity = np.zeros_like(position) + speed * _directions(random, n)[:, None]
+    weights = body.mass_matrix.sum(axis=1)
+    arms = _turned(turns, body.points - weights @ body.points / weights.sum())
+    return Bodies(body, position, velocity + spin * np.cross(_directions(random, n)[:, None], arms, axis=0))
+
+
+def _require_free(body: Body) -> None:
+    if not isinstance(body, Body):
+        raise SceneError(f"body must be a swarm.Body, got {body!r:.200}")
+    for name in ("anchors", "guides", "cavities"):
+        if getattr(body, name):
+            raise SceneError(
+                f"place needs a body that can be anywhere, got one with {name}; give its place: swarm.Bodies(body, "
+                "position, velocity)"
+            )
+
+
+def _probes(scene: Scene, body: Body) -> Floats:
+    """(Q, 3) points of the body that must be within the walls."""
+    corners = body.contacts @ body.points if len(body.contacts) else body.points
+    if not any(surface.is_solid() for surface in scene.surfaces):
+        return corners
+    sides = corners[np.concatenate([body.faces[:, (0, 1)], body.faces[:, (1, 2)], body.faces[:, (2, 0)]])]
+    lines = np.concatenate([sides, body.points[body.bonds()]])
+    share = (np.arange(_SAMPLES) + 0.5)[:, None, None] / _SAMPLES
+    between = lines[:, 0] * (1.0 - share) + lines[:, 1] * share
+    return np.concatenate([corners, between.reshape(-1, 3)])
+
+
+def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """Rotation matrices (3, 3, n), and where the middles (3, n) of the probes are, of n copies within the walls."""
+    low, high = (np.array(corner)[:, None] for corner in scene.bounds())
+    if not np.isfinite(high - low).all():
+        raise SceneError(
+            "place needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or give "
+            "the bodies as arrays: swarm.Bodies(body, position, velocity)"
+        )
+    arms = probes - probes.mean(axis=0)
+    count = len(arms)
+    turns, middles, found, tried = np.empty((3, 3, n)), np.empty((3, n)), 0, 0
+    while found < n:
+        size = max(1, min(_BATCH // count, 2 * (n - found) + 64))
+        trial, turn = low + (high - low) * random.random((3, size)), _rotations(random, size)
+        inside = np.ones(size, bool)
+        for arm in arms:
+            # Each point only of those copies whose points before it are within.
+            left = np.flatnonzero(inside)
+            places = trial[:, left] + _turned(turn[:, :, left], arm[None])[:, 0]
+            inside[left] = (scene.gaps(places) <= 0.0).all(axis=0)
+        chosen = np.flatnonzero(inside)[: n - found]
+        middles[:, found : found + len(chosen)] = trial[:, chosen]
+        turns[:, :, found : found + len(chosen)] = turn[:, :, chosen]
+        found, tried = found + len(chosen), tried + size
+        if tried * count >= _TRIES and found < 1e-6 * tried:
+            extent = 2.0 * np.sqrt((arms**2).sum(axis=1).max())
+            raise SceneError(
+                f"place found {found} places in {tried} tries for a body that is {extent:.3g} m wide, in a scene of "
+                f"{' x '.join(f'{edge:.3g}' for edge in (high - low).ravel())} m; make it smaller, or give its place: "
+                "swarm.Bodies(body, position, velocity)"
+            )
+    return turns, middles
+
+
+def _rotations(random: np.random.Generator, n: int) -> Floats:
+    """(3, 3, n) rotation matrices, uniform on SO(3): of quaternions uniform on the sphere."""
+    normal = random.standard_normal((4, n))
+    w, x, y, z = normal / np.sqrt((normal**2).sum(axis=0))
+    return 2.0 * np.array(
+        [
+            [0.5 - (y * y + z * z), x * y - w * z, x * z + w * y],
+            [x * y + w * z, 0.5 - (x * x + z * z), y * z - w * x],
+            [x * z - w * y, y * z + w * x, 0.5 - (x * x + y * y)],
+        ]
+    )
+
+
+def _turned(turns: Floats, arms: Floats) -> Floats:
+    """(3, P, n) the points (P, 3) in n orientations."""
+    x, y, z = arms.T[:, :, None]
+    # Not by BLAS, whose last bit depends on the processor.
+    return np.asarray(turns[:, 0, None] * x + turns[:, 1, None] * y + turns[:, 2, None] * z)
+
+
+def _directions(random: np.random.Generator, n: int) -> Floats:
+    """(3, n) uniform on the sphere."""
+    normal = random.standard_normal((3, n))
+    return np.asarray(normal / np.sqrt((normal**2).sum(axis=0)))

@@ -1,0 +1,193 @@
+"""Rigid bodies made of links: dumbbell, tetrahedron, chain, and homogeneous polyhedra."""
+
+import itertools
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import checks
+from ..errors import SceneError
+from ..particles import Floats
+from . import checked
+from .body import Body
+from .checked import Pairs
+
+# Corners of a cube that are those of a regular tetrahedron: their second moments are 4 times the identity.
+_CORNERS = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
+_ALL_PAIRS = list(itertools.combinations(range(4), 2))
+_OUTWARD = [(1, 3, 2), (0, 2, 3), (0, 3, 1), (0, 1, 2)]
+# A polyhedron thinner than this, relative to its widest direction, is flat: its six links have no digits.
+_FLAT = 1e-4
+# A volume is round-off if it is less than this times that of a cube of the largest extent.
+_EMPTY = 1e-12
+
+
+def dumbbell(length: float, mass: float) -> Body:
+    """Two equal mass points at the ends of a link along x.
+
+    Args:
+        length: of the link, above 0 [m].
+        mass: of the whole body, above 0 [kg].
+
+    Returns:
+        The body; its centre is the origin.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> dumbbell(length=2.0, mass=1.0).points[:, 0]
+    array([-1.,  1.])
+    """
+    return chain(2, length, mass)
+
+
+def chain(n: int, length: float, mass: float) -> Body:
+    """Equal mass points in a line along x, each linked to the next.
+
+    Args:
+        n: number of points, 2 or more.
+        length: of the whole chain, above 0 [m]; each of its n - 1 links is length/(n - 1) long.
+        mass: of the whole chain, above 0 [kg]; each point has mass/n.
+
+    Returns:
+        The body; its centre is the origin.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> chain(10, length=0.9, mass=1.0)
+    Body(10 points, 9 links, 10 contacts)
+    """
+    n = checks.count("n", n, least=2)
+    length, mass = checks.length("length", length), checks.positive("mass", mass)
+    points = np.zeros((n, 3))
+    points[:, 0] = length * (np.arange(n) / (n - 1) - 0.5)
+    return Body(points, mass / n, links=[(i, i + 1) for i in range(n - 1)])
+
+
+def tetrahedron(edge: float, mass: float) -> Body:
+    """Four equal mass points at the corners of a regular tetrahedron, all linked.
+
+    Args:
+        edge: length of each of its six links, above 0 [m].
+        mass: of the whole body, above 0 [kg].
+
+    Returns:
+        The body; its centre is the origin. The homogeneous solid is `rigid(tetrahedron(...).points, density)`.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> tetrahedron(edge=1.0, mass=4.0)
+    Body(4 points, 6 links, 4 contacts, 4 faces)
+    """
+    edge, mass = checks.length("edge", edge), checks.positive("mass", mass)
+    return Body(_CORNERS * (edge / np.sqrt(8.0)), mass / 4.0, links=_ALL_PAIRS, faces=_OUTWARD)
+
+
+def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -> Body:
+    """A rigid homogeneous polyhedron.
+
+    Its four base points are mass points of a quarter of its mass each, placed so that their centre and their inertia
+    are exactly those of the solid. The vertices are its contact points.
+
+    Args:
+        vertices: (K, 3) corners [m].
+        density: above 0 [kg/m^3].
+        faces: (F, 3) triangles of vertices, closed, anticlockwise seen from outside; None: the convex hull, which needs
+            SciPy.
+
+    Returns:
+        The body; vertex k is its contact point k, where it was given.
+
+    Raises:
+        SceneError: an argument is out of its range; the vertices lie in a plane; the faces are not closed, or do not
+            all face outwards.
+
+    >>> cube = rigid([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], density=6.0)
+    >>> cube
+    Body(4 points, 6 links, 8 contacts, 12 faces)
+    >>> float(cube.mass_matrix.sum().round(12))  # kg
+    6.0
+    """
+    corners = checked.points(vertices)
+    density = checks.positive("density", density)
+    triangles = _hull(corners) if faces is None else _closed(corners, faces)
+    volume, center, moment = _moments(corners, triangles)
+    squares, axes = np.linalg.eigh(moment)
+    if not squares[0] > _FLAT**2 * squares[2]:
+        raise _flat(corners)
+    base = center + _CORNERS @ ((axes * np.sqrt(squares)) @ axes.T)
+    # Weights of the base points, which add up to 1, that give each corner.
+    weights = np.linalg.solve(
+        np.vstack([(base - center).T, np.ones(4)]), np.vstack([(corners - center).T, np.ones(len(corners))])
+    )
+    return Body(base, density * volume / 4.0, links=_ALL_PAIRS, contacts=weights.T, faces=triangles.tolist())
+
+
+def _flat(corners: Floats) -> SceneError:
+    return SceneError(
+        f"vertices must be the corners of a solid, got {len(corners)} that lie in a plane to within {_FLAT:g} of their "
+        "extent; a flat body is a Body of points and links"
+    )
+
+
+def _hull(corners: Floats) -> Pairs:
+    """The triangles of the convex hull, anticlockwise seen from outside."""
+    from ..output.sources import needed_by
+
+    with needed_by("a rigid body without faces", "bodies"):
+        from scipy.spatial import ConvexHull, QhullError
+    size = np.ptp(corners, axis=0).max()
+    try:
+        # Relative to their middle and extent: Qhull's tolerances are absolute.
+        hull = ConvexHull((corners - corners.mean(axis=0)) / (size or 1.0))
+    except (QhullError, ValueError):
+        raise _flat(corners) from None
+    triangles = np.asarray(hull.simplices, dtype=np.int64)
+    a, b, c = corners[triangles].transpose(1, 0, 2)
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return triangles
+
+
+def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
+    """`faces` as triangles, each of whose sides is run through once in both directions."""
+    triangles = checked.numbers("faces", np.asarray(faces).tolist(), 3, len(corners))
+    if not len(triangles):
+        raise SceneError(
+            "faces must hold the triangles of a closed surface, got none; leave it out for the convex hull"
+        )
+    owners: dict[tuple[int, int], int] = {}
+    for k, (a, b, c) in enumerate(triangles.tolist()):
+        for side in ((a, b), (b, c), (c, a)):
+            if side in owners:
+                raise SceneError(
+                    f"faces must be oriented alike, got faces[{owners[side]}] and faces[{k}], which both run from "
+                    f"vertex {side[0]} to {side[1]}; reverse one of them"
+                )
+            owners[side] = k
+    for (a, b), k in owners.items():
+        if (b, a) not in owners:
+            raise SceneError(f"faces must be closed, got faces[{k}] without a neighbour at its side from {a} to {b}")
+    for k in sorted(set(range(len(corners))) - set(triangles.ravel().tolist())):
+        raise SceneError(f"vertices[{k}] must be the corner of a face, got one that no face uses; leave it out")
+    return triangles
+
+
+def _moments(corners: Floats, triangles: Pairs) -> tuple[float, Floats, Floats]:
+    """Volume, centroid, and second moment about it by volume (3, 3), from the tetrahedra that triangles span."""
+    middle = corners.mean(axis=0)
+    sides = (corners - middle)[triangles]
+    volumes = np.linalg.det(sides) / 6.0
+    volume, sums = float(volumes.sum()), sides.sum(axis=1)
+    if abs(volume) <= _EMPTY * np.ptp(corners, axis=0).max() ** 3:
+        raise _flat(corners)
+    if volume < 0.0:
+        raise SceneError(
+            f"faces must be anticlockwise seen from outside, got a volume of {volume:g} m^3; reverse every face"
+        )
+    # Of a tetrahedron with a corner at 0: integral of x = V/4 sum a, of x x^T = V/20 (sum a a^T + sum a sum a^T).
+    center = volumes @ sums / (4.0 * volume)
+    squares = np.einsum("f,fax,fay->xy", volumes, sides, sides) + np.einsum("f,fx,fy->xy", volumes, sums, sums)
+    return volume, middle + center, squares / (20.0 * volume) - np.outer(center, center)

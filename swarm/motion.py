@@ -1,0 +1,164 @@
+"""Given motions: how a point that is led moves in time.
+
+All have one form, so that one kernel serves every motion:
+    s(t) = start + velocity t + cosine (cos(rate t) - 1) + sine sin(rate t).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import checks
+from .checks import Vector
+from .errors import SceneError
+from .particles import Floats
+
+
+class Led(NamedTuple):
+    """The path of one point.
+
+    Attributes:
+        start: (3,) its place at time 0 [m].
+        velocity: (3,) of the steady part [m/s].
+        cosine: (3,) what cos(rate t) - 1 multiplies [m].
+        sine: (3,) what sin(rate t) multiplies [m].
+        rate: of the angle [rad/s].
+    """
+
+    start: Floats
+    velocity: Floats
+    cosine: Floats
+    sine: Floats
+    rate: float
+
+    def position(self, time: ArrayLike) -> Floats:
+        """The place (3,) at a time [s], or the places (3, T) at T times."""
+        t = np.asarray(time, dtype=np.float64)
+        start, velocity, cosine, sine = (part.reshape(3, *(1,) * t.ndim) for part in self[:4])
+        half = np.sin(0.5 * self.rate * t)
+        # cos a - 1 = -2 sin^2(a/2) has no cancellation.
+        return np.asarray(start + velocity * t - cosine * (2.0 * half * half) + sine * np.sin(self.rate * t))
+
+
+@dataclass(frozen=True)
+class Translation:
+    """Steady motion along a straight line.
+
+    Args:
+        velocity: three numbers, each from -1e100 to 1e100 [m/s].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Translation(velocity=(2.0, 0.0, 0.0)).harmonic((0.0, 0.0, 1.0)).position(3.0)
+    array([6., 0., 1.])
+    """
+
+    velocity: Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "velocity", _vector("velocity", self.velocity))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        return Led(_point(start), np.array(self.velocity), np.zeros(3), np.zeros(3), 0.0)
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """Displacement amplitude (sin(2 pi frequency t + phase) - sin(phase)).
+
+    Args:
+        amplitude: three numbers, each from -1e100 to 1e100 [m].
+        frequency: above 0 [1/s].
+        phase: the angle at time 0 [rad].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Oscillation(amplitude=(0.0, 0.0, 0.1), frequency=5.0).harmonic((1.0, 0.0, 0.0)).position(0.05)
+    array([1. , 0. , 0.1])
+    """
+
+    amplitude: Vector
+    frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "amplitude", _vector("amplitude", self.amplitude))
+        frequency = checks.positive("frequency", self.frequency)
+        checks.magnitude("frequency", frequency)
+        object.__setattr__(self, "frequency", frequency)
+        object.__setattr__(self, "phase", checks.number("phase", self.phase))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        amplitude = np.array(self.amplitude)
+        # sin(a + phase) - sin(phase) = sin(phase) (cos a - 1) + cos(phase) sin a
+        cosine, sine = amplitude * math.sin(self.phase), amplitude * math.cos(self.phase)
+        return Led(_point(start), np.zeros(3), cosine, sine, 2.0 * math.pi * self.frequency)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Steady rotation about an axis that is fixed in space.
+
+    Args:
+        axis: three numbers, not all 0; its length does not matter. The rotation is right-handed about it.
+        rate: from -1e100 to 1e100 [rad/s].
+        center: a point of the axis [m].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> import math
+    >>> path = Rotation(axis=(0.0, 0.0, 1.0), rate=math.pi, center=(0.0, 0.0, 0.0)).harmonic((1.0, 0.0, 5.0))
+    >>> path.position(0.5).round(12)
+    array([0., 1., 5.])
+    """
+
+    axis: Vector
+    rate: float
+    center: Vector
+
+    def __post_init__(self) -> None:
+        axis = _vector("axis", self.axis)
+        if not any(axis):
+            raise SceneError("axis must have a direction, got (0, 0, 0)")
+        object.__setattr__(self, "axis", axis)
+        rate = checks.number("rate", self.rate)
+        checks.magnitude("|rate|", abs(rate))
+        object.__setattr__(self, "rate", rate)
+        object.__setattr__(self, "center", _vector("center", self.center))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        point = _point(start)
+        # By the largest part first: the squares of components may overflow, or be 0.
+        axis = np.array(self.axis) / np.abs(self.axis).max()
+        axis /= np.sqrt((axis**2).sum())
+        arm = point - self.center
+        radius = arm - (arm * axis).sum() * axis
+        return Led(point, np.zeros(3), radius, np.cross(axis, radius), self.rate)
+
+
+Motion = Translation | Oscillation | Rotation
+
+
+def led(motion: Motion | None, start: ArrayLike) -> Led:
+    """The path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
+    return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
+
+
+def _vector(name: str, value: Vector) -> Vector:
+    parts = checks.vector(name, value)
+    for i, part in enumerate(parts):
+        checks.magnitude(f"|{name}[{i}]|", abs(part))
+    return parts
+
+
+def _point(start: ArrayLike) -> Floats:
+    return np.array(checks.vector("start", start))
