@@ -86,6 +86,8 @@ def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
 
 
 def _type_name(kind: Any) -> str:
+    if "..." in str(kind):
+        return "a list"
     return {"float": "a number", "int": "a whole number", "Vector": "three numbers"}.get(
         getattr(kind, "__name__", str(kind)), "three numbers" if "tuple" in str(kind) else "a value"
     )

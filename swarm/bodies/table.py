@@ -163,7 +163,7 @@ class Points(Made):
             self.contacts,
             mass_matrix=self.mass_matrix,
             strain=None if self.strain is None else tables.convert(self.strain, _Strain, "strain").strain(),
-            anchors=dict(_each("anchors", self.anchors, _anchor)),
+            anchors=_anchors(self.anchors),
             guides=_each("guides", self.guides, _guide),
             cavities=_each("cavities", self.cavities, _cavity),
             faces=self.faces,
@@ -227,6 +227,15 @@ class _Cavity:
 
 def _each(name: str, given: tuple[Any, ...], read: Callable[[Any, str], Any]) -> list[Any]:
     return [read(table, f"{name}[{k}]") for k, table in enumerate(given)]
+
+
+def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
+    found = _each("anchors", given, _anchor)
+    points = [point for point, _motion in found]
+    for k, point in enumerate(points):
+        if point in points[:k]:
+            raise SceneError(f"anchors[{k}] is of point {point}, as anchors[{points.index(point)}]; remove one of them")
+    return dict(found)
 
 
 def _anchor(table: Any, where: str) -> tuple[int, Any]:
