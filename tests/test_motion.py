@@ -25,11 +25,12 @@ def test_oscillation(phase):
     assert path.position(TIMES) == pytest.approx(START[:, None] + np.outer(amplitude, wave), abs=1e-14)
 
 
-def test_rotation_is_right_handed_about_its_axis():
+@pytest.mark.parametrize("length", [1e-200, 1.0, 1e99])
+def test_rotation_is_right_handed_about_its_axis(length):
     """Rodrigues' formula, of an axis of any length."""
     axis, center = np.array([1.0, -2.0, 0.5]), np.array([0.1, 0.2, 0.3])
     unit, arm = axis / np.linalg.norm(axis), START - center
-    path = swarm.Rotation(1e99 * axis, 0.8, center).harmonic(START)
+    path = swarm.Rotation(length * axis, 0.8, center).harmonic(START)
     for t in TIMES:
         c, s = math.cos(0.8 * t), math.sin(0.8 * t)
         turned = arm * c + np.cross(unit, arm) * s + unit * (unit @ arm) * (1.0 - c)
@@ -53,7 +54,7 @@ def test_early_motion_has_all_digits():
     path = swarm.Oscillation((1.0, 0.0, 0.0), 1.0 / (2.0 * math.pi), math.pi / 2.0).harmonic((0.0, 0.0, 0.0))
     # sin(t + pi/2) - 1, without the round-off of cos(pi/2)
     moved = path.position(1e-9)[0] - path.sine[0] * 1e-9
-    assert moved == pytest.approx(-5e-19, rel=1e-6)
+    assert moved == pytest.approx(-5e-19, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize(
