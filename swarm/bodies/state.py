@@ -18,7 +18,7 @@ class Bodies:
     """n copies of a body.
 
     Args:
-        body: the template; its places of anchored points are the first of all: each copy is led from its own.
+        body: the template. An anchored point of a copy is fixed, or led from, where that copy has it.
         position: (3, P, n) or, of one copy, (3, P) [m], rows x, y, z of every point; the links have their lengths.
         velocity: the same shape [m/s].
 
