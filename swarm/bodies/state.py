@@ -67,6 +67,11 @@ class Bodies:
         n = len(self)
         return np.asarray((self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2))
 
+    def moved(self, particles: Particles) -> "Bodies":
+        """These bodies where their points, as `particles` gives them, are now."""
+        shape = self.position.shape
+        return Bodies(self.body, particles.position.reshape(shape), particles.velocity.reshape(shape))
+
     def particles(self) -> Particles:
         """All points as particles: point p of copy i is number p n + i.
 

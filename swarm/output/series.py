@@ -53,8 +53,7 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
     """The time series of a scene with particles or bodies, without those that are always zero in it."""
     laws, one = scene.laws(), "particle" if body is None else "body"
     every = "all particles" if body is None else "all bodies"
-    stores = body is not None and (len(body.springs) > 0 or body.strain is not None)
-    energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None or stores}
+    energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {"contact": method.law() is not None, "dissipated": laws is not None and laws[:2] != (None, None)}
     lines = [Line(f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there]
     lines += [
@@ -62,6 +61,8 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
         Line("/penetration", f"of a {one}", _logarithm_of("max_penetration")),
         Line("/impacts", every, _rate("impacts", 1.0)),
     ]
+    if body is not None and (len(body.springs) or body.strain is not None):
+        lines.append(Line("/energy/elastic", "elastic", _of("contact_energy")))
     if body is not None and len(body.links):
         lines.append(Line("/link_error", "of a link", _logarithm_of("link_error")))
     if body is not None and any(motion is not None for motion in body.anchors.values()):

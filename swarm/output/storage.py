@@ -46,13 +46,6 @@ class Storage:
             return slice(None) if self.frames == "all" else slice(0)
         return slice(None, None, self.frames)
 
-    def require_whole(self) -> None:
-        """Raise a SceneError if it keeps some points of bodies and not others."""
-        if not isinstance(self.frames, str):
-            raise SceneError(
-                f'frames must be "all" or "none" for bodies, got {self.frames}: every k-th point would tear them apart'
-            )
-
     def bytes_of(self, n: int) -> int:
         """Bytes that n particles take in a frame, if they are not compressed."""
         return len(range(n)[self.kept()]) * (6 * np.dtype(self.precision).itemsize + np.dtype(np.int64).itemsize)

@@ -3,9 +3,10 @@
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .. import checks
+from ..bodies.state import Bodies
 from ..errors import SceneError
 from ..frames import FrameTimes
 from ..methods.base import Method
@@ -14,9 +15,6 @@ from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
 from .tiers import CHOICES
-
-if TYPE_CHECKING:
-    from ..bodies.state import Bodies
 
 # At shorter intervals [s] a run would do little but save checkpoints.
 _OFTEN = 0.01
@@ -102,10 +100,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles, or the bodies and their points as particles, are its own copy."""
+    """A run, checked; the particles are its own copy. Of bodies they are all points."""
 
     scene: Scene
     particles: Particles
     method: Method
     options: RunOptions
-    bodies: "Bodies | None" = None
+    bodies: Bodies | None = None

@@ -151,10 +151,8 @@ def test_what_is_kept_is_whole(tmp_path):
         np.testing.assert_array_equal(trajectory.frame(1).position, start.position.reshape(3, -1).astype(np.float32))
         with pytest.raises(swarm.SceneError, match=r"half\.h5 keeps bodies in float32, .* use frame\(1\)"):
             trajectory.bodies(1)
-    for frames in ("all", "none"):
-        Storage(frames=frames).require_whole()
-    with pytest.raises(swarm.SceneError, match=r'frames must be "all" or "none" for bodies, got 2'):
-        Storage(frames=2).require_whole()
+    with pytest.raises(swarm.SceneError, match=r'frames must be "all" or "none" with bodies, .* got 2'):
+        swarm.simulate(BOX, start, swarm.Impact(dt=0.01), until=1.0, frames=2)
 
 
 def test_particles_are_no_bodies(tmp_path):
