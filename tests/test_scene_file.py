@@ -61,7 +61,9 @@ def test_laws_of_walls_and_their_seed(tmp_path):
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
 def test_shipped_scenes_are_read(path):
     job = scene_file.read(path)
-    assert (job.scene.gaps(job.start().position) <= 0.0).all()
+    start = job.start()
+    points = start.position if isinstance(start, swarm.Particles) else start.contact_points().reshape(3, -1)
+    assert (job.scene.gaps(points) <= 0.0).all()
 
 
 @pytest.mark.parametrize(

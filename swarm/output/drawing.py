@@ -32,15 +32,17 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
 
 
 def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> None:
-    """The lines (S, 2, 3) of bodies, and their colours (S,), 0xRRGGBBAA."""
-    style = {"colors": red_green_blue(packed), "linewidths": 0.9, "zorder": 2}
+    """The lines (S, 2, 3) of bodies, wider the fewer there are, and their colours (S,), 0xRRGGBBAA."""
+    width = float(np.clip(300.0 / max(1, len(lines)), 0.9, 2.0))
+    style = {"colors": red_green_blue(packed), "linewidths": width, "zorder": 2, "clip_on": False}
     axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
 
 
 def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> None:
     """The triangles (T, 3, 3) of bodies, shaded, each of the mean colour of its corners (T, 3), 0xRRGGBBAA."""
     colour = red_green_blue(packed.ravel()).reshape(-1, 3, 3).mean(axis=1)
-    axes.add_collection3d(Poly3DCollection(triangles, facecolors=colour, shade=True, zorder=2), autolim=False)
+    style = {"facecolors": colour, "shade": True, "zorder": 2, "clip_on": False}
+    axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
 
 
 def particles(
@@ -56,9 +58,10 @@ def particles(
         style = (
             {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
         )
-        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, **style), autolim=False)
+        # Corners of a box reach beyond the cell at this zoom.
+        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, clip_on=False, **style), autolim=False)
     dot = size * float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
-    axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2)
+    axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):

@@ -87,7 +87,8 @@ def _speeds(axes: Any, trajectory: Trajectory) -> None:
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
         axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
     axes.set_yscale("log")  # at the start all may be in one bin
-    axes.set_title(f"speeds, % in each of {_BINS} bins", fontsize=10)
+    whose = "speeds" if trajectory.body is None else "speeds of points"
+    axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)
     axes.set_xlabel("speed [m/s]", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

@@ -77,8 +77,9 @@ def checked(scene, particles, method, until, name):
     assert outside <= OUTSIDE
     assert lost <= LOST
     # Independently of the observables: no particle is behind a wall.
-    gaps = scene.gaps(result.particles.position)
-    assert np.isfinite(result.particles.position).all()
+    points = result.particles.position if result.bodies is None else result.bodies.contact_points().reshape(3, -1)
+    gaps = scene.gaps(points)
+    assert np.isfinite(points).all()
     assert gaps.max() <= 1e-9
     return impacts
 

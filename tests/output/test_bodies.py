@@ -209,6 +209,40 @@ def test_the_digest_of_a_start_is_also_of_its_body():
     assert len(digests | {checkpoint.digest_of(points)}) == 3
 
 
+def test_a_run_writes_its_bodies(tmp_path):
+    """The trajectory ends where the run does, and a recording of the trajectory is that of the run."""
+    start = swarm.place(BOX, CUBE, 3, speed=1.0, spin=5.0, seed=2)
+    files = {"trajectory": tmp_path / "run.h5", "recording": tmp_path / "run.rrd"}
+    result = swarm.simulate(BOX, start, swarm.Impact(dt=0.02), until=0.2, every=0.1, compile="never", **files)
+    with swarm.load(files["trajectory"]) as trajectory:
+        np.testing.assert_array_equal(trajectory.bodies(0).position, start.position)
+        np.testing.assert_array_equal(trajectory.bodies(-1).position, result.bodies.position)
+        np.testing.assert_array_equal(trajectory.bodies(-1).velocity, result.bodies.velocity)
+        np.testing.assert_array_equal(trajectory.observables["link_error"], result.observables["link_error"])
+        recording.record(trajectory, tmp_path / "later.rrd", recording.Settings())
+    one, other = (playback.Playback(tmp_path / name) for name in ("run.rrd", "later.rrd"))
+    assert one.about == other.about
+    for number in (0, 1, 2):
+        for mine, theirs in zip(
+            one.frame(number) + one.faces(number), other.frame(number) + other.faces(number), strict=True
+        ):
+            np.testing.assert_array_equal(mine, theirs)
+    np.testing.assert_array_equal(one.series["/link_error"], other.series["/link_error"])
+
+
+def test_another_body_is_another_run(tmp_path):
+    points = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)]
+    soft, hard = (swarm.Body(points, 1.0, springs=[(0, 1, stiffness, 0.1)]) for stiffness in (1.0, 2.0))
+    options = {"until": 0.1, "every": 0.1, "compile": "never", "trajectory": tmp_path / "run.h5"}
+    for body in (soft, hard):
+        start = swarm.Bodies(body, body.points.T, np.zeros((3, 2)))
+        if body is soft:
+            swarm.simulate(BOX, start, swarm.Impact(dt=0.05), **options)
+        else:
+            with pytest.raises(swarm.SceneError, match=r"run\.h5 is of another run: its particles or bodies at the start"):
+                swarm.simulate(BOX, start, swarm.Impact(dt=0.05), **options, resume=True)
+
+
 # --- Recordings and pictures ------------------------------------------------------------------------------
 
 
