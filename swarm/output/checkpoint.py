@@ -72,7 +72,7 @@ _NAMES = {
     "method": "method is",
     "scene": "scene is",
     "storage": "trajectory keeps",
-    "start": "particles or bodies at the start (seed, speed, mass, file, body) have the digest",
+    "start": "particles at the start (seed, speed, mass, file, body) have the digest",
     "seed": "seed of thermal walls is",
     "version": "version of swarm is",
 }

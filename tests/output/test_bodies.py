@@ -239,7 +239,7 @@ def test_another_body_is_another_run(tmp_path):
         if body is soft:
             swarm.simulate(BOX, start, swarm.Impact(dt=0.05), **options)
         else:
-            with pytest.raises(swarm.SceneError, match=r"run\.h5 is of another run: its particles or bodies at the start"):
+            with pytest.raises(swarm.SceneError, match=r"run\.h5 is of another run: its particles at the start"):
                 swarm.simulate(BOX, start, swarm.Impact(dt=0.05), **options, resume=True)
 
 
