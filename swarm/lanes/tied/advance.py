@@ -8,14 +8,18 @@ from ...kernel.jit import inlined, kernel, next_of, scratch, select
 from ...kernel.vector import Vec
 from ...status import Status
 from ...surfaces import fold as walls
-from . import blow
-from .arrays import Lanes, Pace
+from . import blow, hold
+from .arrays import Held, Lanes, Pace
 from .ties import solve
 
 # A step longer than the frame that is left by this part is the last of it.
 _SAME = 1.0 + 1e-9
 # Trials after which a body is stuck: brackets take a hundred at most.
 _STUCK = 2000
+# A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
+_SHORT = 1.0 / 16.0
+# After so many blows without a step the contacts last.
+_LASTS = 20
 
 
 @kernel
@@ -28,6 +32,7 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
+        scratch((points, 3, count), np.float64),
         scratch((rows, 3, count), np.float64), scratch((rows, 3, count), np.float64),
         scratch((rows, 3, count), np.float64), scratch((rows, rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
@@ -40,7 +45,11 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_),
         scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64),
-        scratch(count, np.int64),
+        scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.bool_),
+    )  # fmt: skip
+    held = Held(
+        scratch((count, blow.MOST_CONTACTS, 2), np.int64), scratch((count, blow.MOST_CONTACTS, 3, 3), np.float64),
+        scratch((count, 3 * blow.MOST_CONTACTS), np.float64),
     )  # fmt: skip
     c = scratch((3, count), np.float64)
     for i in range(count):
@@ -68,12 +77,21 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                     _store(state, lanes, pace, i)
             return Status.INTERRUPTED, 0
         passes += 1
+        for i in range(count):
+            if pace.held[i] > 0 and pace.fresh[i]:
+                hold.begin(touching, chain, rule, lanes, pace, held, i)
         _try(ties, rule, lanes, pace)
         _look(touching, chain, lanes, pace, c)
         for i in range(count):
             pace.action[i] = blow.COMMIT if pace.body[i] >= 0 else blow.AGAIN
-            if pace.body[i] >= 0 and (pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]):
+            pace.fresh[i] = False
+            settles = pace.held[i] > 0 and pace.solved[i]
+            if settles and not hold.press(ties, touching, chain, rule, lanes, (pace, held), i):
+                pace.stuck[i] += 1
+                pace.action[i] = blow.AGAIN
+            elif pace.body[i] >= 0 and (pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]):
                 pace.action[i] = blow.judge(touching, chain, rule, lanes, pace, i)
+            if pace.body[i] >= 0:
                 if pace.action[i] == blow.FAILED or pace.stuck[i] > _STUCK:
                     status = Status.UNSOLVED if pace.action[i] == blow.FAILED else Status.STALLED
                     number = pace.body[i]
@@ -81,7 +99,7 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                         if pace.body[j] >= 0:
                             _store(state, lanes, pace, j)
                     return status, number
-        _commit(lanes, pace)
+        _commit(lanes, pace, rule.dt)
         for i in range(count):
             action = pace.action[i]
             if action != blow.AGAIN:
@@ -89,10 +107,17 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                 if action != blow.STRIKE_NOW:
                     state.steps[number] += 1
                     pace.stuck[i] = 0
+                if pace.held[i] > 0 and action != blow.STRIKE_NOW:
+                    hold.end(touching, lanes, pace, held, state, i)
                 if action != blow.COMMIT:
-                    blow.strike(ties, touching, chain, rule, lanes, state, i, number)
+                    short = action == blow.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
+                    state.short[number] = state.short[number] + 1 if short else 0
+                    blows = blow.strike(ties, touching, chain, rule, lanes, state, i, number)
+                    if action == blow.STRIKE_NOW and blows == 0 or pace.stuck[i] > _LASTS:
+                        pace.held[i] = 1
                     for a in range(rows):
                         lanes.before[a, i] = lanes.recent[a, i]
+                pace.fresh[i] = True
                 pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
                 if pace.left[i] <= 0.0:
                     _store(state, lanes, pace, i)
@@ -104,9 +129,11 @@ def _load(state, lanes, pace, i, number):
     """Take a body into a lane."""
     pace.body[i], pace.left[i], pace.stuck[i] = number, state.left[number], 0
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i], pace.point[i] = 0.0, 0.0, math.inf, -1, -1
+    pace.held[i], pace.fresh[i] = state.lasting[number], True
     for q in range(lanes.r.shape[0]):
         for x in range(3):
             lanes.r[q, x, i], lanes.v[q, x, i] = state.position[x, q, number], state.velocity[x, q, number]
+            lanes.load[q, x, i] = 0.0
     for a in range(lanes.f.shape[0]):
         lanes.recent[a, i], lanes.before[a, i] = state.guess[0, a, number], state.guess[1, a, number]
 
@@ -116,6 +143,7 @@ def _store(state, lanes, pace, i):
     """Give the body of a lane back, as it is at the start of its step."""
     number = pace.body[i]
     state.left[number] = pace.left[i]
+    state.lasting[number] = 1 if pace.held[i] > 0 else 0
     for q in range(lanes.r.shape[0]):
         for x in range(3):
             state.position[x, q, number], state.velocity[x, q, number] = lanes.r[q, x, i], lanes.v[q, x, i]
@@ -184,7 +212,7 @@ def _look(touching, chain, lanes, pace, c):
 
 
 @inlined
-def _commit(lanes, pace):
+def _commit(lanes, pace, whole):
     """Take the trial as the step where it is one."""
     count = pace.out.size
     for i in range(count):
@@ -196,6 +224,9 @@ def _commit(lanes, pace):
             for i in range(count):
                 lanes.r[q, x, i] = select(pace.done[i], lanes.r1[q, x, i], lanes.r[q, x, i])
                 lanes.v[q, x, i] = select(pace.done[i], lanes.v1[q, x, i], lanes.v[q, x, i])
+    for i in range(count):
+        # In a short step round-off over h^2 is all that a multiplier is.
+        pace.done[i] = pace.done[i] & (pace.step[i] > _SHORT * whole)
     for a in range(lanes.f.shape[0]):
         for i in range(count):
             g = lanes.recent[a, i]

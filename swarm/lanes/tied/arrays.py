@@ -73,6 +73,7 @@ class Lanes(NamedTuple):
     r1: Any  # at its end
     v1: Any
     force: Any  # (P, 3, B) deceleration by the ties
+    load: Any  # (P, 3, B) and by the walls that a contact lasts at
     y0: Any  # (L, 3, B) of every tie at the start of the stage
     y1: Any
     d: Any  # discrete gradient of |y|^2: y0 + y1
@@ -105,3 +106,13 @@ class Pace(NamedTuple):
     wall: Any
     stuck: Any  # int: trials since the last step
     action: Any  # int
+    held: Any  # int: contacts that last
+    fresh: Any  # bool: the step begins
+
+
+class Held(NamedTuple):
+    """The contacts of each lane that last, at most C of them."""
+
+    name: Any  # (B, C, 2) point and wall
+    frame: Any  # (B, C, 3, 3) normal and two tangents
+    press: Any  # (B, 3 C) force along each [N]

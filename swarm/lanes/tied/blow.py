@@ -10,16 +10,18 @@ from ...surfaces import fold as walls
 
 # What becomes of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
-# A bracket of the time of impact this narrow, as a part of a whole step, is a point; and the shortest step there is.
-_NARROW, _SHORTEST = 1e-13, 1e-10
+# A bracket of the time of impact this narrow, as a part of a whole step, is a point; and of a step from a wall to itself.
+_NARROW, _SHORTEST = 1e-13, 1e-5
 # A step whose ties have no solution is halved this often.
 _HALVED = 2.0**-20
 # A contact this many times round-off away from its wall takes part in a blow.
 NEAR = 64.0
 # Most contacts in one blow; more follow in the next one at the same instant.
-_MOST = 16
+MOST_CONTACTS = 16
 # Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
 _BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
+# After so many short steps from impact to impact a wall that takes energy takes all of the approach.
+_CHATTER = 12
 
 
 @inlined
@@ -60,9 +62,13 @@ def judge(touching, chain, rule, lanes, pace, i):
     if wall < 0:
         return _inside(touching, chain, rule, lanes, pace, i)
     pace.high[i], pace.point[i], pace.wall[i], pace.trial[i] = tau, point, wall, first
-    if tau - low <= _NARROW * rule.dt or tau <= _SHORTEST * rule.dt:
+    if tau - low <= _NARROW * rule.dt:
         pace.trial[i] = low
         return STRIKE_NOW if low == 0.0 else AGAIN
+    if low == 0.0 and tau <= _SHORTEST * rule.dt:
+        # It is at the wall, and does not leave it.
+        start = walls.distance(chain, float(wall), point_of(touching, lanes.r, point, i))
+        return STRIKE_NOW if start >= -NEAR * rule.room else AGAIN
     return AGAIN
 
 
@@ -92,61 +98,45 @@ def _newton(chain, wall, contact, distance, tau):
 
 @outlined
 def strike(ties, touching, chain, rule, lanes, state, i, body):
-    """The blows at one instant: no contact that is at its wall approaches it afterwards; whether that is so.
+    """The blows at one instant, after which no contact at its wall approaches it; how many there are.
 
     For a wall without friction it is v+ = v- - (1 + e) (n.v)/(n K n) K n, where K is the inverse mass that the links
     leave: K = W - W J (J W J)^-1 J W with a row of J for each link. It is the contact step of the scheme for h -> 0.
     """
     m, r, v = ties.links, lanes.r, lanes.v
     system = scratch((m, m), np.float64)
-    _links(ties, r, i, system)
-    name = scratch((_MOST, 2), np.int64)
-    frame = scratch((_MOST, 3, 3), np.float64)
-    answer = scratch((3 * _MOST, m), np.float64)
-    schur = scratch((3 * _MOST, 3 * _MOST), np.float64)
-    rate = scratch(3 * _MOST, np.float64)
-    p = scratch(3 * _MOST, np.float64)
-    for _turn in range(_BLOWS):
-        found = _approaching(touching, chain, rule, (r, v), i, (name, frame))
+    links(ties, r, i, system)
+    # Bounces that follow one another ever faster end here.
+    bounces = 0.0 if state.short[body] > _CHATTER and min(touching.restitution) < 1.0 else 1.0
+    name = scratch((MOST_CONTACTS, 2), np.int64)
+    frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
+    answer = scratch((3 * MOST_CONTACTS, m), np.float64)
+    schur = scratch((3 * MOST_CONTACTS, 3 * MOST_CONTACTS), np.float64)
+    rate = scratch(3 * MOST_CONTACTS, np.float64)
+    p = scratch(3 * MOST_CONTACTS, np.float64)
+    for turn in range(_BLOWS):
+        found = near(touching, chain, rule, (r, v), i, (name, frame), True)
         if found == 0:
-            return True
+            return turn
         rows = 3 * found
+        respond(ties, touching, (name, frame, rows), (r, i), system, answer, schur)
         for a in range(rows):
-            _against_links(ties, touching, (name, frame), a, (r, i), answer)
-            for row in range(m):
-                for k in range(row):
-                    answer[a, row] -= system[row, k] * answer[a, k]
-                answer[a, row] /= system[row, row]
-        for a in range(rows):
-            k, u = name[a // 3, 0], point_of(touching, v, name[a // 3, 0], i)
-            d = Vec(frame[a // 3, a % 3, 0], frame[a // 3, a % 3, 1], frame[a // 3, a % 3, 2])
-            for b in range(rows):
-                o = Vec(frame[b // 3, b % 3, 0], frame[b // 3, b % 3, 1], frame[b // 3, b % 3, 2])
-                s = touching.to_others[k, name[b // 3, 0]] * dot(d, o)
-                for row in range(m):
-                    s -= answer[a, row] * answer[b, row]
-                schur[a, b] = s
-            rate[a] = dot(d, u)
-            p[a] = 0.0
-        for a in range(rows):
-            for row in range(m - 1, -1, -1):
-                for j in range(row + 1, m):
-                    answer[a, row] -= system[j, row] * answer[a, j]
-                answer[a, row] /= system[row, row]
+            rate[a], p[a] = dot(direction(frame, a), point_of(touching, v, name[a // 3, 0], i)), 0.0
             # Without what the links take of it: the velocity has a part across them, of the order of the scheme.
             for row in range(m):
-                y = _tie(ties, r, row, i)
-                rate[a] -= answer[a, row] * dot(y, _tie(ties, v, row, i))
+                rate[a] -= answer[a, row] * dot(_tie(ties, r, row, i), _tie(ties, v, row, i))
         energy = _kinetic(ties, v, i)
-        _impulses(touching, (name, found), schur, rate, p)
+        _impulses(touching, (name, found), schur, rate, p, bounces)
+        if max(p) == 0.0:
+            return turn
         _apply(ties, touching, (name, frame, rows), (answer, p), (r, v), i)
         for a in range(found):
             state.impulse[name[a, 1], body] += p[3 * a]
             if p[3 * a] > 0.0:
                 state.impacts[body] += 1
-        if not _is_elastic(touching, (name, found)):
+        if bounces == 0.0 or not _is_elastic(touching, (name, found)):
             state.dissipated[body] += energy - _kinetic(ties, v, i)
-    return False
+    return _BLOWS
 
 
 @inlined
@@ -166,7 +156,7 @@ def _tie(ties, r, row, i):
 
 
 @inlined
-def _links(ties, r, i, system):
+def links(ties, r, i, system):
     """The Cholesky factor of J W J, the links' rows."""
     m = ties.links
     for a in range(m):
@@ -179,22 +169,53 @@ def _links(ties, r, i, system):
 
 
 @inlined
-def _approaching(touching, chain, rule, motion, i, contacts):
-    """The contacts at their walls that approach them: their names (point, wall), and a normal and two tangents each."""
+def near(touching, chain, rule, motion, i, contacts, approaching):
+    """The contacts at their walls, or those of them that approach: their names (point, wall), a normal, two tangents."""
     r, v = motion
     name, frame = contacts
     found = 0
     for k in range(touching.plain.size):
         c, u = point_of(touching, r, k, i), point_of(touching, v, k, i)
         for w in range(walls.length(chain)):
-            if found < _MOST and walls.distance(chain, float(w), c) >= -NEAR * rule.room:
+            if found < MOST_CONTACTS and walls.distance(chain, float(w), c) >= -NEAR * rule.room:
                 n = walls.unit_normal(chain, float(w), c)
                 # What is left of an approach by round-off is none.
-                if dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
+                if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
                     name[found, 0], name[found, 1] = k, w
                     _frame(frame, found, n)
                     found += 1
     return found
+
+
+@inlined
+def direction(frame, a):
+    """Direction a of the contacts: normal, tangent, tangent, normal of the next, ..."""
+    return Vec(frame[a // 3, a % 3, 0], frame[a // 3, a % 3, 1], frame[a // 3, a % 3, 2])
+
+
+@inlined
+def respond(ties, touching, contacts, place, system, answer, schur):
+    """How the velocities of contacts answer impulses at them, n K n, and x = (J W J)^-1 J W b d of each."""
+    name, frame, rows = contacts
+    m = ties.links
+    for a in range(rows):
+        _against_links(ties, touching, (name, frame), a, place, answer)
+        for row in range(m):
+            for k in range(row):
+                answer[a, row] -= system[row, k] * answer[a, k]
+            answer[a, row] /= system[row, row]
+    for a in range(rows):
+        d = direction(frame, a)
+        for b in range(rows):
+            s = touching.to_others[name[a // 3, 0], name[b // 3, 0]] * dot(d, direction(frame, b))
+            for row in range(m):
+                s -= answer[a, row] * answer[b, row]
+            schur[a, b] = s
+    for a in range(rows):
+        for row in range(m - 1, -1, -1):
+            for j in range(row + 1, m):
+                answer[a, row] -= system[j, row] * answer[a, j]
+            answer[a, row] /= system[row, row]
 
 
 @inlined
@@ -214,7 +235,7 @@ def _against_links(ties, touching, contacts, a, place, answer):
     """J W b d of each link, for direction a of the contacts."""
     name, frame = contacts
     r, i = place
-    d = Vec(frame[a // 3, a % 3, 0], frame[a // 3, a % 3, 1], frame[a // 3, a % 3, 2])
+    d = direction(frame, a)
     for row in range(ties.links):
         answer[a, row] = touching.to_ties[name[a // 3, 0], row] * dot(_tie(ties, r, row, i), d)
 
@@ -231,14 +252,14 @@ def _kinetic(ties, v, i):
 
 
 @inlined
-def _impulses(touching, contacts, schur, rate, p):
+def _impulses(touching, contacts, schur, rate, p, bounces):
     """Gauss-Seidel over the contacts: w+ = -e w- where a wall pushes; friction within its cone, or the point sticks."""
     name, found = contacts
     for _sweep in range(_SWEEPS):
         moved, size = 0.0, 0.0
         for a in range(found):
             wall, j = name[a, 1], 3 * a
-            wanted = (1.0 + touching.restitution[wall]) * rate[j]
+            wanted = (1.0 + bounces * touching.restitution[wall]) * rate[j]
             for b in range(3 * found):
                 wanted -= schur[j, b] * p[b]
             new = max(0.0, p[j] + wanted / schur[j, j])

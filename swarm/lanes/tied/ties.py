@@ -39,7 +39,8 @@ def solve(ties, gravity, noise, lanes, pace):
             for x in range(3):
                 g = gravity[x]
                 for i in range(count):
-                    lanes.p[q, x, i] = lanes.ra[q, x, i] + pace.h[i] * (lanes.va[q, x, i] + 0.5 * pace.h[i] * g)
+                    pull = 0.5 * pace.h[i] * (g - lanes.load[q, x, i])
+                    lanes.p[q, x, i] = lanes.ra[q, x, i] + pace.h[i] * (lanes.va[q, x, i] + pull)
         else:
             for x in range(3):
                 for i in range(count):
@@ -71,7 +72,7 @@ def solve(ties, gravity, noise, lanes, pace):
             for x in range(3):
                 g = gravity[x]
                 for i in range(count):
-                    lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - force[q, x, i])
+                    lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - lanes.load[q, x, i] - force[q, x, i])
 
 
 @inlined
