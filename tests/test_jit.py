@@ -523,6 +523,7 @@ LAYERS = [
     ["output"],
     ["tables", "filling"],
     ["observables", "history"],
+    ["bodies"],
     ["lanes"],
     ["methods"],
     ["scene", "particles"],

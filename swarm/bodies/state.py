@@ -61,6 +61,11 @@ class Bodies:
         """(3, K, n) the points that can touch walls."""
         return np.asarray(np.einsum("kp,xpn->xkn", self.body.contacts, self.position))
 
+    def moved(self, particles: Particles) -> "Bodies":
+        """These bodies where their points, as `particles` gives them, are now."""
+        shape = self.position.shape
+        return Bodies(self.body, particles.position.reshape(shape), particles.velocity.reshape(shape))
+
     def particles(self) -> Particles:
         """All points as particles: point p of copy i is number p n + i.
 

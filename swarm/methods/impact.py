@@ -37,6 +37,8 @@ class Impact(base.Method):
             that a wedge of 1e-4 rad takes its 31415 impacts.
         sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The steps of each
             particle follow from it: some 150 a crossing, and 1/4 power of it more or fewer.
+        dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles, which need none.
+        order: of bodies between impacts: 2, or 4 by Suzuki's composition of five steps.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
     fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
@@ -61,6 +63,8 @@ class Impact(base.Method):
     contact_step: float = 0.0
     shortest_flight: float | None = None
     sliding_tolerance: float = 1e-9
+    dt: float | None = None
+    order: int = 2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "contact_step", checks.at_least("contact_step", self.contact_step, 0.0))
@@ -70,6 +74,10 @@ class Impact(base.Method):
         if not _FINEST <= tolerance <= _COARSEST:
             raise SceneError(f"sliding_tolerance must be from {_FINEST:g} to {_COARSEST:g}, got {tolerance:g}")
         object.__setattr__(self, "sliding_tolerance", tolerance)
+        if self.dt is not None:
+            object.__setattr__(self, "dt", checks.positive("dt", self.dt))
+        if self.order not in (2, 4):
+            raise SceneError(f"order must be 2 or 4, got {self.order}")
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_crossing("contact_step", self.contact_step, scene, particles)

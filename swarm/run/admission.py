@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from ..bodies.state import Bodies
 from ..errors import SceneError
+from ..methods import Impact
 from ..methods.base import Method, check_surfaces
 from ..particles import Particles
 from ..scene import Scene
@@ -14,15 +16,20 @@ from .options import RunOptions, Task
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 
 
-def task_of(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> Task:
+def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Task:
     """The run, checked, with its own copy of the particles.
 
     Raises:
         SceneError: an argument is wrong, or the arguments do not go together.
     """
-    for name, value, kind in (("scene", scene, Scene), ("particles", particles, Particles), ("method", method, Method)):
-        if not isinstance(value, kind):
-            raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
+    kinds = ("scene", scene, (Scene,)), ("particles", particles, (Particles, Bodies)), ("method", method, (Method,))
+    for name, value, allowed in kinds:
+        if not isinstance(value, allowed):
+            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
+    if isinstance(particles, Bodies):
+        return _task_of_bodies(scene, particles.copy(), method, options)
+    if getattr(method, "dt", None) is not None and isinstance(method, Impact):
+        raise SceneError(f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out")
     # The arrays of Particles may have been changed since it checked them.
     particles = particles.copy()
     check_surfaces(method, scene)
@@ -36,6 +43,24 @@ def task_of(scene: Scene, particles: Particles, method: Method, options: RunOpti
     _require_inside(scene, particles)
     workload.check(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
+
+
+def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
+    """A run of bodies, checked."""
+    if not isinstance(method, Impact) or method.dt is None:
+        raise SceneError(f"bodies need the method Impact with a step, got {method}; give Impact(dt=...) [s]")
+    if method.contact_step > 0.0:
+        raise SceneError(f"contact_step must be 0 with bodies, whose blows are exact, got {method.contact_step:g}")
+    for i, surface in enumerate(scene.surfaces):
+        if surface.temperature is not None:
+            raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
+    if options.frames not in ("all", "none"):
+        raise SceneError(f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}')
+    check_surfaces(method, scene)
+    if options.compile != "never":
+        require_compiled(scene.surfaces)
+    _require_inside(scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2))))
+    return Task(scene, bodies.particles(), method, options, bodies)
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

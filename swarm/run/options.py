@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
+from ..bodies.state import Bodies
 from ..errors import SceneError
 from ..frames import FrameTimes
 from ..methods.base import Method
@@ -99,9 +100,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles are its own copy."""
+    """A run, checked; the particles are its own copy. Of bodies they are all points."""
 
     scene: Scene
     particles: Particles
     method: Method
     options: RunOptions
+    bodies: Bodies | None = None

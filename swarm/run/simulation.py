@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from .. import interrupt
 from ..frames import Frame
+from ..bodies.state import Bodies
 from ..kernel.cache import kernels_compiled
+from ..methods import Impact
 from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
 from .admission import task_of
+from .bodies import BodyRun
 from .engine import Run
 from .options import RunOptions, Task
 from .outputs import recorder_of, writer_of
@@ -43,6 +46,7 @@ class Result:
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
+        bodies: the bodies at `until`, or None; then `particles` are all their points.
     """
 
     particles: Particles
@@ -51,11 +55,12 @@ class Result:
     trajectory: Path | None
     multipliers: Multipliers | None
     impacts_per_particle: NDArray[np.int64]
+    bodies: Bodies | None = None
 
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
-    particles: Particles,
+    particles: Particles | Bodies,
     method: Method,
     *,
     until: float,
@@ -92,7 +97,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
     Args:
         scene: the walls and gravity.
-        particles: the start; it is not changed.
+        particles: the start, particles or bodies; it is not changed.
         method: how to advance.
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
@@ -141,7 +146,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     return carry_out(scene, particles, method, RunOptions(**keywords))
 
 
-def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> Result:
+def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Result:
     """`simulate` with its keywords as `RunOptions`."""
     session = Session(options)
     task = task_of(scene, particles, method, options)
@@ -151,7 +156,7 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
     from .progress import display  # rich is imported only when it is shown
 
     recorder = recorder_of(task)
-    runs: list[Run] = []
+    runs: list[Run | BodyRun] = []
 
     def stop() -> None:
         session.stop()
@@ -161,9 +166,7 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
     with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
         session.prepare(task)
         _require_room(task, session)
-        run = Run(
-            scene, task.particles, method, options.thread_count(), options.block_size, options.compile, options.seed
-        )
+        run = _run_of(task)
         runs.append(run)
         session.restore(run)
         writer = writer_of(task, session, recorder)
@@ -176,11 +179,21 @@ def carry_out(scene: Scene, particles: Particles, method: Method, options: RunOp
             options.trajectory,
             run.state.multipliers,
             run.state.impacts,
+            None if task.bodies is None else task.bodies.moved(task.particles),
         )
 
 
+def _run_of(task: Task) -> Run | BodyRun:
+    options = task.options
+    how = options.thread_count(), options.block_size, options.compile
+    if task.bodies is None:
+        return Run(task.scene, task.particles, task.method, *how, options.seed)
+    assert isinstance(task.method, Impact)
+    return BodyRun(task.scene, task.bodies, task.particles, task.method, *how)
+
+
 def _frames(
-    task: Task, session: Session, run: Run, writer: "Background | None", show: "Display"
+    task: Task, session: Session, run: Run | BodyRun, writer: "Background | None", show: "Display"
 ) -> list[dict[str, Any]]:
     """All frames of this session: their observables, if no trajectory holds them."""
     history: list[dict[str, Any]] = []

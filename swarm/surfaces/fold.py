@@ -115,6 +115,7 @@ def _of_wall_4(function: Any, neutral: Any) -> Any:
 
 unit_normal = of_wall(contract.unit_normal, ZERO)
 settle = of_wall(contract.settle, ZERO)
+distance = of_wall(contract.distance, 0.0)
 push = of_wall(contract.push, ZERO)
 inner_gradient = of_wall(contract.inner_gradient, ZERO)
 step_normal = of_wall(contract.step_normal, ZERO)

@@ -1,0 +1,278 @@
+"""One stage of a step: the multipliers of all ties by Newton's method, in all lanes at once.
+
+    r1 = p - (h^2/2) W sum lambda D,  v1 = v0 + h G - h W sum lambda D,  p = r0 + h v0 + h^2 G/2
+with D = y0 + y1, the discrete gradient of |y|^2 of each tie (a quadratic, so it is exact), and for every tie
+    link     |y1|^2 = l^2
+    spring   lambda = k (1 - 2 l/(|y0| + |y1|))/2, the composite discrete gradient of k (|y| - l)^2/2
+    edges    lambda = K ((|y0|^2 + |y1|^2)/2 - s0)
+so that links do no work and what springs and edges do is the change of their energy, exactly. v1 in this form, because
+2 (r1 - r0)/h - v0 cancels: 3e-10 instead of 1e-15.
+
+The system is factored once for several corrections, which are cheap; each shrinks errors by some (h omega)^2. Each lane
+stops by itself, so that its bits do not depend on its neighbours.
+"""
+
+import math
+
+from ...kernel.jit import inlined, select
+
+# Where the relative error of |y|^2 would be below this after a correction, it is the last.
+_TOLERANCE = 1e-15
+# Most corrections, and after how many the system is factored again.
+MOST, _AGAIN = 40, 5
+# By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
+_NEGLECTED = 4.0
+# The rest length that scales the equation of a spring is at least this part of its length.
+_SHORTEST = 1e-8
+
+
+@inlined
+def solve(ties, gravity, noise, lanes, pace):
+    """The end r1, v1 of a stage from (ra, va) with the steps pace.h; pace.done is False where none is found.
+
+    Points that are led must be in r1 already.
+    """
+    force = lanes.force
+    points, count = force.shape[0], force.shape[2]
+    for q in range(points):
+        if ties.is_free[q]:
+            for x in range(3):
+                g = gravity[x]
+                for i in range(count):
+                    lanes.p[q, x, i] = lanes.ra[q, x, i] + pace.h[i] * (lanes.va[q, x, i] + 0.5 * pace.h[i] * g)
+        else:
+            for x in range(3):
+                for i in range(count):
+                    lanes.p[q, x, i] = lanes.r1[q, x, i]
+    for a in range(ties.ends.shape[0]):
+        first, second = ties.ends[a, 0], ties.ends[a, 1]
+        for x in range(3):
+            for i in range(count):
+                y = lanes.ra[first, x, i] - lanes.ra[second, x, i]
+                lanes.y0[a, x, i] = y
+                lanes.d[a, x, i] = y + (lanes.p[first, x, i] - lanes.p[second, x, i])
+    for turn in range(MOST + 1):
+        # D follows the multipliers before they are corrected: together, the second makes up again for the first.
+        _push(ties, lanes, pace)
+        _follow(ties, lanes, pace)
+        _push(ties, lanes, pace)
+        if turn == MOST or _all(pace.done):
+            break
+        _residual(ties, lanes, pace, turn, noise)
+        if turn % _AGAIN == 0:
+            _assemble(ties, lanes, pace)
+            _factor(ties.start, lanes.a)
+        _correct(ties.start, lanes, pace)
+        if _all(pace.done):
+            _push(ties, lanes, pace)
+            break
+    for q in range(points):
+        if ties.is_free[q]:
+            for x in range(3):
+                g = gravity[x]
+                for i in range(count):
+                    lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - force[q, x, i])
+
+
+@inlined
+def _push(ties, lanes, pace):
+    """r1 = p - (h^2/2) W sum lambda D"""
+    accelerate(ties, lanes)
+    for q in range(lanes.r1.shape[0]):
+        for x in range(3):
+            for i in range(lanes.r1.shape[2]):
+                k2 = 0.5 * pace.h[i] * pace.h[i]
+                lanes.r1[q, x, i] = lanes.p[q, x, i] - k2 * lanes.force[q, x, i]
+
+
+@inlined
+def _follow(ties, lanes, pace):
+    """D = y0 + y1
+
+    In a lane that is done D stays as it is: with the multipliers, which stay too, it gives the same r1 again.
+    """
+    for a in range(ties.ends.shape[0]):
+        first, second = ties.ends[a, 0], ties.ends[a, 1]
+        for x in range(3):
+            for i in range(lanes.r1.shape[2]):
+                d = lanes.y0[a, x, i] + (lanes.r1[first, x, i] - lanes.r1[second, x, i])
+                lanes.d[a, x, i] = select(pace.done[i], lanes.d[a, x, i], d)
+
+
+@inlined
+def _all(done):
+    """Whether every lane is done."""
+    undone = 0
+    for i in range(done.size):
+        undone += select(done[i], 0, 1)
+    return undone == 0
+
+
+@inlined
+def accelerate(ties, lanes):
+    """W sum lambda D, the deceleration by the ties."""
+    force, points, count = lanes.force, lanes.force.shape[0], lanes.force.shape[2]
+    for q in range(points):
+        for x in range(3):
+            for i in range(count):
+                force[q, x, i] = 0.0
+    for a in range(ties.ends.shape[0]):
+        first, second = ties.ends[a, 0], ties.ends[a, 1]
+        for x in range(3):
+            for i in range(count):
+                g = lanes.multiplier[a, i] * lanes.d[a, x, i]
+                force[first, x, i] += g
+                force[second, x, i] -= g
+    if ties.is_diagonal:
+        for q in range(points):
+            w = ties.inverse_mass[q, q]
+            for x in range(3):
+                for i in range(count):
+                    force[q, x, i] *= w
+        return
+    for q in range(points):
+        for x in range(3):
+            for i in range(count):
+                lanes.v1[q, x, i] = 0.0
+        for s in range(points):
+            w = ties.inverse_mass[q, s]
+            if w != 0.0:
+                for x in range(3):
+                    for i in range(count):
+                        lanes.v1[q, x, i] += w * force[s, x, i]
+    for q in range(points):
+        for x in range(3):
+            for i in range(count):
+                force[q, x, i] = lanes.v1[q, x, i]
+
+
+@inlined
+def _residual(ties, lanes, pace, turn, noise):
+    """How far each tie is from its equation, as an error of |y1|^2, and which lanes need no more than one correction."""
+    f, count, links, soft = lanes.f, lanes.f.shape[1], ties.links, ties.links + ties.springs
+    for i in range(count):
+        pace.error[i] = 0.0
+        pace.rate[i] = 0.0
+    for a in range(f.shape[0]):
+        first, second = ties.ends[a, 0], ties.ends[a, 1]
+        for i in range(count):
+            f[a, i] = 0.0
+        for x in range(3):
+            for i in range(count):
+                y = lanes.r1[first, x, i] - lanes.r1[second, x, i]
+                lanes.y1[a, x, i] = y
+                f[a, i] += y * y
+        if a < links:
+            rest, inverse = ties.rest[a], 1.0 / ties.rest[a]
+            for i in range(count):
+                f[a, i] -= rest
+                _worse(pace.error, i, abs(f[a, i]) * inverse)
+        elif a < soft:
+            rest, softness = ties.rest[a], 2.0 / ties.stiffness[a]
+            for i in range(count):
+                y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
+                after = math.sqrt(f[a, i])
+                both = math.sqrt(y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) + after
+                short = select(rest > _SHORTEST * both, rest, _SHORTEST * both)
+                # The equation times this has the derivative 1 by |y1|^2.
+                scale = both * both * after / short
+                unmet = 1.0 - 2.0 * rest / both - softness * lanes.multiplier[a, i]
+                f[a, i] = scale * unmet
+                lanes.soft[a, i] = scale * softness
+                _worse(pace.error, i, abs(unmet))
+        else:
+            rest, inverse = 2.0 * ties.rest[a], 1.0 / ties.rest[a]
+            for i in range(count):
+                y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
+                f[a, i] += (y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) - rest
+            for b in range(soft, f.shape[0]):
+                give = ties.compliance[a - soft, b - soft]
+                if give != 0.0:
+                    for i in range(count):
+                        f[a, i] -= give * lanes.multiplier[b, i]
+            for i in range(count):
+                _worse(pace.error, i, abs(f[a, i]) * inverse)
+        for i in range(count):
+            # What the correction neglects: that D changes with r1
+            k2 = _NEGLECTED * pace.h[i] * pace.h[i]
+            _worse(pace.rate, i, abs(k2 * ties.couplings[a, a] * lanes.multiplier[a, i]))
+    for i in range(count):
+        error, before = pace.error[i], pace.previous[i]
+        rate = select(turn == 0, error, error / before)
+        rate = select(rate > pace.rate[i], rate, pace.rate[i])
+        pace.previous[i] = error
+        pace.last[i] = (error * rate <= _TOLERANCE) | (error <= noise)
+
+
+@inlined
+def _worse(worst, i, value):
+    """Keep the larger one; NaN counts as infinite."""
+    value = select(value < math.inf, value, math.inf)
+    worst[i] = select(value > worst[i], value, worst[i])
+
+
+@inlined
+def _assemble(ties, lanes, pace):
+    """The derivative of each equation by each multiplier, h^2 (beta W beta) y1.D, within the skyline."""
+    a, y, d, count = lanes.a, lanes.y1, lanes.d, lanes.f.shape[1]
+    links, soft = ties.links, ties.links + ties.springs
+    for row in range(a.shape[0]):
+        for column in range(ties.start[row], row + 1):
+            w = ties.couplings[row, column]
+            give = 0.0
+            if column >= soft:
+                give = ties.compliance[row - soft, column - soft]
+            for i in range(count):
+                k = w * pace.h[i] * pace.h[i]
+                along = y[row, 0, i] * d[column, 0, i] + y[row, 1, i] * d[column, 1, i]
+                a[row, column, i] = k * (along + y[row, 2, i] * d[column, 2, i]) + give
+            if column < row:
+                for i in range(count):
+                    k = w * pace.h[i] * pace.h[i]
+                    along = y[column, 0, i] * d[row, 0, i] + y[column, 1, i] * d[row, 1, i]
+                    a[column, row, i] = k * (along + y[column, 2, i] * d[row, 2, i]) + give
+        if links <= row < soft:
+            for i in range(count):
+                a[row, row, i] += lanes.soft[row, i]
+
+
+@inlined
+def _factor(start, a):
+    """A = L U in place, with 1/U on the diagonal; the entries before `start` of a row, and of its column, are 0."""
+    count = a.shape[2]
+    for row in range(a.shape[0]):
+        first = start[row]
+        for column in range(first, row):
+            for k in range(max(first, start[column]), column):
+                for i in range(count):
+                    a[column, row, i] -= a[column, k, i] * a[k, row, i]
+                for i in range(count):
+                    a[row, column, i] -= a[row, k, i] * a[k, column, i]
+            for i in range(count):
+                a[row, column, i] *= a[column, column, i]
+        for k in range(first, row):
+            for i in range(count):
+                a[row, row, i] -= a[row, k, i] * a[k, row, i]
+        for i in range(count):
+            a[row, row, i] = 1.0 / a[row, row, i]
+
+
+@inlined
+def _correct(start, lanes, pace):
+    """Add A^-1 f to the multipliers of lanes that are not done."""
+    a, f, count = lanes.a, lanes.f, lanes.f.shape[1]
+    for row in range(f.shape[0]):
+        for k in range(start[row], row):
+            for i in range(count):
+                f[row, i] -= a[row, k, i] * f[k, i]
+    for row in range(f.shape[0] - 1, -1, -1):
+        for k in range(row + 1, f.shape[0]):
+            if start[k] <= row:
+                for i in range(count):
+                    f[row, i] -= a[row, k, i] * f[k, i]
+        for i in range(count):
+            f[row, i] *= a[row, row, i]
+            g = lanes.multiplier[row, i]
+            lanes.multiplier[row, i] = select(pace.done[i], g, g + f[row, i])
+    for i in range(count):
+        pace.done[i] = pace.done[i] | pace.last[i]

@@ -1,0 +1,242 @@
+"""The state of a run of bodies, and the threads that advance it; what `engine.Run` is for particles."""
+
+import math
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies.numbers import touching_of, ties_of
+from ..bodies.state import Bodies
+from ..errors import RunError
+from ..lanes.tied.advance import advance_bodies
+from ..lanes.tied.arrays import BodyState, Rule
+from ..methods import Impact
+from ..particles import Particles, State
+from ..scene import Scene
+from ..status import Status
+from .tiers import Tier
+
+# Round-off of a position on a wall, as a part of the scene's size.
+_ROUND_OFF = 8.0 * np.finfo(np.float64).eps
+# Beyond this part of the scene's size a point outside its walls is an error.
+_OUTSIDE = 1e-9
+# Bytes of the lanes of a thread, which are on its stack, and the most lanes: more gain nothing.
+_STACK, _MOST_LANES = 1 << 20, 32
+# Bodies that a thread draws at a time.
+_AT_ONCE = 256
+# The caller's thread looks for an interrupt so often [s].
+_GLANCE = 0.1
+_NEVER = 2**62
+# Suzuki's composition: five steps of second order are one of fourth.
+_OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
+
+
+class BodyRun:
+    """The copies of a body, advanced from frame to frame; a context that ends its threads."""
+
+    def __init__(
+        self, scene: Scene, bodies: Bodies, particles: Particles, method: Impact, threads: int,
+        block_size: int | None = None, compile: str = "always",
+    ) -> None:  # fmt: skip
+        assert method.dt is not None
+        self._scene, self._body = scene, bodies.body
+        n, points, walls = len(bodies), len(bodies.body), len(scene.owners())
+        self._owners = scene.owners()
+        self._ties = ties_of(bodies.body)
+        self._touching = touching_of(bodies.body, self._ties, scene)
+        rows = len(self._ties.ends)
+        shape = 3, points, n
+        self._bodies = BodyState(
+            particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), np.zeros((2, rows, n)),
+            np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros((walls, n)), np.zeros(n),
+            np.zeros(n), np.zeros(n, np.int64),
+        )  # fmt: skip
+        none = np.zeros(0)
+        impacts = np.zeros(points * n, np.int64)
+        # What files take of a run.
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, none, none, impacts, np.zeros((walls, 0)), none,
+            None,
+        )  # fmt: skip
+        size = scene.finite_size()
+        self._deepest = _OUTSIDE * size
+        self._tier = Tier(compile, (scene.chain(),), n * points)
+        per_lane = 8 * (24 * points + 10 * rows + rows * rows + 40)
+        lanes = 1 if self._tier.is_plain else max(1, min(_MOST_LANES, _STACK // per_lane))
+        room = _ROUND_OFF * max(size, scene.extent())
+        noise = room / math.sqrt(min([*self._ties.rest[: self._ties.links], size * size]))
+        gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
+        self._rule = Rule(method.dt, np.array(STAGES[method.order]), gravity, room, noise, lanes)
+        self._size = max(1, block_size or _AT_ONCE)
+        self._halt = np.full(1, _NEVER)
+        self._threads = min(threads, math.ceil(n / self._size))
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
+        self._cut_short = False
+        self._start = self._energies()
+        self._scale = np.maximum(np.abs(self._start), self._kinetic()) + self._fall_scale()
+        self._seen: dict[str, Any] = {}
+        self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
+        if not self._tier.is_plain and lanes == 1:
+            self._rule = self._rule._replace(lanes=max(1, min(_MOST_LANES, _STACK // per_lane)))
+
+    def __enter__(self) -> "BodyRun":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.halt()
+        self._pool.shutdown(wait=True)
+
+    def halt(self, passes: int = 0) -> None:
+        """Make every kernel call of this frame return after so many passes; 0: at once."""
+        np.minimum(self._halt, passes, out=self._halt)
+
+    def _arguments(self, ticket: NDArray[np.int64]) -> tuple[Any, ...]:
+        both = self._ties, self._touching
+        return both, self._scene.chain(), self._rule, self._bodies, ticket, self._size, self._halt
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        """Advance every body by `span` [s] and observe it: whether the frame is done, as `engine.Run.advance`."""
+        if not self._cut_short:
+            self._bodies.left.fill(span)
+        if self._tier.is_plain and self._tier.left < math.inf:
+            self._tier.left = 0.0
+            self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
+        ticket = np.zeros(1, np.int64)
+        kernel = self._tier.kernel(advance_bodies)
+        threads = 1 if self._tier.is_plain else self._threads
+        ends = [self._pool.submit(kernel, *self._arguments(ticket)) for _ in range(threads)]
+        status, number = max(self._end_of(end, latest) for end in ends)
+        self._halt[0] = _NEVER
+        self._cut_short = status == Status.INTERRUPTED
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._failure(Status(status), number, moment))
+        if not self._cut_short:
+            self.observe()
+        return not self._cut_short
+
+    def _end_of(self, end: "Future[tuple[int, int]]", latest: float) -> tuple[int, int]:
+        while True:
+            try:
+                return end.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
+            except TimeoutError:
+                if time.monotonic() >= latest:
+                    self.halt()
+                    latest = math.inf
+
+    def _failure(self, status: Status, number: int, moment: float) -> str:
+        time_of = moment - self._bodies.left[number]
+        sentence = f"the frame at {moment:g} s failed at body {number}, at {time_of:.6g} s: "
+        if status == Status.UNSOLVED:
+            return sentence + (
+                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; their lengths are off by "
+                f"{self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
+            )
+        return sentence + (
+            "a point meets its wall without end, as where it slides along it or rests; bodies bounce, they do not slide yet"
+        )
+
+    def share_done(self, span: float) -> float:
+        """How much of a frame that was cut short is done, on average over the bodies."""
+        return float((1.0 - self._bodies.left / span).mean())
+
+    # --- What is observed --------------------------------------------------------------------------------
+
+    def _kinetic(self) -> NDArray[np.float64]:
+        v = self._bodies.velocity
+        moving = np.tensordot(self._ties.mass, v, axes=(1, 1))  # (P, 3, n)
+        return np.asarray(0.5 * (moving.transpose(1, 0, 2) * v).sum(axis=(0, 1)))
+
+    def _fall(self) -> NDArray[np.float64]:
+        mass = self._ties.mass.sum(axis=1)
+        center = np.tensordot(mass, self._bodies.position, axes=(0, 1))
+        return np.asarray(-(self._rule.gravity @ center))
+
+    def _fall_scale(self) -> NDArray[np.float64]:
+        pull = math.hypot(*self._rule.gravity) * self._ties.mass.sum()
+        return np.full(len(self._bodies.left), pull * self._scene.finite_size())
+
+    def _elastic(self) -> NDArray[np.float64]:
+        r, ties = self._bodies.position, self._ties
+        total = np.zeros(r.shape[2])
+        for _row, (i, j, k, length) in enumerate(self._body.springs):
+            total += 0.5 * k * (np.sqrt(((r[:, i] - r[:, j]) ** 2).sum(axis=0)) - length) ** 2
+        if self._body.strain is not None:
+            edges = self._body.strain.edges
+            strain = ((r[:, edges[:, 0]] - r[:, edges[:, 1]]) ** 2).sum(axis=0) - ties.rest[-len(edges) :, None]
+            total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
+        return total
+
+    def _energies(self) -> NDArray[np.float64]:
+        return self._kinetic() + self._fall() + self._elastic()
+
+    def _link_error(self) -> float:
+        r, links = self._bodies.position, self._ties.links
+        ends, rest = self._ties.ends[:links], self._ties.rest[:links, None]
+        if not links:
+            return 0.0
+        length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
+        return float(0.5 * np.abs(length2 / rest - 1.0).max())
+
+    def observe(self) -> None:
+        """Observe the bodies as they are."""
+        state, bodies = self.state, self._bodies
+        kinetic, fall, elastic = self._kinetic(), self._fall(), self._elastic()
+        error = np.abs(kinetic + fall + elastic + bodies.dissipated - self._start)
+        scaled = np.divide(error, self._scale, out=np.zeros_like(error), where=self._scale > 0.0)
+        state.impacts[:] = np.tile(bodies.impacts, len(self._body))
+        momentum = np.tensordot(self._ties.mass, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
+        spin = np.cross(bodies.position, momentum, axis=0).sum(axis=(1, 2))
+        points = np.tensordot(self._body.contacts, bodies.position, axes=(1, 1)).transpose(1, 0, 2)
+        depth = self._scene.distances_outside(points.reshape(3, -1)).max(initial=0.0)
+        impulse = np.bincount(self._owners, weights=bodies.impulse.sum(axis=1), minlength=len(self._scene.surfaces))
+        self._seen = {
+            "kinetic_energy": float(kinetic.sum()),
+            "potential_energy": float(fall.sum()),
+            "contact_energy": float(elastic.sum()),
+            "total_energy": float((kinetic + fall + elastic).sum()),
+            "dissipated_energy": float(bodies.dissipated.sum()),
+            "energy_error": float(scaled.max()),
+            "momentum": momentum.sum(axis=(1, 2)),
+            "angular_momentum": spin,
+            "max_penetration": float(max(depth, 0.0)),
+            "impacts": int(bodies.impacts.sum()),
+            "impulse": impulse,
+            "sliding": 0,
+            "sliding_time": 0.0,
+            "wall_heat": np.zeros(len(self._scene.surfaces)),
+            "unconverged": 0,
+            "escaped": 0,
+            "link_error": self._link_error(),
+        }
+
+    def seen(self) -> dict[str, Any]:
+        """The observables of the last frame."""
+        return dict(self._seen)
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        """Raise a RunError where a state is not finite, or a point outside its walls."""
+        r = self._bodies.position
+        if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+            good = np.isfinite(r).all(axis=(0, 1)) & np.isfinite(self._bodies.velocity).all(axis=(0, 1))
+            raise RunError(f"the frame at {moment:g} s failed at body {int(np.argmin(good))}: {_NOT_FINITE}")
+        if seen["max_penetration"] > self._deepest:
+            raise RunError(
+                f"the frame at {moment:g} s failed: a point of a body is {seen['max_penetration']:.3g} m outside its walls"
+            )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What `restore` needs to continue with the same bits, not copied."""
+        return dict(self._bodies._asdict())
+
+    def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
+        """Take the state of the run that gave these `arrays`."""
+        for name, array in self.arrays().items():
+            np.copyto(array, arrays[name], casting="no")
+        self._cut_short = cut_short
+
+
+_NOT_FINITE = Status.NOT_FINITE.sentence
