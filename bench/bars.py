@@ -354,7 +354,7 @@ class Seen(Exception): pass
 def stop(frame):
     if frame.number == 1: raise Seen
 try:
-    simulate(job.scene, job.particles(), job.method, until=job.run.until, every=job.run.every,
+    simulate(job.scene, job.start(), job.method, until=job.run.until, every=job.run.every,
              trajectory=r"{target}", overwrite=True, progress=stop, scene_text=job.text)
 except Seen:
     print(time.perf_counter() - start)

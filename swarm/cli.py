@@ -21,7 +21,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="Simulate particles bouncing in rigid cavities and off rigid solids, with energy conserved to round-off.",
+    help="Simulate particles and bodies bouncing in rigid cavities and off solids, with energy conserved to round-off.",
     epilog="Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
@@ -102,14 +102,14 @@ def run(  # noqa: PLR0913  one argument an option
                 compile=compile or job.run.compile,
             )
             # Before particles are made and kernels compiled.
-            inputs = {"scene file": scene_file, "file of the particles": job.start_file()}
+            inputs = {"scene file": scene_file, "file of the start": job.start_file()}
             paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
             paths.check_target(target, overwrite or resume)
             if options.recording is not None:
                 paths.check_target(options.recording, overwrite, "recording")
-            before, particles = paths.identity(target), job.particles()
+            before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
-        result = carry_out(job.scene, particles, job.method, options)
+        result = carry_out(job.scene, start, job.method, options)
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
         # The files are closed: a second signal may end the process here.
@@ -130,7 +130,7 @@ def run(  # noqa: PLR0913  one argument an option
         raise
     report("complete", target, wall_time=result.wall_time)
     if not (quiet or as_json):
-        _table(of_result(result, particles.volume))
+        _table(of_result(result, getattr(start, "volume", None)))
 
 
 def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
@@ -184,7 +184,7 @@ def record(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
     ] = None,
-    particles: Annotated[int, typer.Option(help="Most particles recorded, evenly chosen.")] = 5000,
+    particles: Annotated[int, typer.Option(help="Most particles, or points of bodies, recorded.")] = 5000,
     color: Annotated[str, typer.Option(help="Colour by speed or energy-error.")] = "speed",
     megabytes: Annotated[float, typer.Option(help="Largest size; if needed, every k-th frame is recorded.")] = 100.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
@@ -241,7 +241,7 @@ def plot(
         Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
     ] = None,
 ) -> None:
-    """Draw energy error, penetration, impacts, pressure, speeds and the particles of a trajectory."""
+    """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
     from .output.sources import needed_by
 
     with needed_by("a plot", "plot"):

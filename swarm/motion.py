@@ -137,7 +137,7 @@ class Rotation:
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
         point = _point(start)
-        # By the largest part first: the squares of components may overflow, or be 0.
+        # By the largest part first: the squares of small components are 0.
         axis = np.array(self.axis) / np.abs(self.axis).max()
         axis /= np.sqrt((axis**2).sum())
         arm = point - self.center

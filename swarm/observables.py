@@ -162,9 +162,13 @@ def _(gravity, chain, r, v):
 
 
 def drift(seen: dict[str, Any]) -> float:
-    """Change of the total energy over a run that walls did not cause; relative, if there was any at the start."""
+    """Change of the total energy over a run that nothing caused; relative, if there was any at the start.
+
+    Walls may take or give energy, and anchors that are led give their work.
+    """
     energy, lost = seen["total_energy"], seen["dissipated_energy"]
-    given = np.sum(seen.get("wall_heat", [0.0])[-1])  # files of older versions have none
+    # Files of older versions have no heat, and those of particles no work.
+    given = np.sum(seen.get("wall_heat", [0.0])[-1]) + seen.get("work", [0.0])[-1]
     change = abs(energy[-1] + lost[-1] - given - energy[0])
     return float(change / abs(energy[0]) if energy[0] else change)
 

@@ -4,7 +4,7 @@ import dataclasses
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import tables
 from .checks import closest, count, listed, particles_fit
@@ -15,7 +15,11 @@ from .particles import Particles
 from .run.options import RunOptions
 from .scene import Scene
 
-_TABLES = ("gravity", "particles", "surface", "method", "run")
+if TYPE_CHECKING:
+    from .bodies.state import Bodies
+    from .bodies.table import Made
+
+_TABLES = ("gravity", "particles", "body", "surface", "method", "run")
 _SAVED = {"checkpoint": 60.0}
 
 
@@ -33,6 +37,14 @@ class ParticlesTable:
 
 
 @dataclass(frozen=True)
+class BodiesFile:
+    """[body]: the file that holds the bodies."""
+
+    source: str = dataclasses.field(metadata={"key": "from"})
+    frame: int | None = None
+
+
+@dataclass(frozen=True)
 class Job:
     """What a scene file describes, checked; `text` is the file itself."""
 
@@ -40,26 +52,38 @@ class Job:
     method: Method
     run: RunOptions
     text: str
-    source: ParticlesTable
+    source: "ParticlesTable | BodiesFile | Made"
     path: Path
 
     def start_file(self) -> Path | None:
-        """The file that holds the particles, or None."""
-        return None if self.source.source is None else self.path.parent / self.source.source
+        """The file that holds the particles or bodies, or None."""
+        name = getattr(self.source, "source", None)
+        return None if name is None else self.path.parent / name
 
-    def particles(self) -> Particles:
-        """The particles at the start, filled or read.
+    def start(self) -> "Particles | Bodies":
+        """The particles or bodies at the start, made or read.
 
         Raises:
-            SceneError: a value of [particles] is out of its range, or the file it names cannot be used.
+            SceneError: a value of [particles] or [body] is out of its range, or the file it names cannot be used.
         """
+        source = self.source
         try:
-            return self._particles()
+            if isinstance(source, ParticlesTable):
+                return self._particles(source)
+            return self._bodies(source) if isinstance(source, BodiesFile) else source.start(self.scene)
         except SceneError as error:
-            raise SceneError(f"{self.path}, [particles]: {error}") from None
+            table = "particles" if isinstance(source, ParticlesTable) else "body"
+            raise SceneError(f"{self.path}, [{table}]: {error}") from None
 
-    def _particles(self) -> Particles:
-        table = self.source
+    def _bodies(self, table: BodiesFile) -> "Bodies":
+        from .output.trajectory import load
+
+        file = self.start_file()
+        assert file is not None
+        with load(file) as trajectory:
+            return trajectory.bodies(-1 if table.frame is None else table.frame)
+
+    def _particles(self, table: ParticlesTable) -> Particles:
         if table.source is None:
             assert table.count is not None
             particles_fit("count", table.count)
@@ -78,6 +102,8 @@ class Job:
         from .output.trajectory import load  # h5py only where it is used
 
         with load(file) as trajectory:
+            if trajectory.body is not None:
+                raise SceneError(f"from: {file} holds bodies, which are not particles; write [body] in place of it")
             return trajectory.frame(-1 if table.frame is None else table.frame)
 
 
@@ -106,17 +132,18 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
     for key in document:
         if key not in _TABLES:
             raise SceneError(f"{key}: unknown key, expected {listed(_TABLES)}{closest(key, _TABLES)}")
-    for key in ("particles", "method", "run"):
+    for key in ("method", "run"):
         if key not in document:
             raise SceneError(f"{key}: expected a [{key}] table, got none")
-    source = tables.convert(document["particles"], ParticlesTable, "particles")
-    _check_source(source)
+    if ("particles" in document) == ("body" in document):
+        came = "both" if "body" in document else "neither"
+        raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
     return Job(
         scene=tables.scene_of(document.get("surface"), document.get("gravity")),
         method=tables.method_of(document["method"]),
         run=_run(document["run"]),
         text=text,
-        source=source,
+        source=_body(document["body"]) if "body" in document else _particles(document["particles"]),
         path=path,
     )
 
@@ -126,7 +153,19 @@ def _run(table: Any) -> RunOptions:
     return tables.convert({**_SAVED, **table} if isinstance(table, dict) else table, RunOptions, "run")
 
 
-def _check_source(table: ParticlesTable) -> None:
+def _body(table: Any) -> "BodiesFile | Made":
+    if not isinstance(table, dict) or "from" not in table:
+        from .bodies.table import KINDS
+
+        return tables.of_kind(table, "body", KINDS)
+    found = tables.convert(table, BodiesFile, "body")
+    if Path(found.source).suffix.lower() != ".h5":
+        raise SceneError(f"body.from: expected a .h5 file, a trajectory of bodies, got {found.source!r}")
+    return found
+
+
+def _particles(given: Any) -> ParticlesTable:
+    table = tables.convert(given, ParticlesTable, "particles")
     filled = ("count", "speed", "temperature", "mass", "seed")
     if table.source is None:
         if table.frame is not None:
@@ -134,7 +173,7 @@ def _check_source(table: ParticlesTable) -> None:
         if table.count is None:
             raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
         count("particles.count", table.count)
-        return
+        return table
     both = [name for name in filled if getattr(table, name) is not None]
     if both:
         raise SceneError(f"particles.{both[0]}: cannot be combined with from = {table.source!r}; remove one of them")
@@ -143,3 +182,4 @@ def _check_source(table: ParticlesTable) -> None:
         raise SceneError(f"particles.from: expected a .csv or .h5 file, got {table.source!r}")
     if table.frame is not None and suffix != ".h5":
         raise SceneError('particles.frame: needs from = "FILE.h5"')
+    return table

@@ -1,12 +1,15 @@
 """Summaries of runs and their files: text for people, numbers for other programs."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .observables import drift
 from .run.simulation import Result
+
+if TYPE_CHECKING:
+    from .output.trajectory import Trajectory
 
 
 def numbers(trajectory: Path) -> dict[str, Any]:
@@ -14,10 +17,11 @@ def numbers(trajectory: Path) -> dict[str, Any]:
     from .output.trajectory import load
 
     with load(trajectory) as written:
-        seen, particles = written.observed(), written.count
+        seen, particles, copies = written.observed(), written.count, written.copies
     return {
         "trajectory": str(trajectory),
         "particles": particles,
+        "bodies": copies,
         "frames": len(seen["time"]),
         "time": float(seen["time"][-1]),
         "impacts": int(seen["impacts"][-1]),
@@ -25,7 +29,9 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "energy_error": float(seen["energy_error"].max()),
         "max_penetration": float(seen["max_penetration"].max()),
         "dissipated_energy": float(seen["dissipated_energy"][-1]),
-        # Files of older versions have none of these.
+        # Files of older versions have none of these, or only those of bodies.
+        "link_error": float(np.max(seen.get("link_error", 0.0))),
+        "work": float(seen.get("work", [0.0])[-1]),
         "wall_heat": np.array(seen.get("wall_heat", [[]])[-1]).tolist(),
         "sliding": int(seen.get("sliding", [0])[-1]),
         "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),
@@ -43,7 +49,7 @@ def of_trajectory(file: Path) -> dict[str, str]:
         last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
         rows = {
             "frames": f"{len(times)}{last}",
-            "particles": f"{trajectory.count}",
+            **_what(trajectory),
             "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
             "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
             "method": _call(trajectory.method),
@@ -70,7 +76,7 @@ def of_recording(file: Path, repair: bool) -> dict[str, str]:
     every = f", of the run's every {about['stride']}th" if about["stride"] > 1 else ""
     return {
         "frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s{every}{missing}",
-        "particles": f"{about['shown']} of {about['particles']}",
+        about["noun"]: f"{about['shown']} of {about['particles']}",
         "colour": f"{about['quantity']}, {about['low']:g} to {about['high']:g}",
         "entities": "\n".join(f"{path} ({rows} rows)" for path, rows in sorted(held.entities.items())),
         "size": f"{file.stat().st_size / 1e6:.1f} MB",
@@ -98,15 +104,38 @@ def _figures(seen: dict[str, Any]) -> dict[str, str]:
     slid = seen.get("sliding_time", [0.0])[-1]
     sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
     heats = [f"{heat:.4g} J from surfaces[{i}]" for i, heat in enumerate(seen.get("wall_heat", [[]])[-1]) if heat]
+    tied = (
+        {"link error": f"{seen['link_error'].max():.1e} of its length"} if np.any(seen.get("link_error", 0.0)) else {}
+    )
+    if np.any(seen.get("work", 0.0)):
+        tied["work"] = f"{seen['work'][-1]:.4g} J of led anchors"
     return {
         "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
         **sliding,
         "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
         "largest penetration": f"{seen['max_penetration'].max():.1e} m",
+        **tied,
         **dissipated,
         **({"wall heat": ", ".join(heats)} if heats else {}),
         **escaped,
     }
+
+
+def _what(trajectory: "Trajectory") -> dict[str, str]:
+    """The row that says what was run: particles, or bodies and what they are made of."""
+    body = trajectory.body
+    if body is None:
+        return {"particles": f"{trajectory.count}"}
+    parts = {
+        "point": len(body),
+        "link": len(body.links),
+        "spring": len(body.springs),
+        "elastic edge": 0 if body.strain is None else len(body.strain.edges),
+        "anchor": len(body.anchors),
+        "guide": len(body.guides),
+    }
+    told = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in parts.items() if count]
+    return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
 
 
 def _call(described: Any) -> str:

@@ -23,13 +23,13 @@ def scene_of(surfaces: Any, gravity: Any) -> Scene:
     """A scene from its tables: a list of surface tables, and gravity or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
-    built = [_from_table(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
+    built = [of_kind(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
     return Scene(surfaces=built, gravity=gravity)
 
 
 def method_of(table: Any) -> Method:
     """A method from its table."""
-    return _from_table(table, "method", ALL_METHODS)
+    return of_kind(table, "method", ALL_METHODS)
 
 
 def table_of(described: Surface | Method) -> dict[str, Any]:
@@ -70,7 +70,8 @@ def convert(table: Any, cls: type[T], where: str) -> T:
         ) from None
 
 
-def _from_table(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
+def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
+    """A dataclass from a table whose kind says which."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:
@@ -85,6 +86,8 @@ def _from_table(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
 
 
 def _type_name(kind: Any) -> str:
+    if "..." in str(kind):
+        return "a list"
     return {"float": "a number", "int": "a whole number", "Vector": "three numbers"}.get(
         getattr(kind, "__name__", str(kind)), "three numbers" if "tuple" in str(kind) else "a value"
     )

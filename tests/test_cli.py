@@ -190,7 +190,7 @@ def test_the_file_of_the_start_is_no_output(folder):
     text = re.sub(r"(?s)\[particles\].*?\n\n", '[particles]\nfrom = "start.csv"\n\n', GOOD, count=1)
     (folder / "scene.toml").write_text(text)
     done = command("run", "scene.toml", "-o", "start.csv", "--overwrite", cwd=folder)
-    assert (done.returncode, "start.csv is also the file of the particles" in done.stderr) == (2, True), done.stderr
+    assert (done.returncode, "start.csv is also the file of the start" in done.stderr) == (2, True), done.stderr
 
 
 def test_a_scene_file_with_a_byte_order_mark(folder):

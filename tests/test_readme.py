@@ -120,6 +120,15 @@ def test_the_commands_run_in_their_order(tmp_path):
         assert all((tmp_path / output).stat().st_size for output in outputs)
 
 
+@pytest.mark.physics
+@pytest.mark.parametrize("number", range(len(re.findall(r"```toml\n", ALL))))
+def test_the_scene_files_run(tmp_path, number):
+    (tmp_path / "scene.toml").write_text(re.findall(r"```toml\n(.*?)```", ALL, re.DOTALL)[number])
+    done = command("run", "scene.toml", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "energy drift" in done.stdout
+
+
 @pytest.mark.parametrize("line", settings())
 def test_the_settings_of_a_run_are_taken(tmp_path, line):
     (tmp_path / "scene.toml").write_text(SCENE.replace("[run]\n", f"[run]\n{line}\n"))

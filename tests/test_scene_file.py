@@ -7,6 +7,8 @@ import pytest
 
 import swarm
 from swarm import scene_file
+from swarm.bodies.elastic import block
+from swarm.bodies.table import table_of
 
 GOOD = """
 [particles]
@@ -45,7 +47,7 @@ def test_a_job(tmp_path):
     assert job.method == swarm.Impact()
     assert (job.run.until, job.run.every) == (1.0, 0.5)
     assert job.text == GOOD
-    np.testing.assert_array_equal(job.particles().position, swarm.fill(job.scene, 10, speed=0.5).position)
+    np.testing.assert_array_equal(job.start().position, swarm.fill(job.scene, 10, speed=0.5).position)
 
 
 def test_laws_of_walls_and_their_seed(tmp_path):
@@ -59,7 +61,9 @@ def test_laws_of_walls_and_their_seed(tmp_path):
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
 def test_shipped_scenes_are_read(path):
     job = scene_file.read(path)
-    assert (job.scene.gaps(job.particles().position) <= 0.0).all()
+    start = job.start()
+    points = start.position if isinstance(start, swarm.Particles) else start.contact_points().reshape(3, -1)
+    assert (job.scene.gaps(points) <= 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -145,21 +149,21 @@ def test_shipped_scenes_are_read(path):
 def test_bad_input_names_the_key(tmp_path, old, new, message):
     assert old in GOOD
     with pytest.raises(swarm.SceneError, match=message):
-        read(tmp_path, GOOD.replace(old, new)).particles()
+        read(tmp_path, GOOD.replace(old, new)).start()
 
 
 def test_particles_from_files(tmp_path):
     csv = tmp_path / "start.csv"
     csv.write_text("x,y,z,vx,vy,vz,mass\n0.1,0,0,1,0,0,2\n")
     source = GOOD.replace("count = 10\nspeed = 0.5", 'from = "{}"')
-    particles = read(tmp_path, source.format("start.csv")).particles()
+    particles = read(tmp_path, source.format("start.csv")).start()
     assert (particles.position[0, 0], particles.mass[0]) == (0.1, 2.0)
 
     scene = swarm.Scene(surfaces=[swarm.Sphere(0.5)])
     result = swarm.simulate(scene, particles, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "start.h5")
-    last = read(tmp_path, source.format("start.h5")).particles()
+    last = read(tmp_path, source.format("start.h5")).start()
     np.testing.assert_array_equal(last.position, result.particles.position)
-    first = read(tmp_path, source.format('start.h5"\nframe = 0 #')).particles()
+    first = read(tmp_path, source.format('start.h5"\nframe = 0 #')).start()
     np.testing.assert_array_equal(first.position, particles.position)
 
     for text, message in (
@@ -170,4 +174,83 @@ def test_particles_from_files(tmp_path):
         with pytest.raises(swarm.SceneError, match=message):
             read(tmp_path, source.format(text))
     with pytest.raises(swarm.SceneError, match=r"cannot read .*absent\.csv"):
-        read(tmp_path, source.format("absent.csv")).particles()
+        read(tmp_path, source.format("absent.csv")).start()
+
+
+def with_body(keys):
+    return GOOD.replace("[particles]\ncount = 10\nspeed = 0.5", f"[body]\n{keys}")
+
+
+CUBE = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
+ROD = "points = [[0, 0, 0], [0.1, 0, 0]]\nmass = 0.5\nlinks = [[0, 1]]"
+
+
+@pytest.mark.parametrize(
+    ("keys", "body"),
+    [
+        ('kind = "dumbbell"\nlength = 0.1\nmass = 0.5', lambda: swarm.dumbbell(0.1, 0.5)),
+        ('kind = "tetrahedron"\nedge = 0.1\nmass = 0.5', lambda: swarm.tetrahedron(0.1, 0.5)),
+        ('kind = "chain"\nn = 3\nlength = 0.1\nmass = 0.5', lambda: swarm.chain(3, 0.1, 0.5)),
+        (f'kind = "rigid"\ndensity = 500\nvertices = {[list(v) for v in CUBE]}', lambda: swarm.rigid(CUBE, 500.0)),
+        (
+            'kind = "elastic"\nlengths = [0.1, 0.1, 0.2]\ncells = [1, 1, 2]\nyoung = 1e5\npoisson = 0.3\n'
+            'density = 500\nmass = "consistent"',
+            lambda: swarm.elastic(block((0.1, 0.1, 0.2), (1, 1, 2)), 1e5, 0.3, 500.0, mass="consistent"),
+        ),
+        (f'kind = "points"\n{ROD}', lambda: swarm.Body([(0, 0, 0), (0.1, 0, 0)], 0.5, [(0, 1)])),
+    ],
+    ids=lambda value: value.split('"')[1] if isinstance(value, str) else "",
+)
+def test_bodies_are_those_of_the_functions(tmp_path, keys, body):
+    job = read(tmp_path, with_body(f"{keys}\ncount = 3\nspeed = 0.5\nspin = 2.0\nseed = 7"))
+    start, expected = job.start(), swarm.place(job.scene, body(), 3, speed=0.5, spin=2.0, seed=7)
+    np.testing.assert_array_equal(start.position, expected.position)
+    np.testing.assert_array_equal(start.velocity, expected.velocity)
+    assert table_of(start.body) == table_of(expected.body)
+    assert job.start_file() is None
+
+
+def test_one_body_where_its_points_are(tmp_path):
+    velocity = "velocity = [[0, 0, 0], [0, 0, 1.5]]\nanchors = [{ point = 0 }]"
+    start = read(tmp_path, with_body(f'kind = "points"\n{ROD}\n{velocity}')).start()
+    assert start.position[:, :, 0].T.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
+    assert start.velocity[:, :, 0].T.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]]
+    assert start.body.anchors == {0: None}
+    still = read(tmp_path, with_body(f'kind = "points"\n{ROD}')).start()
+    assert len(still) == 1
+    assert not still.velocity.any()
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ('kind = "dumbell"', r"body\.kind must be one of 'dumbbell', .*'dumbell'; did you mean 'dumbbell'"),
+        ("length = 0.1", r"body\.kind: expected one of"),
+        ('kind = "dumbbell"\nlength = 0.1', r"body\.mass: expected a number, got nothing"),
+        ('kind = "dumbbell"\nlength = 0.1\nmass = 1\nedge = 2', r"body\.edge: unknown key, expected 'count', 'speed'"),
+        ('kind = "dumbbell"\nlength = 0.1\nmass = 1', r"\[body\]: count: expected a whole number, got nothing"),
+        ('kind = "dumbbell"\nlength = 0.1\nmass = 1\ncount = 0', r"body\.count must be 1 or more, got 0"),
+        ('kind = "dumbbell"\nlength = 0.1\nmass = 1\ncount = 1e3', r"body\.count: expected int.*, got float"),
+        ('kind = "dumbbell"\nlength = -1\nmass = 1\ncount = 1', r"\[body\]: length must be above 0, got -1"),
+        (
+            'kind = "chain"\nn = 2\nlength = 0.1\nmass = 1\ncount = 10_000_000_000_000',
+            r"\[body\]: count must fit in mem",
+        ),
+        (f'kind = "points"\n{ROD}\nspin = 1.0', r"\[body\]: spin: is of copies at random; add count = \.\.\."),
+        (f'kind = "points"\n{ROD}\ncount = 2\nvelocity = [[0, 0, 0], [0, 0, 0]]', r"velocity: must go without count"),
+        (f'kind = "points"\n{ROD}\nvelocity = [[0, 0, 0]]', r"\[body\]: velocity must have shape \(3, 2, n\)"),
+        ('from = "start.csv"', r"body\.from: expected a \.h5 file, a trajectory of bodies, got 'start\.csv'"),
+        ('from = "start.h5"\ncount = 2', r"body\.count: unknown key, expected 'from' and 'frame'"),
+        ('from = "absent.h5"', r"\[body\]: there is no file .*absent\.h5"),
+        ("[particles]\ncount = 1\nspeed = 0.5", r"particles: expected a \[particles\] or a \[body\] table, got both"),
+        ("[body]", "cannot read the scene file"),
+    ],
+)
+def test_bad_bodies_name_the_key(tmp_path, keys, message):
+    with pytest.raises(swarm.SceneError, match=message):
+        read(tmp_path, with_body(keys)).start()
+
+
+def test_neither_particles_nor_bodies(tmp_path):
+    with pytest.raises(swarm.SceneError, match=r"particles: expected a \[particles\] or a \[body\] table, got neither"):
+        read(tmp_path, GOOD.replace("[particles]\ncount = 10\nspeed = 0.5", ""))

@@ -75,7 +75,7 @@ class Body:
         cavities: Iterable[tuple[Surface, int, int]] = (),
         faces: Iterable[Sequence[int]] = (),
     ) -> None:
-        places = checked.points(points)
+        places = checked.points("points", points)
         count = len(places)
         led = checked.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)

@@ -23,13 +23,13 @@ _ROUND_OFF = 1e-12
 _ON_SURFACE = 1e-9
 
 
-def points(value: ArrayLike) -> Floats:
+def points(name: str, value: ArrayLike) -> Floats:
     """`value` as (P, 3) places."""
-    rows = np.array(checks.array("points", value))
+    rows = np.array(checks.array(name, value))
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
         hint = "; transpose it" if rows.ndim == 2 and rows.shape[0] == 3 else ""
-        raise SceneError(f"points must have shape (P, 3), one row a point, got {rows.shape}{hint}")
-    return finite("points", rows)
+        raise SceneError(f"{name} must have shape (P, 3), one row a point, got {rows.shape}{hint}")
+    return finite(name, rows)
 
 
 def finite(name: str, values: Floats) -> Floats:

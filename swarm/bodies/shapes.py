@@ -110,7 +110,7 @@ def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -
     >>> float(cube.mass_matrix.sum().round(12))  # kg
     6.0
     """
-    corners = checked.points(vertices)
+    corners = checked.points("vertices", vertices)
     density = checks.positive("density", density)
     triangles = _hull(corners) if faces is None else _closed(corners, faces)
     volume, center, moment = _moments(corners, triangles)

@@ -8,6 +8,7 @@ from ..errors import SceneError
 from ..particles import Floats, Particles
 from . import checked
 from .body import Body
+from .checked import Pairs
 
 # How exactly a link must have its length at the start, relative.
 _LINK = 1e-9
@@ -17,7 +18,7 @@ class Bodies:
     """n copies of a body.
 
     Args:
-        body: the template; its places of anchored points are the first of all: each copy is led from its own.
+        body: the template. An anchored point of a copy is fixed, or led from, where that copy has it.
         position: (3, P, n) or, of one copy, (3, P) [m], rows x, y, z of every point; the links have their lengths.
         velocity: the same shape [m/s].
 
@@ -60,6 +61,11 @@ class Bodies:
     def contact_points(self) -> Floats:
         """(3, K, n) the points that can touch walls."""
         return np.asarray(np.einsum("kp,xpn->xkn", self.body.contacts, self.position))
+
+    def bonds(self) -> Pairs:
+        """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
+        n = len(self)
+        return np.asarray((self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2))
 
     def moved(self, particles: Particles) -> "Bodies":
         """These bodies where their points, as `particles` gives them, are now."""

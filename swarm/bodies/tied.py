@@ -43,12 +43,13 @@ def require_independent(
     excess = null.shape[1]
     if _dependences(elsewhere, links, anchors, guides).shape[1] < excess:
         raise SceneError(
-            f"links and guides must be independent, got {said}, whose directions depend on each other where the points are (in a "
-            f"line or in a plane, say): their forces are not determined; leave {excess} of them out, or move a point"
+            f"links and guides must be independent, got {said}, whose directions depend on each other where the points "
+            "are (in a line or in a plane, say): their forces are not determined; leave out "
+            f"{excess} of them, or move a point"
         )
     raise SceneError(
-        f"links and guides must be independent, got {said}, of which {excess} {'follows' if excess == 1 else 'follow'} from the "
-        f"others: their forces are not determined; leave {excess} of them out"
+        f"links and guides must be independent, got {said}, of which {excess} {'follows' if excess == 1 else 'follow'} "
+        f"from the others: their forces are not determined; leave out {excess} of them"
     )
 
 

@@ -72,7 +72,7 @@ _NAMES = {
     "method": "method is",
     "scene": "scene is",
     "storage": "trajectory keeps",
-    "start": "particles at the start (seed, speed, mass, file) have the digest",
+    "start": "particles at the start (seed, speed, mass, file, body) have the digest",
     "seed": "seed of thermal walls is",
     "version": "version of swarm is",
 }
@@ -83,9 +83,9 @@ def _one_line(value: Any) -> str:
     return ", ".join(line for line in str(value).splitlines() if line)
 
 
-def digest_of(particles: Particles) -> str:
-    """A digest that identifies particles."""
-    digest = hashlib.sha256()
+def digest_of(particles: Particles, body: str = "") -> str:
+    """A digest that identifies particles, or the points of bodies together with the text of the body."""
+    digest = hashlib.sha256(body.encode())
     for array in (particles.position, particles.velocity, particles.mass):
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]

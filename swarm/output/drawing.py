@@ -10,7 +10,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.colors import ListedColormap
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike, NDArray
 
 from ..particles import Floats
@@ -31,17 +31,37 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
     return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
 
 
-def particles(axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]]) -> None:
-    """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale."""
+def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+    """The lines (S, 2, 3) of bodies, wider the fewer there are, and their colours (S,), 0xRRGGBBAA."""
+    width = float(np.clip(300.0 / max(1, len(lines)), 0.9, 2.0))
+    style = {"colors": red_green_blue(packed), "linewidths": width, "zorder": 2, "clip_on": False}
+    axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
+
+
+def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+    """The triangles (T, 3, 3) of bodies, shaded, each of the mean colour of its corners (T, 3), 0xRRGGBBAA."""
+    colour = red_green_blue(packed.ravel()).reshape(-1, 3, 3).mean(axis=1)
+    style = {"facecolors": colour, "shade": True, "zorder": 2, "clip_on": False}
+    axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
+
+
+def particles(
+    axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]], size: float = 1.0
+) -> None:
+    """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale.
+
+    The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none.
+    """
     points = np.asarray(positions)
     axes.computed_zorder = False  # the particles would hide the solids among them
     for solid, curves in wires:
         style = (
             {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
         )
-        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, **style), autolim=False)
-    size = float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
-    axes.scatter(*points.T, c=colour, s=size, linewidths=0.0, depthshade=False, zorder=2)
+        # Corners of a box reach beyond the cell at this zoom.
+        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, clip_on=False, **style), autolim=False)
+    dot = size * float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
+    axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):

@@ -24,8 +24,8 @@ _NUMBERS = (
     "max_penetration", "impacts", "escaped", "unconverged",
 )  # fmt: skip
 
-# Likewise, besides the heat of each surface, but files of older versions have none of them.
-_LATER = ("sliding", "sliding_time")
+# Likewise, besides the heat of each surface, but files of older versions have none of them, or only those of bodies.
+_LATER = ("sliding", "sliding_time", "link_error", "work")
 
 
 def missing(file: Any) -> str | None:
@@ -38,11 +38,12 @@ def frames(file: Any, path: Path) -> int:
 
     While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
-    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start")):
+    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start", "body")):
         if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
-    if "parameters/seed" in file:
-        _dataset(file, "parameters/seed", _INTEGER, ())
+    for name in ("parameters/seed", "parameters/copies"):
+        if name in file:
+            _dataset(file, name, _INTEGER, ())
     count = int(_dataset(file, "parameters/particles", _INTEGER, ())[()])
     time = _dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])

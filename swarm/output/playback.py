@@ -17,10 +17,14 @@ from ..particles import Floats
 from . import paths
 from .sources import DAMAGE, DamagedError, reason, require_file
 
-_PARTICLES = "/scene/particles"
+_BODIES = "/scene/bodies/"
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
+# Recordings of older versions do not say it.
+_NOUN = "noun"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
+_STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
+_TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
 
 
 class Playback:
@@ -31,7 +35,8 @@ class Playback:
         entities: path -> number of rows.
         series: path -> (times, values).
         names: path -> name in the legend.
-        about: meaning of the colours: quantity, low, high; number of particles, how many are shown, stride of frames.
+        about: meaning of the colours: quantity, low, high; number of particles or bodies, how many are shown, stride of
+            frames; "noun": "particles" or "bodies".
         wires: of each surface, whether it is a solid and its curves.
 
     Raises:
@@ -58,9 +63,11 @@ class Playback:
         self.entities: dict[str, int] = {}
         self.series: dict[str, tuple[Floats, Floats]] = {}
         self.names: dict[str, str] = {}
-        self.about: dict[str, Any] = {}
         self.wires: list[tuple[bool, list[Floats]]] = []
-        self._frames: dict[int, tuple[Any, int]] = {}
+        self.about: dict[str, Any] = {_NOUN: "particles"}
+        self._triangles = np.zeros((0, 3), np.int64)
+        # Of each column, where the row of a frame is.
+        self._rows: dict[str, dict[int, tuple[Any, int]]] = {name: {} for name in (_POSITIONS, _STRIPS, _CORNERS)}
         rows: dict[str, list[tuple[NDArray[np.int64], Floats]]] = {}
         for chunk in chunks:
             entity = chunk.entity_path
@@ -69,20 +76,21 @@ class Playback:
             self.entities[entity] = self.entities.get(entity, 0) + chunk.num_rows
             batch = chunk.to_record_batch()
             names = batch.schema.names
-            if _POSITIONS in names:
-                self._frames |= {number: (batch, row) for row, number in enumerate(batch.column("frame").to_pylist())}
+            for name in self._rows.keys() & names if "frame" in names else ():
+                numbers = batch.column("frame").to_pylist()
+                self._rows[name] |= {number: (batch, row) for row, number in enumerate(numbers)}
             if _SCALARS in names:
                 values = batch.column(_SCALARS).flatten().to_numpy(zero_copy_only=False)
                 rows.setdefault(entity, []).append((batch.column("frame").to_numpy(), values))
             self._static(entity, batch, names)
-        if not self._frames or "/time" not in rows:
+        if not self._rows[_POSITIONS] or "/time" not in rows:
             raise ValueError("it is not a recording of swarm, or holds no frame")
         missing = [name for name in _ABOUT if name not in self.about]
         if missing:
             raise ValueError(f"it does not say its {missing[0]}")
         moments = {k: t for numbers, values in rows.pop("/time") for k, t in zip(numbers, values, strict=True)}
         # A crash may have left more points than rows of the time series.
-        self.numbers = sorted(number for number in self._frames if number in moments)
+        self.numbers = sorted(number for number in self._rows[_POSITIONS] if number in moments)
         if not self.numbers:
             raise ValueError("it holds no frame whose time is known")
         self.times = np.array([moments[number] for number in self.numbers])
@@ -94,17 +102,40 @@ class Playback:
         if "SeriesLines:names" in names:
             self.names[entity] = batch.column("SeriesLines:names")[0].as_py()[0]
         if entity == "/about":
-            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in _ABOUT}
-        if "LineStrips3D:strips" in names:
-            strips = batch.column("LineStrips3D:strips")[0].as_py()
+            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in (*_ABOUT, _NOUN)}
+        if _TRIANGLES in names and entity.startswith(_BODIES):
+            self._triangles = batch.column(_TRIANGLES)[0].values.flatten().to_numpy().reshape(-1, 3)
+        if _STRIPS in names and not entity.startswith(_BODIES):
+            strips = batch.column(_STRIPS)[0].as_py()
             self.wires.append((entity.startswith("/scene/solids/"), [np.array(strip) for strip in strips]))
 
     def frame(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
-        batch, row = self._frames[number]
-        positions = batch.column(_POSITIONS)[row].values.flatten().to_numpy(zero_copy_only=False)
-        colours = batch.column(_COLOURS)[row].values.to_numpy(zero_copy_only=False)
-        return positions.reshape(-1, 3), colours
+        batch, row = self._rows[_POSITIONS][number]
+        return _points(batch, _POSITIONS, row), _colours(batch, _COLOURS, row)
+
+    def lines(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+        """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; none where bodies have faces."""
+        batch, row = self._rows[_STRIPS].get(number, (None, 0))
+        if batch is None or _TINTS not in batch.schema.names:
+            return np.zeros((0, 2, 3), np.float32), np.zeros(0, np.uint32)
+        ends = batch.column(_STRIPS)[row].values.flatten().flatten().to_numpy(zero_copy_only=False)
+        return ends.reshape(-1, 2, 3), _colours(batch, _TINTS, row)
+
+    def faces(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+        """Triangles of bodies (T, 3, 3) and the colours of their corners (T, 3) at a frame."""
+        batch, row = self._rows[_CORNERS].get(number, (None, 0))
+        if batch is None:
+            return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint32)
+        return _points(batch, _CORNERS, row)[self._triangles], _colours(batch, _PAINT, row)[self._triangles]
+
+
+def _points(batch: Any, name: str, row: int) -> NDArray[np.float32]:
+    return np.asarray(batch.column(name)[row].values.flatten().to_numpy(zero_copy_only=False).reshape(-1, 3))
+
+
+def _colours(batch: Any, name: str, row: int) -> NDArray[np.uint32]:
+    return np.asarray(batch.column(name)[row].values.to_numpy(zero_copy_only=False))
 
 
 def is_whole(path: Path) -> bool:

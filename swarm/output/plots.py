@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib import pyplot
 
 from . import colours, drawing, series
-from .shapes import shapes_of
+from .drawn import Drawn
+from .shapes import Shape, shapes_of
 from .trajectory import Trajectory
 
-# Most particles drawn.
+# Most particles drawn, or points of bodies.
 _SHOWN = 5000
 _BINS = 60
 _WIDE, _HIGH = 17.0, 7.6
@@ -29,18 +30,8 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
     left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
 
-    left.set_facecolor(drawing.BACKGROUND)
-    drawn = slice(None, None, -(-len(end) // _SHOWN))
-    scale, values = colours.colouring("speed", scene, method, trajectory.frame(0))
-    axes = left.add_subplot(projection="3d")
-    packed = scale.colours(values(end.position, end.velocity)[drawn])
-    wires = [(shape.solid, shape.wires) for shape in shapes]
-    drawing.particles(axes, end.position[:, drawn].T, drawing.red_green_blue(packed), wires)
-    drawing.colour_bar(left, axes, scale.quantity, scale.low, scale.high)
-    title = f"{len(packed)} of {len(end)} particles, t = {times[-1]:.6g} s"
-    axes.set_title(title, fontsize=10, color=drawing.LIGHT)
-
-    lines = series.lines_of(scene, method, shapes)
+    _places(left, trajectory, shapes)
+    lines = series.lines_of(scene, method, shapes, trajectory.body)
     before: series.Seen = None
     rows = []
     for k, moment in enumerate(times):
@@ -64,6 +55,26 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     drawing.save(picture, target)
 
 
+def _places(picture: Any, trajectory: Trajectory, shapes: list[Shape]) -> None:
+    """The particles, or the bodies, at the end."""
+    end, drawn = trajectory.frame(-1), Drawn(trajectory.count, trajectory.body, _SHOWN)
+    scale, values = colours.colouring("speed", trajectory.scene, trajectory.method, trajectory.frame(0))
+    position, velocity = drawn.points(end.position), drawn.points(end.velocity)
+    points, packed = position.T, scale.colours(values(position, velocity))
+    axes, has_faces = picture.add_subplot(projection="3d"), len(drawn.triangles) > 0
+    picture.set_facecolor(drawing.BACKGROUND)
+    wires = [(shape.solid, shape.wires) for shape in shapes]
+    drawing.particles(axes, points, drawing.red_green_blue(packed), wires, 0.0 if has_faces else 1.0)
+    if has_faces:
+        drawing.faces(axes, points[drawn.triangles], packed[drawn.triangles])
+    else:
+        middles = scale.colours(values(drawn.middles(position), drawn.middles(velocity)))
+        drawing.bonds(axes, points[drawn.lines], middles)
+    drawing.colour_bar(picture, axes, scale.quantity, scale.low, scale.high)
+    title = f"{drawn.shown} of {drawn.count} {drawn.noun}, t = {trajectory.times[-1]:.6g} s"
+    axes.set_title(title, fontsize=10, color=drawing.LIGHT)
+
+
 def _speeds(axes: Any, trajectory: Trajectory) -> None:
     """How many particles have which speed, at the start and at the end."""
     ends = {"start": trajectory.frame(0), "end": trajectory.frame(-1)}
@@ -76,7 +87,8 @@ def _speeds(axes: Any, trajectory: Trajectory) -> None:
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
         axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
     axes.set_yscale("log")  # at the start all may be in one bin
-    axes.set_title(f"speeds, % in each of {_BINS} bins", fontsize=10)
+    whose = "speeds" if trajectory.body is None else "speeds of points"
+    axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)
     axes.set_xlabel("speed [m/s]", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

@@ -1,6 +1,7 @@
 """Recordings for Rerun (https://rerun.io), written during a run or from its trajectory.
 
-/scene/particles              Points3D, a frame's; coloured
+/scene/particles              Points3D, a frame's; coloured; of bodies, their points
+/scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
@@ -21,17 +22,20 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .. import checks
+from ..bodies.body import Body
 from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
 from . import colours, paths, series, viewer
+from .drawn import Drawn
 from .shapes import shapes_of
 from .trajectory import Trajectory
 from .writer import WriteFrames, Written, rows
 
-# Bytes of a particle (position and colour), and at most of a number of a time series, which may be a chunk of its own.
-_PARTICLE_BYTES, _NUMBER_BYTES = 16, 2000
+# Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
+# time series, which may be a chunk of its own.
+_PARTICLE_BYTES, _LINE_BYTES, _NUMBER_BYTES = 16, 32, 2000
 _MEGABYTE = 1e6
 _AT_ONCE = 10  # frames of a trajectory
 # Rows of the time series that are sent together, unless that takes longer than this [s].
@@ -39,8 +43,11 @@ _ROWS, _PATIENCE = 50, 0.5
 # Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
 
+_LINES, _MESH = "/scene/bodies/lines", "/scene/bodies/mesh"
 _BACKGROUND = (24, 24, 27)
 _CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
+# Between the faces of bodies, which have no shading.
+_EDGE = (10, 10, 12, 255)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
 # Okabe and Ito's, without those that are invisible on a dark background.
 LINES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
@@ -51,7 +58,7 @@ class Settings:
     """What a recording shows.
 
     Args:
-        particles: the most that are recorded, evenly chosen.
+        particles: the most that are recorded, evenly chosen; of bodies, the most points, and bodies are whole.
         color: "speed" or "energy-error".
         megabytes: the largest size; if there are too many frames, every k-th and the last are recorded.
         live: True to show it in a viewer on this machine during the run, or the URL of a viewer.
@@ -71,7 +78,7 @@ class Settings:
 class RecordingWriter:
     """A context that creates the recording and gives the function that appends frames.
 
-    `frames` is the number of frames of the run.
+    `start` holds particles, or the points of copies of `body`; `frames` is the number of frames of the run.
     """
 
     def __init__(
@@ -83,16 +90,21 @@ class RecordingWriter:
         start: Particles,
         frames: int,
         settings: Settings,
+        body: Body | None = None,
     ) -> None:
         if path is not None:
             paths.check_target(path, overwrite, "recording")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
-        self._count, self._last = len(start), frames - 1
-        # Every k-th particle: a slice takes a tenth of the time of a list of indices.
-        self._drawn = slice(None, None, math.ceil(len(start) / settings.particles))
-        some = Particles(start.position[:, self._drawn], start.velocity[:, self._drawn], start.mass[self._drawn])
-        self._scale, self._values = colours.colouring(settings.color, scene, method, some)
-        self._some = some
+        self._last, self._body = frames - 1, body
+        self._drawn = drawn = Drawn(len(start), body, settings.particles)
+        self._at_start = drawn.points(start.position)
+        if body is None:
+            start = Particles(self._at_start, drawn.points(start.velocity), drawn.points(start.mass[None])[0])
+        elif settings.color != "speed":
+            raise SceneError(
+                f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
+            )
+        self._scale, self._values = colours.colouring(settings.color, scene, method, start)
         self._before: series.Seen = None
         self._rows: list[tuple[int, float, list[float]]] = []
         self._due = 0.0
@@ -100,17 +112,20 @@ class RecordingWriter:
         self._url = viewer.live_url(settings.live) if settings.live else None
 
     def __enter__(self) -> WriteFrames:
-        self._shapes = shapes_of(self._scene, self._some.position)
-        self._series = series.lines_of(self._scene, self._method, self._shapes)
+        self._shapes = shapes_of(self._scene, self._at_start)
+        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
-        frame = _PARTICLE_BYTES * len(self._some) + _NUMBER_BYTES * (2 + len(self._series))
+        lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
+        points = self._at_start.shape[1] * (2 if triangles else 1)
+        frame = _PARTICLE_BYTES * points + _LINE_BYTES * lines + _NUMBER_BYTES * (4 + len(self._series))
+        fixed += 12 * triangles
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
         self._stream = rr.RecordingStream("swarm")
         sinks = [rr.GrpcSink(self._url)] if self._url else []
         try:
             files = [rr.FileSink(self._path)] if self._path else []
-            self._stream.set_sinks(*sinks, *files, default_blueprint=_blueprint(self._series))
+            self._stream.set_sinks(*sinks, *files, default_blueprint=_blueprint(self._series, self._drawn.noun))
         except RuntimeError as error:
             raise FileError(f"cannot write the recording {self._path}: {error}") from error
         self._stream.set_log_time_enabled(False)
@@ -135,6 +150,12 @@ class RecordingWriter:
         log = self._stream.log
         log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
+        drawn, width = self._drawn, rr.Radius.ui_points(1.0)
+        if len(drawn.triangles):
+            log(_MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)
+            log(_LINES, rr.LineStrips3D.from_fields(radii=width, colors=[_EDGE]), static=True)
+        elif len(drawn.lines):
+            log(_LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
         for shape in self._shapes:
             path = f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
             face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
@@ -149,18 +170,18 @@ class RecordingWriter:
                 log(f"{path}/wires", lines, static=True)
         for colour, line in zip(_cycled(self._series), self._series, strict=True):
             log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
-        scale, shown = self._scale, len(self._some)
-        particles = f"{shown} of {self._count} particles" if shown < self._count else f"{shown} particles"
+        scale, shown = self._scale, drawn.shown
+        of = f" of {drawn.count}" if shown < drawn.count else ""
         every = f", every {self._stride}th frame" if self._stride > 1 else ""
         text = (
-            f"**{particles}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
+            f"**{shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
             f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
             f"plots {series.NOTHING:g} is the logarithm of 0."
         )
         log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         values = rr.AnyValues(
-            quantity=scale.quantity, low=scale.low, high=scale.high, particles=self._count, shown=shown,
-            stride=self._stride,
+            quantity=scale.quantity, low=scale.low, high=scale.high, particles=drawn.count, shown=shown,
+            stride=self._stride, noun=drawn.noun,
         )  # fmt: skip
         log("/about", values, static=True)
 
@@ -169,17 +190,19 @@ class RecordingWriter:
         if not chosen:
             return
         numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
-        n = len(self._some)
-        shown, colour = [], np.empty((len(chosen), n), np.uint32)
-        for k, (number, moment, state, seen) in enumerate(chosen):
-            position, velocity = state.position[:, self._drawn], state.velocity[:, self._drawn]
+        drawn, shown, colour, lines = self._drawn, [], [], []
+        for number, moment, state, seen in chosen:
+            position, velocity = drawn.points(state.position), drawn.points(state.velocity)
             shown.append(position)
-            colour[k] = self._scale.colours(self._values(position, velocity))
+            colour.append(self._scale.colours(self._values(position, velocity)))
+            if len(drawn.lines) and not len(drawn.triangles):
+                middles = drawn.middles(position), drawn.middles(velocity)
+                lines.append(self._scale.colours(self._values(*middles)))
             self._rows.append((number, moment, series.row_of(self._series, moment, seen, self._before)))
             self._before = moment, seen
-        columns = rr.Points3D.columns(positions=rows(shown, np.float32).reshape(-1, 3), colors=colour.ravel())
+        points = rows(shown, np.float32)
         try:
-            self._send("/scene/particles", numbers, times, columns.partition([n] * len(chosen)))
+            self._send_points(numbers, times, points, np.array(colour), np.array(lines))
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
             # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
@@ -192,6 +215,20 @@ class RecordingWriter:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
+
+    def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
+        """Send points (frames, n, 3) with their colours, and what ties them together."""
+        drawn, (frames, n, _three) = self._drawn, points.shape
+        columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
+        self._send("/scene/particles", numbers, times, columns.partition([n] * frames))
+        if len(drawn.lines):
+            strips = points[:, drawn.lines].reshape(-1, 2, 3)
+            tinted = {"colors": lines.ravel()} if lines.size else {}
+            columns = rr.LineStrips3D.columns(strips=strips, **tinted)
+            self._send(_LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
+        if len(drawn.triangles):
+            columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
+            self._send(_MESH, numbers, times, columns.partition([n] * frames))
 
     def sync(self) -> None:
         """Do nothing: no checkpoint refers to a recording."""
@@ -220,10 +257,10 @@ def _cycled(lines: list[series.Line]) -> list[tuple[int, int, int]]:
     return [LINES[k % len(LINES)] for together in series.views_of(lines).values() for k in range(len(together))]
 
 
-def _blueprint(lines: list[series.Line]) -> rrb.Blueprint:
+def _blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
     """The 3-D view beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
-        origin="/scene", name="particles", background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
+        origin="/scene", name=noun, background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
     )
     plots = []
     for group, together in series.views_of(lines).items():
@@ -253,7 +290,8 @@ def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bo
     """
     frames, start, times = len(trajectory), trajectory.frame(0), trajectory.times
     seen = trajectory.observed()
-    writer = RecordingWriter(path, overwrite, trajectory.scene, trajectory.method, start, frames, settings)
+    scene, method, body = trajectory.scene, trajectory.method, trajectory.body
+    writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
     try:
         with writer as write:
             for first in range(0, frames, _AT_ONCE):

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from ..bodies.body import Body
 from ..methods import Method
 from ..scene import Scene
 from .shapes import Shape
@@ -16,11 +17,12 @@ NOTHING = -18.0
 VIEWS = {
     "energy": ("energy [J]", False),
     "energy_error": ("worst relative energy error", True),
+    "link_error": ("worst relative error of a link's length", True),
     "penetration": ("largest penetration [m]", True),
     "impacts": ("impacts per second [1/s]", False),
     "pressure": ("pressure on each surface [Pa]", False),
     "force": ("force on each surface [N]", False),
-    "sliding": ("particles that slide or rest", False),
+    "sliding": ("how many slide or rest", False),
     "heat": ("heat from each surface [W]", False),
 }
 # Views that pictures leave out where all values are 0.
@@ -47,17 +49,24 @@ def group_of(path: str) -> str:
     return path.split("/")[1]
 
 
-def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
-    """The time series of a scene, without those that are always zero in it."""
-    laws = scene.laws()
+def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None) -> list[Line]:
+    """The time series of a scene with particles or bodies, without those that are always zero in it."""
+    laws, one = scene.laws(), "particle" if body is None else "body"
+    every = "all particles" if body is None else "all bodies"
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {"contact": method.law() is not None, "dissipated": laws is not None and laws[:2] != (None, None)}
     lines = [Line(f"/energy/{name}", name, _of(f"{name}_energy")) for name, there in energies.items() if there]
     lines += [
-        Line("/energy_error", "of a particle", _logarithm_of("energy_error")),
-        Line("/penetration", "of a particle", _logarithm_of("max_penetration")),
-        Line("/impacts", "all particles", _rate("impacts", 1.0)),
+        Line("/energy_error", f"of a {one}", _logarithm_of("energy_error")),
+        Line("/penetration", f"of a {one}", _logarithm_of("max_penetration")),
+        Line("/impacts", every, _rate("impacts", 1.0)),
     ]
+    if body is not None and (len(body.springs) or body.strain is not None):
+        lines.append(Line("/energy/elastic", "elastic", _of("contact_energy")))
+    if body is not None and len(body.links):
+        lines.append(Line("/link_error", "of a link", _logarithm_of("link_error")))
+    if body is not None and any(motion is not None for motion in body.anchors.values()):
+        lines.append(Line("/energy/work", "work of anchors", _of("work")))
     # The walls of an open volume are drawn in part, so they have no area.
     group = "force" if scene.is_open() else "pressure"
     for i, shape in enumerate(shapes):
@@ -65,7 +74,7 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape]) -> list[Line]:
         if area > 0.0:
             lines.append(Line(f"/{group}/{shape.name}", shape.name, _rate("impulse", area, i)))
     if method.is_rigid():
-        lines.append(Line("/sliding", "all particles", _of("sliding")))
+        lines.append(Line("/sliding", every, _of("sliding")))
     for i, shape in enumerate(shapes):
         if scene.surfaces[i].temperature is not None:
             lines.append(Line(f"/heat/{shape.name}", shape.name, _rate("wall_heat", 1.0, i)))
@@ -86,7 +95,7 @@ def row_of(lines: list[Line], moment: float, seen: dict[str, Any], before: Seen)
 
 
 def _of(name: str) -> Callable[..., float]:
-    # Files of older versions have no "sliding".
+    # Files of older versions have no "sliding", and runs of particles no "work".
     return lambda _moment, seen, _before: float(seen.get(name, 0.0))
 
 

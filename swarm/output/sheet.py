@@ -84,13 +84,24 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             cells[-1].imshow(found[place])
             cells[-1].set_axis_off()
         else:
-            positions, packed = playback.frame(playback.numbers[k])
-            drawing.particles(cells[-1], positions, drawing.red_green_blue(packed), playback.wires)
+            _places(cells[-1], playback, playback.numbers[k])
     about = playback.about
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
-    title = f"{playback.path.name}: {about['shown']} of {about['particles']} particles, {count}"
+    title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
     top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
     for place, group in enumerate(group for group in series.VIEWS if group in groups):
         drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], groups[group])
     return picture
+
+
+def _places(axes: Any, playback: Playback, number: int) -> None:
+    """The particles, or the bodies, of the frame of this number."""
+    positions, packed = playback.frame(number)
+    lines, faces = playback.lines(number), playback.faces(number)
+    size = 0.0 if len(faces[0]) else 1.0
+    drawing.particles(axes, positions, drawing.red_green_blue(packed), playback.wires, size)
+    if len(lines[0]):
+        drawing.bonds(axes, *lines)
+    if len(faces[0]):
+        drawing.faces(axes, *faces)

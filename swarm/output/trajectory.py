@@ -3,15 +3,18 @@
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
 start; particles/all/{mass,id} (N,); observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as
 TOML text, parameters/particles, the number that were run, parameters/start, a digest of them at the start, and
-parameters/seed, of thermal walls. All elements share one step and one time dataset by hard links. writer.py writes it.
+parameters/seed, of thermal walls. Of bodies: parameters/body, the table of one as TOML text, parameters/copies, their
+number n, and connectivity/bonds (B n, 2); point p of copy i is particle p n + i. All elements share one step and one
+time dataset by hard links. writer.py writes it.
 """
 
 import contextlib
+import functools
 import operator
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -24,6 +27,10 @@ from ..particles import Particles
 from ..scene import Scene
 from . import layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+    from ..bodies.state import Bodies
 
 _STILL_WRITTEN = "already open"
 # In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
@@ -39,6 +46,7 @@ class Trajectory:
         observables: name -> array, one entry a frame.
         scene, method: as they were run.
         scene_text: the scene file's text, or None.
+        body, copies: the body whose copies were run, and their number; None and 0 for particles.
 
     A file that is being written, or that a killed run left, can be read: the frames that are complete when it is
     opened. Inconsistent content raises a SceneError that names the damaged part.
@@ -130,6 +138,28 @@ class Trajectory:
             position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
             return Particles(position, velocity, everything["mass"][()])
 
+    def bodies(self, k: int) -> "Bodies":
+        """The bodies at frame k; negative k count from the end.
+
+        Raises:
+            SceneError: the file holds particles, or keeps too few digits: the links of bodies have exact lengths.
+        """
+        body = self.body
+        if body is None:
+            raise SceneError(f"{self.path} holds particles, not bodies; use frame({k})")
+        points, shape = self.frame(k), (3, len(body), self.copies)
+        with self._reading(f"frame {k}") as file:
+            exact = file["particles/all/position/value"].dtype == np.float64
+        if not exact:
+            raise SceneError(
+                f"{self.path} keeps bodies in float32, in which their links lose their lengths; use frame({k}) for the "
+                'points, or run again with precision = "float64"'
+            )
+        from ..bodies.state import Bodies
+
+        with self._reading(f"frame {k}"):
+            return Bodies(body, points.position.reshape(shape), points.velocity.reshape(shape))
+
     def impacts(self, k: int) -> NDArray[np.int64]:
         """How many impacts each of the particles of frame k has had since the start, (N,)."""
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
@@ -180,9 +210,29 @@ class Trajectory:
 
     @property
     def count(self) -> int:
-        """Number of particles that were run; a frame may keep fewer."""
+        """Number of particles, or of points of bodies, that were run; a frame may keep fewer."""
         with self._reading("its number of particles") as file:
             return int(file["parameters/particles"][()])
+
+    @functools.cached_property
+    def body(self) -> "Body | None":
+        """The body whose copies were run; None for particles."""
+        with self._reading("its body") as file:
+            if "parameters/body" not in file:
+                return None
+        from ..bodies.table import body_of
+
+        with self._reading("its body"):
+            body = body_of(tomllib.loads(self._text("body")))
+            if len(body) * self.copies != self.count:
+                raise ValueError(f"{self.copies} of {len(body)} points are not {self.count}")
+        return body
+
+    @property
+    def copies(self) -> int:
+        """Number of bodies that were run; 0 for particles."""
+        with self._reading("its number of bodies") as file:
+            return int(file["parameters/copies"][()]) if "parameters/body" in file else 0
 
     @property
     def descriptions(self) -> dict[str, str]:

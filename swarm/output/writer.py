@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -25,6 +25,10 @@ from ..version import VERSION
 from . import paths, superblock
 from .layout import COUNTS, PARTS
 from .storage import Storage
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+    from ..bodies.state import Bodies
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
 _CHUNK = (10, 1000)
@@ -58,12 +62,14 @@ class TrajectoryWriter:
         storage: Storage,
         scene: Scene,
         method: Method,
-        particles: Particles,
+        particles: "Particles | Bodies",
         scene_text: str | None,
         identity: dict[str, Any],
         following: bool = False,
     ) -> None:
         self._path, self._storage, self._scene, self._method = path, storage, scene, method
+        self._bodies = None if isinstance(particles, Particles) else particles
+        particles = particles if isinstance(particles, Particles) else particles.particles()
         self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
         self._identity, self._following = identity, following
         self._part = path if following else paths.part_of(path)
@@ -126,6 +132,8 @@ class TrajectoryWriter:
             parameters[name] = value
         if self._text is not None:
             parameters["scene_file"] = self._text
+        if self._bodies is not None:
+            parameters["body"], parameters["copies"] = body_text(self._bodies.body), len(self._bodies)
         self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
         self._time = parameters.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
         self._values: dict[str, Any] = {}
@@ -138,6 +146,9 @@ class TrajectoryWriter:
         box.attrs["dimension"], box.attrs["boundary"] = 3, ["none"] * 3
         everything["mass"] = self._mass
         everything["id"] = np.arange(self._count)[self._storage.kept()]
+        if self._bodies is not None:
+            bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
+            bonds.attrs["particles_group"] = everything.ref
         options = _PACKED[self._storage.compression]
         # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
         deep = 1 if options else _CHUNK[0]
@@ -300,3 +311,10 @@ def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, st
         "method": tomli_w.dumps(tables.table_of(method)),
         "storage": tomli_w.dumps(vars(storage)),
     }
+
+
+def body_text(body: "Body") -> str:
+    """The text that a trajectory keeps of a body."""
+    from ..bodies.table import table_of
+
+    return tomli_w.dumps(table_of(body))

@@ -29,7 +29,9 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     if isinstance(particles, Bodies):
         return _task_of_bodies(scene, particles.copy(), method, options)
     if getattr(method, "dt", None) is not None and isinstance(method, Impact):
-        raise SceneError(f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out")
+        raise SceneError(
+            f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
+        )
     # The arrays of Particles may have been changed since it checked them.
     particles = particles.copy()
     check_surfaces(method, scene)
@@ -55,7 +57,9 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
     if options.frames not in ("all", "none"):
-        raise SceneError(f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}')
+        raise SceneError(
+            f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
+        )
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled(scene.surfaces)

@@ -26,9 +26,11 @@ def recorder_of(task: Task) -> "Writer | None":
         from ..output.recording import RecordingWriter, Settings  # rerun takes half a second
 
     settings = Settings(options.record_particles, options.record_color, options.record_megabytes, options.live)
+    body = None if task.bodies is None else task.bodies.body
     return RecordingWriter(
-        options.recording, options.overwrite, task.scene, task.method, task.particles, options.times.count, settings
-    )
+        options.recording, options.overwrite, task.scene, task.method, task.particles, options.times.count, settings,
+        body,
+    )  # fmt: skip
 
 
 def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Background | None":
@@ -50,6 +52,6 @@ def _trajectory(task: Task, session: Session) -> "Writer | None":
     from ..output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
     return TrajectoryWriter(
-        options.trajectory, options.storage, task.scene, task.method, task.particles, options.scene_text,
-        session.identity, session.first > 0,
+        options.trajectory, options.storage, task.scene, task.method, task.bodies or task.particles,
+        options.scene_text, session.identity, session.first > 0,
     )  # fmt: skip

@@ -67,7 +67,7 @@ class Session:
             return
         from ..output import checkpoint
         from ..output.lock import only_writer
-        from ..output.writer import descriptions
+        from ..output.writer import body_text, descriptions
 
         overwrite, until = task.options.overwrite, task.options.until
         paths.check_target(self._trajectory, overwrite or self._resumes)
@@ -77,7 +77,8 @@ class Session:
                 f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
                 "replace; move it away, or choose another name for the trajectory"
             )
-        self.identity = {"start": checkpoint.digest_of(task.particles), "seed": task.options.seed}
+        body = "" if task.bodies is None else body_text(task.bodies.body)
+        self.identity = {"start": checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
         if not self._resumes:
@@ -167,7 +168,9 @@ class Session:
         """Seconds of all sessions of the run."""
         return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
 
-    def look(self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None) -> None:
+    def look(
+        self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+    ) -> None:
         """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
 
         Raises:
@@ -185,7 +188,9 @@ class Session:
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
-    def _save(self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None) -> None:
+    def _save(
+        self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+    ) -> None:
         from ..output import checkpoint
 
         assert self._job is not None

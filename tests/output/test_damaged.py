@@ -209,7 +209,7 @@ def test_a_path_without_a_file_is_one_sentence(tmp_path):
     def started(path):
         shutil.copytree(path, f"{path}.h5") if path.is_dir() else path.exists() and shutil.copy(path, f"{path}.h5")
         (tmp_path / "scene.toml").write_text(f'{scene}"{path.name}.h5"')
-        scene_file.read(tmp_path / "scene.toml").particles()
+        scene_file.read(tmp_path / "scene.toml").start()
 
     (tmp_path / "folder").mkdir()
     readers = [swarm.load, summary.of_trajectory, started, playback.Playback, playback.described, playback.repair]

@@ -1,0 +1,319 @@
+"""Bodies to and from plain tables, the form that scene files and trajectories hold.
+
+A table of the kind "points" has the arguments of `Body`, every number exactly; the other kinds are those that are made.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import checks, tables
+from ..checks import Vector
+from ..errors import SceneError
+from ..particles import Floats
+from ..scene import Scene
+from ..surfaces import ALL_SURFACES
+from .body import Body
+from .strain import Strain
+
+if TYPE_CHECKING:
+    from .state import Bodies
+
+_MOTIONS = ("translation", "oscillation", "rotation")
+
+
+# --- Keys of [body] ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """Keys of every kind of [body]: how many copies there are, and how they are placed."""
+
+    count: int | None = None
+    speed: float | None = None
+    spin: float | None = None
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.count is not None:
+            checks.count("count", self.count)
+
+    def body(self) -> Body:
+        """The body that is described."""
+        raise NotImplementedError
+
+    def start(self, scene: Scene) -> "Bodies":
+        """The copies at the start.
+
+        Raises:
+            SceneError: a value is out of its range, or the copies cannot be placed.
+        """
+        from .placing import place
+
+        if self.count is None:
+            raise SceneError("count: expected a whole number, got nothing; add count = ...")
+        body = self.body()
+        checks.particles_fit("count", self.count * len(body))
+        return place(scene, body, self.count, speed=self.speed or 0.0, spin=self.spin or 0.0, seed=self.seed or 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dumbbell(Made):
+    """Arguments of `dumbbell`."""
+
+    length: float
+    mass: float
+
+    def body(self) -> Body:
+        """Two points and a link."""
+        from .shapes import dumbbell
+
+        return dumbbell(self.length, self.mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tetrahedron(Made):
+    """Arguments of `tetrahedron`."""
+
+    edge: float
+    mass: float
+
+    def body(self) -> Body:
+        """Four points and six links."""
+        from .shapes import tetrahedron
+
+        return tetrahedron(self.edge, self.mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain(Made):
+    """Arguments of `chain`."""
+
+    n: int
+    length: float
+    mass: float
+
+    def body(self) -> Body:
+        """n points in a line, each linked to the next."""
+        from .shapes import chain
+
+        return chain(self.n, self.length, self.mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rigid(Made):
+    """Arguments of `rigid`."""
+
+    vertices: tuple[Vector, ...]
+    density: float
+    faces: tuple[tuple[int, int, int], ...] | None = None
+
+    def body(self) -> Body:
+        """A polyhedron."""
+        from .shapes import rigid
+
+        return rigid(self.vertices, self.density, self.faces)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elastic(Made):
+    """Arguments of `elastic`, for a block of these lengths that is cut into so many cells along each."""
+
+    lengths: Vector
+    cells: tuple[int, int, int]
+    young: float
+    poisson: float
+    density: float
+    mass: str = "lumped"
+
+    def body(self) -> Body:
+        """A block of tetrahedra."""
+        from .elastic import block, elastic
+
+        return elastic(block(self.lengths, self.cells), self.young, self.poisson, self.density, self.mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Points(Made):
+    """Arguments of `Body`; without a count there is one, where its points are."""
+
+    points: tuple[Vector, ...]
+    velocity: tuple[Vector, ...] | None = None
+    mass: float | tuple[float, ...] | None = None
+    mass_matrix: tuple[tuple[float, ...], ...] | None = None
+    links: tuple[tuple[int, int], ...] = ()
+    springs: tuple[tuple[int, int, float, float], ...] = ()
+    contacts: tuple[int | tuple[float, ...], ...] | None = None
+    strain: Any = None
+    anchors: tuple[Any, ...] = ()
+    guides: tuple[Any, ...] = ()
+    cavities: tuple[Any, ...] = ()
+    faces: tuple[tuple[int, int, int], ...] = ()
+
+    def body(self) -> Body:
+        """The body with these arguments."""
+        return Body(
+            self.points,
+            self.mass,
+            self.links,
+            self.springs,
+            self.contacts,
+            mass_matrix=self.mass_matrix,
+            strain=None if self.strain is None else tables.convert(self.strain, _Strain, "strain").strain(),
+            anchors=_anchors(self.anchors),
+            guides=_each("guides", self.guides, _guide),
+            cavities=_each("cavities", self.cavities, _cavity),
+            faces=self.faces,
+        )
+
+    def start(self, scene: Scene) -> "Bodies":
+        """The copies at the start, or the one where its points are."""
+        from .state import Bodies
+
+        if self.count is not None:
+            if self.velocity is not None:
+                raise SceneError("velocity: must go without count, got both; copies at random have speed and spin")
+            return super().start(scene)
+        placed = [name for name in ("speed", "spin", "seed") if getattr(self, name) is not None]
+        if placed:
+            raise SceneError(f"{placed[0]}: is of copies at random; add count = ..., or give velocity = ... instead")
+        position = np.array(self.points)
+        velocity = np.zeros_like(position) if self.velocity is None else np.array(self.velocity)
+        return Bodies(self.body(), position.T, velocity.T)
+
+
+KINDS: dict[str, type[Made]] = {
+    "dumbbell": Dumbbell, "tetrahedron": Tetrahedron, "chain": Chain, "rigid": Rigid, "elastic": Elastic,
+    "points": Points,
+}  # fmt: skip
+
+
+# --- Parts of the kind "points" ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Strain:
+    """`Strain`, with those entries (i, j, K_ij) of its matrix that are not 0: each edge meets few others."""
+
+    edges: tuple[tuple[int, int], ...]
+    rest: tuple[float, ...]
+    stiffness: tuple[tuple[int, int, float], ...]
+
+    def strain(self) -> Strain:
+        n = len(self.edges)
+        matrix = np.zeros((n, n))
+        for k, (i, j, value) in enumerate(self.stiffness):
+            if not (0 <= i < n and 0 <= j < n):
+                raise SceneError(f"strain.stiffness[{k}] must name two of the {n} edges, got {i} and {j}")
+            matrix[i, j] = value
+        return Strain(np.array(self.edges, dtype=np.int64).reshape(-1, 2), np.array(self.rest), matrix)
+
+
+@dataclass(frozen=True)
+class _Guide:
+    point: int
+    surface: Any
+
+
+@dataclass(frozen=True)
+class _Cavity:
+    surface: Any
+    carrier: int
+    point: int
+
+
+def _each(name: str, given: tuple[Any, ...], read: Callable[[Any, str], Any]) -> list[Any]:
+    return [read(table, f"{name}[{k}]") for k, table in enumerate(given)]
+
+
+def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
+    found = _each("anchors", given, _anchor)
+    points = [point for point, _motion in found]
+    for k, point in enumerate(points):
+        if point in points[:k]:
+            raise SceneError(f"anchors[{k}] is of point {point}, as anchors[{points.index(point)}]; remove one of them")
+    return dict(found)
+
+
+def _anchor(table: Any, where: str) -> tuple[int, Any]:
+    """A point, and the motion that leads it, if the table has a kind."""
+    if not isinstance(table, dict) or type(table.get("point")) is not int:
+        raise SceneError(f"{where}: expected a table with the number of a point, got {table!r}")
+    motion = {key: value for key, value in table.items() if key != "point"}
+    return table["point"], tables.of_kind(motion, where, _motions()) if motion else None
+
+
+def _guide(table: Any, where: str) -> tuple[int, Any]:
+    found = tables.convert(table, _Guide, where)
+    return found.point, tables.of_kind(found.surface, f"{where}.surface", ALL_SURFACES)
+
+
+def _cavity(table: Any, where: str) -> tuple[Any, int, int]:
+    found = tables.convert(table, _Cavity, where)
+    return tables.of_kind(found.surface, f"{where}.surface", ALL_SURFACES), found.carrier, found.point
+
+
+def _motions() -> dict[str, type[Any]]:
+    from .. import motion
+
+    return {kind: getattr(motion, kind.capitalize()) for kind in _MOTIONS}
+
+
+# --- To a table -------------------------------------------------------------------------------------------
+
+
+def body_of(table: Any) -> Body:
+    """The body of a table that `table_of` made.
+
+    Raises:
+        SceneError: the table is not one of a body.
+    """
+    return tables.of_kind(table, "body", {"points": Points}).body()
+
+
+def table_of(body: Body) -> dict[str, Any]:
+    """The table of a body, of the kind "points": `body_of` makes the same body of it, to the last bit.
+
+    >>> table_of(Body([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], mass=0.5, links=[(0, 1)]))["links"]
+    [[0, 1]]
+    """
+    matrix, mass = body.mass_matrix, np.diag(body.mass_matrix)
+    masses = {"mass": mass.tolist()} if (matrix == np.diag(mass)).all() else {"mass_matrix": matrix.tolist()}
+    table = {
+        "kind": "points",
+        "points": body.points.tolist(),
+        **masses,
+        "links": body.links.tolist(),
+        "springs": [list(spring) for spring in body.springs],
+        "contacts": _contacts(body.contacts),
+        "anchors": [{"point": point, **_motion(motion)} for point, motion in body.anchors.items()],
+        "guides": [{"point": point, "surface": tables.table_of(surface)} for point, surface in body.guides],
+        "cavities": [
+            {"surface": tables.table_of(surface), "carrier": carrier, "point": point}
+            for surface, carrier, point in body.cavities
+        ],
+        "faces": body.faces.tolist(),
+    }
+    if body.strain is not None:
+        i, j = (places.tolist() for places in np.nonzero(body.strain.stiffness))
+        entries = zip(i, j, body.strain.stiffness[i, j].tolist(), strict=True)
+        table["strain"] = {
+            "edges": body.strain.edges.tolist(),
+            "rest": body.strain.rest.tolist(),
+            "stiffness": [list(entry) for entry in entries],
+        }
+    return {name: value for name, value in table.items() if name in ("kind", "points", "contacts") or value}
+
+
+def _contacts(rows: Floats) -> list[Any]:
+    """The numbers of points where every row is a point, else the coefficients."""
+    numbers = rows.argmax(axis=1)
+    same = (rows == np.eye(rows.shape[1])[numbers]).all()
+    return list(numbers.tolist() if same else rows.tolist())
+
+
+def _motion(motion: Any) -> dict[str, Any]:
+    return {} if motion is None else {"kind": type(motion).__name__.lower(), **dataclasses.asdict(motion)}

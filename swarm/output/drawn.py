@@ -1,0 +1,74 @@
+"""What pictures and recordings show of a run: some of its particles, or some of its bodies, whole."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies.body import Body
+from ..bodies.checked import Pairs
+from ..particles import Floats
+
+# Triangles whose normals differ by less lie in one face of a polyhedron, without a line between them.
+_FLAT = 1e-6
+
+
+class Drawn:
+    """Which particles or bodies are shown, evenly chosen, and what ties their points together.
+
+    A body with faces is shown by its contact points, its faces and the edges between them, another by its points and
+    its bonds.
+
+    Attributes:
+        noun: what is shown, "particles" or "bodies"; count: how many there are; shown: how many are shown.
+        lines: (S, 2) and triangles: (T, 3), of the points that are shown.
+    """
+
+    def __init__(self, points: int, body: Body | None, most: int) -> None:
+        """Of `points` particles or points of bodies, at most `most` points are shown, or one body."""
+        self.noun = "particles" if body is None else "bodies"
+        size = 1 if body is None else len(body)
+        self.count = points // size
+        self._body, self._faces = body, body is not None and len(body.faces) > 0
+        one = size if body is None or not self._faces else len(body.contacts)
+        self._every = slice(None, None, math.ceil(self.count / max(1, most // one)))
+        self.shown = len(range(self.count)[self._every])
+        edges, faces = (_none(2), _none(3)) if body is None else (_lines(body), body.faces)
+        self.lines, self.triangles = self._of_all(edges), self._of_all(faces)
+
+    def points(self, rows: Floats) -> Floats:
+        """The points that are shown, from positions or velocities (3, N) of all."""
+        if self._body is None:
+            return rows[:, self._every]
+        some = rows.reshape(3, len(self._body), self.count)[:, :, self._every]
+        if self._faces:
+            some = np.einsum("kp,xpn->xkn", self._body.contacts, some)
+        return some.reshape(3, -1)
+
+    def middles(self, rows: Floats) -> Floats:
+        """The middles of the lines, from the points that are shown."""
+        return np.asarray(0.5 * (rows[:, self.lines[:, 0]] + rows[:, self.lines[:, 1]]))
+
+    def _of_all(self, groups: Pairs) -> NDArray[np.int64]:
+        """Groups of points of one body, of all that are shown; point p of the i-th is number p shown + i."""
+        return (groups[:, None] * self.shown + np.arange(self.shown)[:, None]).reshape(-1, groups.shape[1])
+
+
+def _none(width: int) -> Pairs:
+    return np.zeros((0, width), np.int64)
+
+
+def _lines(body: Body) -> Pairs:
+    """The bonds of a body, or the edges of its faces; where it is rigid, without those within a flat face."""
+    if not len(body.faces):
+        return np.unique(np.sort(body.bonds(), axis=1), axis=0)
+    corners = (body.contacts @ body.points)[body.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.sqrt((normals**2).sum(axis=1, keepdims=True)), np.finfo(np.float64).tiny)
+    beside: dict[tuple[int, ...], list[Floats]] = {}
+    for face, normal in zip(body.faces.tolist(), normals, strict=True):
+        for k in range(3):
+            beside.setdefault(tuple(sorted((face[k - 1], face[k]))), []).append(normal)
+    bends = body.strain is not None or len(body.springs) > 0
+    kept = [edge for edge, sides in beside.items() if bends or len(sides) == 1 or np.ptp(sides, axis=0).max() > _FLAT]
+    return np.array(kept, dtype=np.int64).reshape(-1, 2)

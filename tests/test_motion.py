@@ -1,0 +1,77 @@
+"""Given motions: their common form against their definitions."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.motion import led
+
+START = np.array([0.3, -0.2, 0.7])
+TIMES = np.linspace(0.0, 7.0, 101)
+
+
+def test_translation():
+    path = swarm.Translation((1.0, 2.0, -3.0)).harmonic(START)
+    assert path.position(TIMES) == pytest.approx(START[:, None] + np.outer((1.0, 2.0, -3.0), TIMES), abs=1e-14)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.4, -2.0])
+def test_oscillation(phase):
+    amplitude = np.array([0.1, -0.2, 0.3])
+    path = swarm.Oscillation(amplitude, 1.5, phase).harmonic(START)
+    wave = np.sin(3.0 * math.pi * TIMES + phase) - math.sin(phase)
+    assert path.position(TIMES) == pytest.approx(START[:, None] + np.outer(amplitude, wave), abs=1e-14)
+
+
+@pytest.mark.parametrize("length", [1e-200, 1.0, 1e99])
+def test_rotation_is_right_handed_about_its_axis(length):
+    """Rodrigues' formula, of an axis of any length."""
+    axis, center = np.array([1.0, -2.0, 0.5]), np.array([0.1, 0.2, 0.3])
+    unit, arm = axis / np.linalg.norm(axis), START - center
+    path = swarm.Rotation(length * axis, 0.8, center).harmonic(START)
+    for t in TIMES:
+        c, s = math.cos(0.8 * t), math.sin(0.8 * t)
+        turned = arm * c + np.cross(unit, arm) * s + unit * (unit @ arm) * (1.0 - c)
+        assert path.position(t) == pytest.approx(center + turned, abs=1e-14)
+
+
+def test_every_path_begins_at_its_start():
+    motions = [
+        swarm.Translation((1.0, 0.0, 0.0)),
+        swarm.Oscillation((1.0, 0.0, 0.0), 1.0, 0.3),
+        swarm.Rotation((0.0, 0.0, 1.0), 1.0, (5.0, 0.0, 0.0)),
+        None,
+    ]
+    for motion in motions:
+        assert (led(motion, START).position(0.0) == START).all()
+    assert (led(None, START).position(1e6) == START).all()
+
+
+def test_early_motion_has_all_digits():
+    """The cosine's part of a slow start is t^2/2, far below the round-off of 1."""
+    path = swarm.Oscillation((1.0, 0.0, 0.0), 1.0 / (2.0 * math.pi), math.pi / 2.0).harmonic((0.0, 0.0, 0.0))
+    # sin(t + pi/2) - 1, without the round-off of cos(pi/2)
+    moved = path.position(1e-9)[0] - path.sine[0] * 1e-9
+    assert moved == pytest.approx(-5e-19, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("build", "parts"),
+    [
+        (lambda: swarm.Translation((1.0, 2.0)), ["velocity", "three numbers", "2"]),
+        (lambda: swarm.Translation((math.nan, 0.0, 0.0)), ["velocity[0]", "finite", "nan"]),
+        (lambda: swarm.Translation((0.0, -1e200, 0.0)), ["|velocity[1]|", "at most 1e+100"]),
+        (lambda: swarm.Oscillation(0.1, 1.0), ["amplitude", "three numbers"]),
+        (lambda: swarm.Oscillation((0.1, 0.0, 0.0), 0.0), ["frequency", "above 0"]),
+        (lambda: swarm.Oscillation((0.1, 0.0, 0.0), 1.0, math.inf), ["phase", "finite"]),
+        (lambda: swarm.Rotation((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0)), ["axis", "direction"]),
+        (lambda: swarm.Rotation((0.0, 0.0, 1.0), "fast", (0.0, 0.0, 0.0)), ["rate", "'fast'"]),
+        (lambda: swarm.Rotation((0.0, 0.0, 1.0), 1.0, None), ["center", "three numbers"]),
+    ],
+)
+def test_errors_name_the_argument(build, parts):
+    with pytest.raises(swarm.SceneError) as caught:
+        build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
