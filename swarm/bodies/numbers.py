@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..lanes.tied.arrays import Ties, Touching
+from ..particles import Floats
 from ..scene import Scene
 from .body import Body
 
@@ -13,7 +14,7 @@ def ties_of(body: Body) -> Ties:
     links, springs, edges = len(body.links), len(body.springs), 0 if body.strain is None else len(body.strain.edges)
     tied = body.points[ends[:, 0]] - body.points[ends[:, 1]]
     rest, stiffness = (tied**2).sum(axis=1), np.zeros(len(ends))
-    compliance = np.zeros((edges, edges))
+    compliance: Floats = np.zeros((edges, edges))
     for row, (_i, _j, k, length) in enumerate(body.springs, start=links):
         stiffness[row], rest[row] = k, length
     if body.strain is not None:

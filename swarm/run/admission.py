@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..bodies.body import Body
 from ..bodies.state import Bodies
 from ..errors import SceneError
 from ..methods import Impact
@@ -60,11 +61,22 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
+    _require_known(bodies.body)
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled(scene.surfaces)
     _require_inside(scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2))))
     return Task(scene, bodies.particles(), method, options, bodies)
+
+
+def _require_known(body: Body) -> None:
+    """Raise a SceneError where a body has what no kernel knows yet."""
+    for name, given in (("guides", body.guides), ("cavities", body.cavities)):
+        if given:
+            raise SceneError(f"{name} of a body must be empty in a run, got {len(given)}: no method knows them yet")
+    for point, motion in body.anchors.items():
+        if motion is not None:
+            raise SceneError(f"anchors[{point}] must be None, fixed in space, in a run, got {motion}: none is led yet")
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

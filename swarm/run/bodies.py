@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.numbers import touching_of, ties_of
+from ..bodies.numbers import ties_of, touching_of
 from ..bodies.state import Bodies
 from ..errors import RunError
 from ..lanes.tied.advance import advance_bodies
@@ -132,11 +132,11 @@ class BodyRun:
         sentence = f"the frame at {moment:g} s failed at body {number}, at {time_of:.6g} s: "
         if status == Status.UNSOLVED:
             return sentence + (
-                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; their lengths are off by "
-                f"{self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
+                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s, from lengths that are off "
+                f"by {self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
             )
         return sentence + (
-            "a point meets its wall without end, as where it slides along it or rests; bodies bounce, they do not slide yet"
+            "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"
         )
 
     def share_done(self, span: float) -> float:
@@ -205,8 +205,8 @@ class BodyRun:
             "max_penetration": float(max(depth, 0.0)),
             "impacts": int(bodies.impacts.sum()),
             "impulse": impulse,
-            "sliding": 0,
-            "sliding_time": 0.0,
+            "sliding": int(np.count_nonzero(bodies.lasting)),
+            "sliding_time": float(bodies.sliding.sum()),
             "wall_heat": np.zeros(len(self._scene.surfaces)),
             "unconverged": 0,
             "escaped": 0,
@@ -225,7 +225,8 @@ class BodyRun:
             raise RunError(f"the frame at {moment:g} s failed at body {int(np.argmin(good))}: {_NOT_FINITE}")
         if seen["max_penetration"] > self._deepest:
             raise RunError(
-                f"the frame at {moment:g} s failed: a point of a body is {seen['max_penetration']:.3g} m outside its walls"
+                f"the frame at {moment:g} s failed: a point of a body is {seen['max_penetration']:.3g} m outside its "
+                "walls"
             )
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import interrupt
-from ..frames import Frame
 from ..bodies.state import Bodies
+from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..methods import Impact
 from ..methods.base import Method

@@ -91,14 +91,13 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                 pace.action[i] = blow.AGAIN
             elif pace.body[i] >= 0 and (pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]):
                 pace.action[i] = blow.judge(touching, chain, rule, lanes, pace, i, 2.0 * hold.tolerated(rule, pace, i))
-            if pace.body[i] >= 0:
-                if pace.action[i] == blow.FAILED or pace.stuck[i] > _STUCK:
-                    status = Status.UNSOLVED if pace.action[i] == blow.FAILED else Status.STALLED
-                    number = pace.body[i]
-                    for j in range(count):
-                        if pace.body[j] >= 0:
-                            _store(state, lanes, pace, j)
-                    return status, number
+            if pace.body[i] >= 0 and (pace.action[i] == blow.FAILED or pace.stuck[i] > _STUCK):
+                status = Status.UNSOLVED if pace.action[i] == blow.FAILED else Status.STALLED
+                number = pace.body[i]
+                for j in range(count):
+                    if pace.body[j] >= 0:
+                        _store(state, lanes, pace, j)
+                return status, number
         _commit(lanes, pace, rule.dt)
         for i in range(count):
             action = pace.action[i]
@@ -113,7 +112,7 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                     short = action == blow.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
                     state.short[number] = state.short[number] + 1 if short else 0
                     blows = blow.strike(ties, touching, chain, rule, lanes, state, i, number)
-                    if action == blow.STRIKE_NOW and blows == 0 or pace.stuck[i] > _LASTS:
+                    if (action == blow.STRIKE_NOW and blows == 0) or pace.stuck[i] > _LASTS:
                         pace.held[i] = 1
                     for a in range(rows):
                         lanes.before[a, i] = lanes.recent[a, i]

@@ -10,7 +10,8 @@ from ...surfaces import fold as walls
 
 # What becomes of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
-# A bracket of the time of impact this narrow, as a part of a whole step, is a point; and of a step from a wall to itself.
+# A bracket of the time of impact this narrow, as a part of a whole step, is a point; a step this short from a wall to
+# itself is none.
 _NARROW, _SHORTEST = 1e-13, 1e-5
 # Trials that find most times of impact.
 _QUICK = 6
@@ -178,7 +179,7 @@ def links(ties, r, i, system):
 
 @inlined
 def near(touching, chain, rule, motion, i, contacts, approaching):
-    """The contacts at their walls, or those of them that approach: their names (point, wall), a normal, two tangents."""
+    """The contacts at their walls, or those that approach: their names (point, wall), a normal and two tangents."""
     r, v = motion
     name, frame = contacts
     found = 0

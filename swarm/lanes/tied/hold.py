@@ -106,7 +106,7 @@ def _sweep(touching, contacts, schur, moved, presses, change, half):
     press_of, i = presses
     for a in range(3 * found):
         change[a] = 0.0
-    for _sweep_ in range(_SWEEPS):
+    for _turn in range(_SWEEPS):
         largest, size = 0.0, 0.0
         for a in range(found):
             j, mu = 3 * a, touching.friction[name[a, 1]]

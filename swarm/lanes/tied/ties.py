@@ -149,7 +149,7 @@ def accelerate(ties, lanes):
 
 @inlined
 def _residual(ties, lanes, pace, turn, noise):
-    """How far each tie is from its equation, as an error of |y1|^2, and which lanes need no more than one correction."""
+    """How far each tie is from its equation, as an error of |y1|^2; which lanes need no more than one correction."""
     f, count, links, soft = lanes.f, lanes.f.shape[1], ties.links, ties.links + ties.springs
     for i in range(count):
         pace.error[i] = 0.0

@@ -1,0 +1,187 @@
+"""Bodies: what a run conserves, its order, blows against closed forms, and its bits."""
+
+import numpy as np
+import pytest
+
+import swarm
+
+STEP = 5e-3
+SPHERE = [swarm.Sphere(0.5)]
+BOX = [swarm.Box((0.5, 0.4, 0.3))]
+MAKERS = {"dumbbell": lambda: swarm.dumbbell(0.1, 2.0), "tetrahedron": lambda: swarm.tetrahedron(0.1, 4.0)}
+
+
+def run(bodies, surfaces, until, dt=STEP, gravity=None, **options):
+    scene = swarm.Scene(surfaces, gravity=gravity)
+    order = options.pop("order", 2)
+    return swarm.simulate(scene, bodies, swarm.Impact(dt=dt, order=order), until=until, **options)
+
+
+def some(kind, surfaces, n, seed=1):
+    return swarm.place(swarm.Scene(surfaces), MAKERS[kind](), n, speed=1.0, spin=4.0, seed=seed)
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["free", "falling"])
+@pytest.mark.parametrize("surfaces", [SPHERE, BOX], ids=["sphere", "box"])
+@pytest.mark.parametrize("kind", MAKERS)
+def test_energy_links_and_walls_are_kept(kind, surfaces, gravity):
+    result = run(some(kind, surfaces, 40), surfaces, 20.0, gravity=gravity, every=5.0)
+    seen = result.observables
+    assert seen["impacts"][-1] > 40 * 10
+    assert seen["energy_error"].max() < 1e-12
+    assert seen["link_error"].max() < 1e-13
+    assert seen["max_penetration"].max() < 1e-13
+
+
+def test_angular_momentum_about_the_centre_of_a_sphere_is_kept():
+    seen = run(some("tetrahedron", SPHERE, 40), SPHERE, 20.0, every=5.0).observables
+    change = np.abs(seen["angular_momentum"] - seen["angular_momentum"][0]).max()
+    assert change < 1e-11 * np.abs(seen["angular_momentum"][0]).max()
+
+
+def test_momentum_of_free_flight_is_kept():
+    far = [swarm.Sphere(1000.0)]
+    seen = run(some("tetrahedron", far, 40), far, 1.0).observables
+    assert seen["impacts"][-1] == 0
+    assert np.abs(np.diff(seen["momentum"], axis=0)).max() < 1e-12 * 40 * 4.0
+
+
+def test_bits_do_not_depend_on_threads_or_blocks():
+    start = some("tetrahedron", BOX, 70)
+    ends = [
+        run(start, BOX, 5.0, threads=threads, block_size=size).bodies for threads, size in [(1, 7), (2, 16), (2, 70)]
+    ]
+    for end in ends[1:]:
+        np.testing.assert_array_equal(end.position, ends[0].position)
+        np.testing.assert_array_equal(end.velocity, ends[0].velocity)
+
+
+def test_a_body_does_not_depend_on_its_neighbours():
+    start = some("tetrahedron", BOX, 20)
+    one = swarm.Bodies(start.body, start.position[:, :, 3:4], start.velocity[:, :, 3:4])
+    np.testing.assert_array_equal(
+        run(one, BOX, 5.0).bodies.position[:, :, 0], run(start, BOX, 5.0).bodies.position[:, :, 3]
+    )
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+def test_the_blow_of_a_rod_that_meets_a_plane(restitution):
+    # n K n of one end of a dumbbell of masses m, tilted by a: (1 + sin^2 a)/(2 m), without inertia along the rod
+    tilt, m, speed = 0.6, 1.0, 1.0
+    ends = 0.05 * np.array([[-np.cos(tilt), 0.0, -np.sin(tilt)], [np.cos(tilt), 0.0, np.sin(tilt)]])
+    body = swarm.Body(ends, mass=m, links=[(0, 1)])
+    position = (ends + [0.0, 0.0, 0.05]).T[:, :, None]
+    velocity = np.zeros((3, 2, 1))
+    velocity[2] = -speed
+    plane = [swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=restitution)]
+    end = run(swarm.Bodies(body, position, velocity), plane, 0.04).bodies.velocity[:, :, 0]
+    inverse = 1.0 / (2.0 * m) + np.cos(tilt) ** 2 * 0.05**2 / (2.0 * m * 0.05**2)
+    impulse = (1.0 + restitution) * speed / inverse
+    np.testing.assert_allclose(end.sum(axis=1), [0.0, 0.0, impulse / m - 2.0 * speed], rtol=1e-12, atol=1e-12)
+
+
+def test_what_restitution_takes_is_booked():
+    walls = [swarm.Box((0.5, 0.4, 0.3), restitution=0.8)]
+    seen = run(some("tetrahedron", walls, 20), walls, 5.0).observables
+    assert seen["total_energy"][-1] < 0.9 * seen["total_energy"][0]
+    assert seen["energy_error"].max() < 1e-12
+
+
+def test_bodies_come_to_rest_on_a_rough_floor():
+    walls = [swarm.Box((0.5, 0.4, 0.3), restitution=0.3, friction=0.3)]
+    seen = run(some("tetrahedron", walls, 8), walls, 8.0, gravity=(0.0, 0.0, -5.0), every=4.0).observables
+    assert seen["sliding"][-1] >= 7
+    assert seen["kinetic_energy"][-1] < 1e-4 * seen["kinetic_energy"][0]
+    assert seen["max_penetration"].max() < 1e-9
+
+
+def top(t, dt, order):
+    """A tetrahedron of four masses that turns freely: its points after t."""
+    points = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]) * 0.1
+    mass = np.array([1.0, 2.0, 3.0, 4.0])
+    points = points - mass @ points / mass.sum()
+    body = swarm.Body(points, mass=mass, links=[(i, j) for i in range(4) for j in range(i)])
+    velocity = np.cross([3.0, -2.0, 5.0], points)
+    start = swarm.Bodies(body, points.T[:, :, None], velocity.T[:, :, None])
+    return run(start, [swarm.Sphere(100.0)], t, dt=dt, order=order).bodies.position[:, :, 0]
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_a_free_top_converges_with_its_order_to_eulers_equations(order):
+    points = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]) * 0.1
+    mass = np.array([1.0, 2.0, 3.0, 4.0])
+    points = points - mass @ points / mass.sum()
+    exact = euler(points, mass, np.array([3.0, -2.0, 5.0]), 1.0)
+    coarse, fine = (np.abs(top(1.0, dt, order).T - exact).max() for dt in (0.02, 0.01))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.2)
+
+
+def euler(points, mass, spin, t):
+    """The points of a rigid body after t, by the equations of its rotation with DOP853."""
+    from scipy.integrate import solve_ivp
+
+    inertia = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, points, strict=True))
+
+    def rate(_t, state):
+        turn = state.reshape(3, 3)
+        omega = turn @ np.linalg.solve(inertia, turn.T @ momentum)
+        return np.cross(omega, turn.T).T.ravel()
+
+    momentum = inertia @ spin
+    end = solve_ivp(rate, (0.0, t), np.eye(3).ravel(), method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    return points @ end.reshape(3, 3).T
+
+
+def test_a_spring_keeps_its_energy():
+    body = swarm.Body([[0.0, 0.0, 0.0], [0.12, 0.0, 0.0]], mass=1.0, springs=[(0, 1, 500.0, 0.1)])
+    start = swarm.place(swarm.Scene(SPHERE), body, 20, speed=1.0, spin=3.0, seed=2)
+    seen = run(start, SPHERE, 10.0, every=2.0).observables
+    assert seen["impacts"][-1] > 100
+    assert np.ptp(seen["contact_energy"]) > 1e-3
+    assert seen["energy_error"].max() < 1e-12
+
+
+def test_a_pendulum_hangs_from_its_anchor():
+    body = swarm.Body([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]], mass=1.0, links=[(0, 1)], anchors={0: None})
+    start = swarm.Bodies(body, body.points.T[:, :, None], np.zeros((3, 2, 1)))
+    result = run(start, SPHERE, 3.0, gravity=(0.0, 0.0, -9.81), every=0.5)
+    np.testing.assert_array_equal(result.bodies.position[:, 0, 0], 0.0)
+    assert result.observables["energy_error"].max() < 1e-12
+
+
+def test_a_run_that_is_resumed_has_the_same_bits(tmp_path):
+    start, scene = some("tetrahedron", BOX, 30), swarm.Scene(BOX)
+    whole = run(start, BOX, 4.0, every=1.0, trajectory=tmp_path / "whole.h5", checkpoint=0.01).bodies.position
+    path = tmp_path / "parts.h5"
+    method, how = swarm.Impact(dt=STEP), {"until": 4.0, "every": 1.0, "trajectory": path, "checkpoint": 0.01}
+
+    def stop(frame):
+        if frame.number == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        swarm.simulate(scene, start, method, progress=stop, **how)
+    end = swarm.simulate(
+        scene, start, method, resume=(tmp_path / "parts.h5.checkpoint").exists(), overwrite=True, **how
+    )
+    np.testing.assert_array_equal(end.bodies.position, whole)
+
+
+@pytest.mark.parametrize(
+    ("method", "said"),
+    [
+        (swarm.Impact(), "Impact with a step"),
+        (swarm.Impact(dt=0.01, contact_step=0.001), "contact_step must be 0"),
+        (swarm.Penalty(dt=0.01, penalty=1.0), "Impact with a step"),
+    ],
+)
+def test_a_method_that_cannot_serve_bodies_says_so(method, said):
+    with pytest.raises(swarm.SceneError, match=said):
+        swarm.simulate(swarm.Scene(SPHERE), some("dumbbell", SPHERE, 2), method, until=1.0)
+
+
+def test_a_point_outside_at_the_start_is_named():
+    body = swarm.dumbbell(0.1, 1.0)
+    start = swarm.Bodies(body, (body.points + [0.49, 0.0, 0.0]).T[:, :, None], np.zeros((3, 2, 1)))
+    with pytest.raises(swarm.SceneError, match="must start inside"):
+        run(start, SPHERE, 1.0)
