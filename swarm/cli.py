@@ -190,7 +190,7 @@ def record(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
 ) -> None:
     """Make a Rerun recording of a trajectory."""
-    from .output.sources import needed_by
+    from .extras import needed_by
 
     with needed_by("a recording", "record"):
         from .output import recording
@@ -221,7 +221,7 @@ def view(
     ] = None,
 ) -> None:
     """Draw a contact sheet of a recording; no screen and no GPU are needed."""
-    from .output.sources import needed_by
+    from .extras import needed_by
 
     with needed_by("a contact sheet", "record"):
         from .output.playback import Playback
@@ -242,7 +242,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
-    from .output.sources import needed_by
+    from .extras import needed_by
 
     with needed_by("a plot", "plot"):
         from .output import plots

@@ -63,7 +63,7 @@ def of_trajectory(file: Path) -> dict[str, str]:
 
 def of_recording(file: Path, repair: bool) -> dict[str, str]:
     """What a recording holds; `repair` repairs it first."""
-    from .output.sources import needed_by
+    from .extras import needed_by
 
     with needed_by("a recording", "record"):
         from .output import playback

@@ -19,7 +19,7 @@ def ties_of(body: Body) -> Ties:
         stiffness[row], rest[row] = k, length
     if body.strain is not None:
         rest[links + springs :] = body.strain.rest
-        compliance = 2.0 * np.linalg.inv(body.strain.stiffness)
+        compliance = np.asarray(2.0 * np.linalg.inv(body.strain.stiffness), dtype=np.float64)
     is_free = np.ones(len(body), np.bool_)
     is_free[list(body.anchors)] = False
     free = np.flatnonzero(is_free)

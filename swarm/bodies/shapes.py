@@ -134,7 +134,7 @@ def _flat(corners: Floats) -> SceneError:
 
 def _hull(corners: Floats) -> Pairs:
     """The triangles of the convex hull, anticlockwise seen from outside."""
-    from ..output.sources import needed_by
+    from ..extras import needed_by
 
     with needed_by("a rigid body without faces", "bodies"):
         from scipy.spatial import ConvexHull, QhullError

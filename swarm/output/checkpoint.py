@@ -156,13 +156,16 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
     with _reading(path):
         if arrays.keys() != run.keys():
             raise ValueError(f"expected the arrays {sorted(run)}, got {sorted(arrays)}")
-        left = arrays["halted.particle"].shape[-1:]
+        # Bodies leave nothing in lanes.
+        left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
         for name, mine in run.items():
             shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
             if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
                 raise ValueError(
                     f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
                 )
+        if "halted.particle" not in run:
+            return
         particles = arrays["halted.particle"]
         bounded = np.concatenate([[-1], particles, [len(run["mass"])]])
         if (np.diff(bounded) <= 0).any():

@@ -1,9 +1,7 @@
-"""Errors of files that are read, missing, of another kind or damaged, and of optional packages that are missing."""
+"""Errors of files that are read, missing, of another kind or damaged."""
 
-import contextlib
 import re
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import SceneError
@@ -12,7 +10,6 @@ from ..errors import SceneError
 # LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
 # RuntimeError.
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError)
-_PACKAGES = {"record": "rerun-sdk scikit-image contourpy", "plot": "matplotlib scikit-image", "bodies": "scipy"}
 
 
 class DamagedError(SceneError):
@@ -43,16 +40,3 @@ def reason(error: BaseException | None) -> str:
         found = re.fullmatch(pattern, message)
         message = found.group(1) if found else message
     return message
-
-
-@contextlib.contextmanager
-def needed_by(what: str, extra: str) -> Iterator[None]:
-    """Imports in this context raise a SceneError that says what to install."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if str(error.name).startswith("swarm"):
-            raise
-        raise SceneError(
-            f"{what} needs the package {error.name!r}, which is not installed: pip install {_PACKAGES[extra]}"
-        ) from error

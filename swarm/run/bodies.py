@@ -132,8 +132,8 @@ class BodyRun:
         sentence = f"the frame at {moment:g} s failed at body {number}, at {time_of:.6g} s: "
         if status == Status.UNSOLVED:
             return sentence + (
-                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s, from lengths that are off "
-                f"by {self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
+                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; lengths at its start "
+                f"are off by {self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
             )
         return sentence + (
             "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"

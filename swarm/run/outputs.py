@@ -20,7 +20,7 @@ def recorder_of(task: Task) -> "Writer | None":
             "recording and live cannot continue a run that was stopped; leave them out, and make the recording from "
             "the trajectory: swarm record RUN.h5 -o OUT.rrd"
         )
-    from ..output.sources import needed_by
+    from ..extras import needed_by
 
     with needed_by("a recording", "record"):
         from ..output.recording import RecordingWriter, Settings  # rerun takes half a second

@@ -70,7 +70,7 @@ def test_the_blow_of_a_rod_that_meets_a_plane(restitution):
     tilt, m, speed = 0.6, 1.0, 1.0
     ends = 0.05 * np.array([[-np.cos(tilt), 0.0, -np.sin(tilt)], [np.cos(tilt), 0.0, np.sin(tilt)]])
     body = swarm.Body(ends, mass=m, links=[(0, 1)])
-    position = (ends + [0.0, 0.0, 0.05]).T[:, :, None]
+    position = (ends + np.array([0.0, 0.0, 0.05])).T[:, :, None]
     velocity = np.zeros((3, 2, 1))
     velocity[2] = -speed
     plane = [swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=restitution)]
@@ -182,6 +182,6 @@ def test_a_method_that_cannot_serve_bodies_says_so(method, said):
 
 def test_a_point_outside_at_the_start_is_named():
     body = swarm.dumbbell(0.1, 1.0)
-    start = swarm.Bodies(body, (body.points + [0.49, 0.0, 0.0]).T[:, :, None], np.zeros((3, 2, 1)))
+    start = swarm.Bodies(body, (body.points + np.array([0.49, 0.0, 0.0])).T[:, :, None], np.zeros((3, 2, 1)))
     with pytest.raises(swarm.SceneError, match="must start inside"):
         run(start, SPHERE, 1.0)
