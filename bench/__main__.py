@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, compare, contacts, endurance, report, scenes, stability, throughput
+from . import accuracy, bars, bodies, compare, contacts, endurance, report, scenes, stability, throughput
 from .peers import race
 
 
@@ -22,6 +22,7 @@ def main() -> None:
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
     commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
+    commands.add_parser("bodies", help="a step and an impact of bodies of several points, and what they conserve")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -40,6 +41,7 @@ def main() -> None:
         "peers": race,
         "scenes": scenes,
         "contacts": contacts,
+        "bodies": bodies,
         "endurance": endurance,
     }
     before = report.stolen()

@@ -75,6 +75,13 @@ def test_contacts_quick():
 
 
 @pytest.mark.long
+def test_bodies_quick():
+    told = printed("bodies")
+    for row in ("chain of ten, a step, two threads", "tetrahedron in a sphere, link error"):
+        assert row in told
+
+
+@pytest.mark.long
 def test_accuracy_quick():
     told = printed("accuracy")
     assert "sphere: Choose Impact" in told

@@ -1,0 +1,114 @@
+"""Bodies: nanoseconds a step and an impact, and what is conserved, each figure beside its bar."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import swarm
+
+from .report import Row, in_turn, show, write
+
+COUNT, DT, SPEED, SPIN = 10_000, 5e-3, 0.5, 2.0
+# Steps that are timed, and how long impacts are counted and figures conserved [s].
+_STEPS, _LONG = 100, 200.0
+# A cavity so wide that nothing is hit.
+_FAR, _NEAR = 1000.0, 0.5
+# Bars of a step without contact [ns].
+_BARS = {"dumbbell": "60", "tetrahedron": "400", "chain of ten": "1000"}
+
+
+def makers() -> dict[str, Callable[[], swarm.Body]]:
+    """The bodies by name."""
+    return {
+        "dumbbell": lambda: swarm.dumbbell(0.1, 2.0),
+        "tetrahedron": lambda: swarm.tetrahedron(0.1, 4.0),
+        "chain of ten": lambda: swarm.chain(10, 0.2, 10.0),
+    }
+
+
+def _start(body: swarm.Body, radius: float, count: int) -> tuple[swarm.Scene, swarm.Bodies]:
+    scene = swarm.Scene([swarm.Sphere(radius)])
+    return scene, swarm.place(scene, body, count, speed=SPEED, spin=SPIN, seed=0)
+
+
+def _run(scene: swarm.Scene, bodies: swarm.Bodies, until: float, threads: int, order: int = 2) -> swarm.Result:
+    method = swarm.Impact(dt=DT, order=order)
+    return swarm.simulate(scene, bodies, method, until=until, threads=threads, progress=False, compile="always")
+
+
+def _nanoseconds(scene: swarm.Scene, bodies: swarm.Bodies, steps: int, threads: int, order: int) -> Callable[[], float]:
+    """A measurement: nanoseconds a step; what a run costs besides is measured by a run of one step."""
+
+    def measure() -> float:
+        seconds = []
+        for many in (steps + 1, 1):
+            start = time.perf_counter()
+            _run(scene, bodies, many * DT, threads, order)
+            seconds.append(time.perf_counter() - start)
+        return 1e9 * (seconds[0] - seconds[1]) / steps / len(bodies)
+
+    return measure
+
+
+def steps(name: str, quick: bool) -> list[Row]:
+    """A step without contact, with one thread and two, and composed."""
+    count = 64 if quick else COUNT
+    scene, bodies = _start(makers()[name](), _FAR, count)
+    _run(scene, bodies, DT, 1)
+    _run(scene, bodies, DT, 1, 4)
+    many = 2 if quick else _STEPS
+    ways = {"one thread": (1, 2), "two threads": (2, 2), "of fourth order": (1, 4)}
+    figures = in_turn({way: _nanoseconds(scene, bodies, many, *how) for way, how in ways.items()}, 1 if quick else 5)
+    seen = _run(scene, bodies, many * DT, 2).observables
+    rows = [Row(f"{name}, a step, {way}", *figures[way], "ns", _BARS[name] * (way == "one thread")) for way in ways]
+    gain = figures["one thread"][0] / figures["two threads"][0]
+    rows.append(Row(f"  {name}, two threads are faster by", gain, gain, "", "1.5"))
+    for what in ("energy_error", "link_error"):
+        worst = float(seen[what].max())
+        rows.append(Row(f"  {name}, {what.replace('_', ' ')}", worst, worst, ""))
+    return rows
+
+
+def impacts(name: str, quick: bool) -> list[Row]:
+    """What an impact costs beyond the steps, and what a long run with impacts conserves."""
+    count, until = (16, 1.0) if quick else (1_000, _LONG)
+    body = makers()[name]()
+    (near, bodies), (far, apart) = _start(body, _NEAR, count), _start(body, _FAR, count)
+    seconds = []
+    for scene, start in ((far, apart), (near, bodies)):
+        _run(scene, start, DT, 1)
+        begin = time.perf_counter()
+        end = _run(scene, start, until, 1)
+        seconds.append(time.perf_counter() - begin)
+    seen = end.observables
+    hits = float(seen["impacts"][-1])
+    extra = 1e9 * (seconds[1] - seconds[0]) / max(hits, 1.0)
+    step = 1e9 * seconds[0] / (until / DT) / count
+    spin = seen["angular_momentum"]
+    turned = float(np.abs(spin[-1] - spin[0]).max() / np.abs(spin[0]).max())
+    told = {
+        "impacts of a body": (hits / count, ""),
+        "an impact, with the search for its instant": (extra, "ns"),
+        "an impact, in steps without contact": (extra / step, "steps"),
+        "energy error": (float(seen["energy_error"].max()), ""),
+        "link error": (float(seen["link_error"].max()), ""),
+        "change of the angular momentum": (turned, ""),
+        "largest penetration": (float(seen["max_penetration"].max()), "m"),
+    }
+    bars = {"energy error": "1e-12", "link error": "1e-13", "change of the angular momentum": "1e-11"}
+    return [
+        Row(f"{name} in a sphere, {what}", one, one, unit, bars.get(what, "")) for what, (one, unit) in told.items()
+    ]
+
+
+def main(quick: bool) -> None:
+    """Measure, print, and write the table of this machine."""
+    rows = []
+    for name in makers():
+        rows += steps(name, quick)
+    for name in ("dumbbell", "tetrahedron"):
+        rows += impacts(name, quick)
+    show(rows)
+    if not quick:
+        write(rows, "bodies")
