@@ -156,7 +156,7 @@ TURNED = {
 
 def is_made_again(surface):
     table = tomllib.loads(tomli_w.dumps(tables.table_of(surface)))
-    for again in (eval(repr(surface), vars(swarm)), tables._from_table(table, "surface", ALL_SURFACES)):
+    for again in (eval(repr(surface), vars(swarm)), tables.of_kind(table, "surface", ALL_SURFACES)):
         assert again == surface
         assert hash(again) == hash(surface)
         assert [wall[1:] for wall in again.walls()] == [wall[1:] for wall in surface.walls()]
