@@ -13,7 +13,7 @@ COUNT, DT, SPEED, SPIN = 10_000, 5e-3, 0.5, 2.0
 # Steps that are timed, and how long impacts are counted and figures conserved [s].
 _STEPS, _LONG = 100, 200.0
 # A cavity so wide that nothing is hit.
-_FAR, _NEAR = 20.0, 0.5
+_FAR, _NEAR = 100.0, 0.5
 # Bars of a step without contact [ns].
 _BARS = {"dumbbell": "60", "tetrahedron": "400", "chain of ten": "1000"}
 
