@@ -42,6 +42,11 @@ class Led(NamedTuple):
         # cos a - 1 = -2 sin^2(a/2) has no cancellation.
         return np.asarray(start + velocity * t - cosine * (2.0 * half * half) + sine * np.sin(self.rate * t))
 
+    def velocity_at(self, time: float) -> Floats:
+        """Its velocity (3,) at a time [s]."""
+        angle = self.rate * time
+        return self.velocity + self.rate * (self.sine * math.cos(angle) - self.cosine * math.sin(angle))
+
 
 @dataclass(frozen=True)
 class Translation:

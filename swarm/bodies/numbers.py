@@ -5,7 +5,9 @@ import numpy as np
 from ..lanes.tied.arrays import Ties, Touching
 from ..particles import Floats
 from ..scene import Scene
+from ..surfaces.surface import Surface
 from .body import Body
+from .checked import Pairs
 
 
 def ties_of(body: Body) -> Ties:
@@ -26,30 +28,53 @@ def ties_of(body: Body) -> Ties:
     inverse = np.zeros((len(body), len(body)))
     inverse[np.ix_(free, free)] = np.linalg.inv(body.mass_matrix[np.ix_(free, free)])
     is_diagonal = bool((inverse == np.diag(np.diag(inverse))).all())
-    beta = np.zeros((len(ends), len(body)))
-    for row, (i, j) in enumerate(ends):
-        beta[row, i], beta[row, j] = 1.0, -1.0
-    couplings = beta @ inverse @ beta.T
-    filled = couplings != 0.0
-    filled[links + springs :, links + springs :] = True
+    rows = np.concatenate([_differences(ends, len(body)), _combinations(body)])
+    couplings = rows @ inverse @ rows.T
+    ties = len(ends)
+    held = [*range(ties), *range(ties + len(body.contacts), ties + len(body.contacts) + len(body.guides))]
+    filled = couplings[np.ix_(held, held)] != 0.0
+    filled[links + springs : ties, links + springs : ties] = True
     start = np.array([np.flatnonzero(row[: k + 1]).min(initial=k) for k, row in enumerate(filled)], np.int64)
+    led = np.full(len(body), -1)
+    led[led_points(body)] = np.arange(len(led_points(body)))
     return Ties(
         ends, links, springs, rest, stiffness, compliance, start, inverse, body.mass_matrix, is_diagonal, is_free,
-        couplings,
+        led, couplings,
     )  # fmt: skip
 
 
+def led_points(body: Body) -> list[int]:
+    """The points that have a path."""
+    return [point for point, motion in body.anchors.items() if motion is not None]
+
+
+def _differences(ends: Pairs, points: int) -> Floats:
+    """(rows, P) +1 at the first point of each pair, -1 at the second."""
+    rows = np.zeros((len(ends), points))
+    every = np.arange(len(ends))
+    rows[every, ends[:, 0]], rows[every, ends[:, 1]] = 1.0, -1.0
+    return rows
+
+
+def _combinations(body: Body) -> Floats:
+    """(K + G + C, P) contact points, points in guides, and points relative to the carriers of their cavities."""
+    held = np.eye(len(body))[[point for point, _surface in body.guides]]
+    carried = np.array([(point, carrier) for _surface, carrier, point in body.cavities], np.int64).reshape(-1, 2)
+    return np.concatenate([body.contacts, held, _differences(carried, len(body))])
+
+
+def own_surfaces(body: Body) -> list[Surface]:
+    """The surfaces of its guides and cavities."""
+    return [surface for _point, surface in body.guides] + [surface for surface, _carrier, _point in body.cavities]
+
+
 def touching_of(body: Body, ties: Ties, scene: Scene) -> Touching:
-    """Its points that may touch the walls of a scene."""
-    b, owners = body.contacts, scene.owners()
-    single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1) == 1.0)
+    """Its points that may touch the walls of a scene, or those of its own guides and cavities."""
+    b = _combinations(body)
+    single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)
-    reach = b @ ties.inverse_mass
-    beta = np.zeros((len(ties.ends), len(body)))
-    for row, (i, j) in enumerate(ties.ends):
-        beta[row, i], beta[row, j] = 1.0, -1.0
+    surfaces = [scene.surfaces[i] for i in scene.owners()] + own_surfaces(body)
     return Touching(
-        b, plain, reach, reach @ beta.T, reach @ b.T,
-        np.array([scene.surfaces[i].restitution for i in owners]),
-        np.array([scene.surfaces[i].friction for i in owners]),
+        b, plain, b @ ties.inverse_mass, len(body.contacts), len(scene.owners()), len(body.guides),
+        np.array([surface.restitution for surface in surfaces]), np.array([surface.friction for surface in surfaces]),
     )  # fmt: skip

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..bodies.body import Body
 from ..bodies.state import Bodies
 from ..errors import SceneError
 from ..methods import Impact
 from ..methods.base import Method, check_surfaces
+from ..motion import led
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
@@ -61,22 +61,32 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
-    _require_known(bodies.body)
+    _lead(bodies)
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled(scene.surfaces)
-    _require_inside(scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2))))
+    if len(bodies.body.contacts):
+        _require_inside(
+            scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2)))
+        )
     return Task(scene, bodies.particles(), method, options, bodies)
 
 
-def _require_known(body: Body) -> None:
-    """Raise a SceneError where a body has what no kernel knows yet."""
-    for name, given in (("guides", body.guides), ("cavities", body.cavities)):
-        if given:
-            raise SceneError(f"{name} of a body must be empty in a run, got {len(given)}: no method knows them yet")
+def _lead(bodies: Bodies) -> None:
+    """Give anchored points the velocity of their paths."""
+    body = bodies.body
     for point, motion in body.anchors.items():
-        if motion is not None:
-            raise SceneError(f"anchors[{point}] must be None, fixed in space, in a run, got {motion}: none is led yet")
+        for k in range(len(bodies)):
+            bodies.velocity[:, point, k] = led(motion, bodies.position[:, point, k]).velocity_at(0.0)
+        coupled = np.flatnonzero(body.mass_matrix[point])
+        if motion is not None and not set(coupled.tolist()) <= set(body.anchors):
+            raise SceneError(
+                f"anchors[{point}] must be None, fixed in space, or its point have no mass coupling with points that "
+                f"can move, got {motion} and a mass_matrix with couplings of point {point} to points {coupled.tolist()}"
+            )
+    for k, (_point, surface) in enumerate(body.guides):
+        if surface.friction > 0.0:
+            raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

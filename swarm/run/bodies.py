@@ -2,13 +2,14 @@
 
 import math
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.numbers import ties_of, touching_of
+from ..bodies.numbers import led_points, own_surfaces, ties_of, touching_of
 from ..bodies.state import Bodies
 from ..errors import RunError
 from ..lanes.tied.advance import advance_bodies
@@ -17,6 +18,7 @@ from ..methods import Impact
 from ..particles import Particles, State
 from ..scene import Scene
 from ..status import Status
+from ..surfaces.fold import chain_of
 from .tiers import Tier
 
 # Round-off of a position on a wall, as a part of the scene's size.
@@ -48,12 +50,14 @@ class BodyRun:
         self._owners = scene.owners()
         self._ties = ties_of(bodies.body)
         self._touching = touching_of(bodies.body, self._ties, scene)
-        rows = len(self._ties.ends)
+        own = own_surfaces(bodies.body)
+        self._chains = scene.chain(), chain_of([*scene.surfaces, *own])
+        rows, walls = len(self._ties.ends) + len(bodies.body.guides), walls + len(own)
         shape = 3, points, n
         self._bodies = BodyState(
             particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), np.zeros((2, rows, n)),
-            np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros((walls, n)), np.zeros(n),
-            np.zeros(n), np.zeros(n, np.int64),
+            self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
+            np.zeros((walls, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
         )  # fmt: skip
         none = np.zeros(0)
         impacts = np.zeros(points * n, np.int64)
@@ -64,24 +68,28 @@ class BodyRun:
         )  # fmt: skip
         size = scene.finite_size()
         self._deepest = _OUTSIDE * size
-        self._tier = Tier(compile, (scene.chain(),), n * points)
+        # Sines of two libraries differ in the last bit.
+        choice = "always" if compile == "auto" and led_points(bodies.body) else compile
+        self._tier = Tier(choice, self._chains, n * points)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 40)
-        lanes = 1 if self._tier.is_plain else max(1, min(_MOST_LANES, _STACK // per_lane))
+        most = max(1, min(_MOST_LANES, _STACK // per_lane, n))
+        lanes = 1 if self._tier.is_plain else most
         room = _ROUND_OFF * max(size, scene.extent())
         noise = room / math.sqrt(min([*self._ties.rest[: self._ties.links], size * size]))
         gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
-        self._rule = Rule(method.dt, np.array(STAGES[method.order]), gravity, room, noise, lanes)
+        self._rule = Rule(method.dt, np.array(STAGES[method.order]), gravity, 0.0, room, noise, lanes)
         self._size = max(1, block_size or _AT_ONCE)
         self._halt = np.full(1, _NEVER)
         self._threads = min(threads, math.ceil(n / self._size))
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._cut_short = False
+        self._led_start = self._led_energy()
         self._start = self._energies()
         self._scale = np.maximum(np.abs(self._start), self._kinetic()) + self._fall_scale()
         self._seen: dict[str, Any] = {}
         self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
         if not self._tier.is_plain and lanes == 1:
-            self._rule = self._rule._replace(lanes=max(1, min(_MOST_LANES, _STACK // per_lane)))
+            self._rule = self._rule._replace(lanes=most)
 
     def __enter__(self) -> "BodyRun":
         return self
@@ -96,12 +104,13 @@ class BodyRun:
 
     def _arguments(self, ticket: NDArray[np.int64]) -> tuple[Any, ...]:
         both = self._ties, self._touching
-        return both, self._scene.chain(), self._rule, self._bodies, ticket, self._size, self._halt
+        return both, self._chains, self._rule, self._bodies, ticket, self._size, self._halt
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every body by `span` [s] and observe it: whether the frame is done, as `engine.Run.advance`."""
         if not self._cut_short:
             self._bodies.left.fill(span)
+        self._rule = self._rule._replace(end=moment)
         if self._tier.is_plain and self._tier.left < math.inf:
             self._tier.left = 0.0
             self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
@@ -173,6 +182,24 @@ class BodyRun:
     def _energies(self) -> NDArray[np.float64]:
         return self._kinetic() + self._fall() + self._elastic()
 
+    def _led_energy(self) -> NDArray[np.float64]:
+        """Kinetic and potential energy of led points themselves."""
+        led = led_points(self._body)
+        r, v, mass = self._bodies.position[:, led], self._bodies.velocity[:, led], self._ties.mass[np.ix_(led, led)]
+        moving = np.tensordot(mass, v, axes=(1, 1)).transpose(1, 0, 2)
+        fall = np.tensordot(mass.sum(axis=1), r, axes=(0, 1))
+        return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - self._rule.gravity @ fall)
+
+    def _paths(self, bodies: Bodies) -> NDArray[np.float64]:
+        """(A, 13, n) start, velocity, cosine, sine and rate of each led point of each copy."""
+        anchors = bodies.body.anchors
+        paths = [
+            [anchors[q].harmonic(start) for start in bodies.position[:, q].T]  # type: ignore[union-attr]
+            for q in led_points(bodies.body)
+        ]
+        rows = np.array([[np.hstack(path) for path in copies] for copies in paths]).reshape(-1, len(bodies), 13)
+        return np.ascontiguousarray(rows.transpose(0, 2, 1))
+
     def _link_error(self) -> float:
         r, links = self._bodies.position, self._ties.links
         ends, rest = self._ties.ends[:links], self._ties.rest[:links, None]
@@ -181,18 +208,27 @@ class BodyRun:
         length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
         return float(0.5 * np.abs(length2 / rest - 1.0).max())
 
+    def _out_of_own(self) -> Iterator[NDArray[np.float64]]:
+        """How far points are out of the cavities that others carry."""
+        r = self._bodies.position
+        for surface, carrier, point in self._body.cavities:
+            yield Scene([surface]).distances_outside(r[:, point] - r[:, carrier])
+
     def observe(self) -> None:
         """Observe the bodies as they are."""
         state, bodies = self.state, self._bodies
         kinetic, fall, elastic = self._kinetic(), self._fall(), self._elastic()
-        error = np.abs(kinetic + fall + elastic + bodies.dissipated - self._start)
+        work = bodies.work + self._led_energy() - self._led_start
+        error = np.abs(kinetic + fall + elastic + bodies.dissipated - work - self._start)
         scaled = np.divide(error, self._scale, out=np.zeros_like(error), where=self._scale > 0.0)
         state.impacts[:] = np.tile(bodies.impacts, len(self._body))
         momentum = np.tensordot(self._ties.mass, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
         spin = np.cross(bodies.position, momentum, axis=0).sum(axis=(1, 2))
         points = np.tensordot(self._body.contacts, bodies.position, axes=(1, 1)).transpose(1, 0, 2)
         depth = self._scene.distances_outside(points.reshape(3, -1)).max(initial=0.0)
-        impulse = np.bincount(self._owners, weights=bodies.impulse.sum(axis=1), minlength=len(self._scene.surfaces))
+        depth = max(depth, *(out.max() for out in self._out_of_own()), 0.0)
+        pushed, walls = bodies.impulse.sum(axis=1), len(self._owners)
+        impulse = np.bincount(self._owners, weights=pushed[:walls], minlength=len(self._scene.surfaces))
         self._seen = {
             "kinetic_energy": float(kinetic.sum()),
             "potential_energy": float(fall.sum()),
@@ -202,7 +238,7 @@ class BodyRun:
             "energy_error": float(scaled.max()),
             "momentum": momentum.sum(axis=(1, 2)),
             "angular_momentum": spin,
-            "max_penetration": float(max(depth, 0.0)),
+            "max_penetration": float(depth),
             "impacts": int(bodies.impacts.sum()),
             "impulse": impulse,
             "sliding": int(np.count_nonzero(bodies.lasting)),
@@ -211,6 +247,7 @@ class BodyRun:
             "unconverged": 0,
             "escaped": 0,
             "link_error": self._link_error(),
+            "work": float(work.sum()),
         }
 
     def seen(self) -> dict[str, Any]:

@@ -8,9 +8,10 @@ from ...kernel.jit import inlined, kernel, next_of, scratch, select
 from ...kernel.vector import Vec
 from ...status import Status
 from ...surfaces import fold as walls
-from . import blow, hold
+from . import blow, hold, instant, lead
 from .arrays import Held, Lanes, Pace
-from .ties import solve
+from .contacts import MOST_CONTACTS, point_of
+from .stage import solve
 
 # A step longer than the frame that is left by this part is the last of it.
 _SAME = 1.0 + 1e-9
@@ -23,16 +24,17 @@ _LASTS = 20
 
 
 @kernel
-def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR0915  the lanes are made here
-    """Advance all bodies that this thread draws: (status, number of the body)."""
-    ties, touching = body
-    points, rows, count = state.position.shape[1], ties.ends.shape[0], rule.lanes
+def advance_bodies(body, chains, rule, state, ticket, size, halt):
+    """Advance all bodies that this thread draws: (status, number of the body).
+
+    `chains` are the walls of the scene, and those with the walls of the body's own guides and cavities after them.
+    """
+    points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
     lanes = Lanes(
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
         scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
-        scratch((points, 3, count), np.float64),
         scratch((rows, 3, count), np.float64), scratch((rows, 3, count), np.float64),
         scratch((rows, 3, count), np.float64), scratch((rows, rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
@@ -43,13 +45,16 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
+        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_),
         scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64),
-        scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.bool_),
+        scratch(count, np.int64), scratch(count, np.bool_), scratch(count, np.int64), scratch(count, np.bool_),
+        scratch(count, np.bool_), scratch(count, np.float64),
     )  # fmt: skip
     held = Held(
-        scratch((count, blow.MOST_CONTACTS, 2), np.int64), scratch((count, blow.MOST_CONTACTS, 3, 3), np.float64),
-        scratch((count, 3 * blow.MOST_CONTACTS), np.float64),
+        scratch((count, MOST_CONTACTS, 2), np.int64), scratch((count, MOST_CONTACTS, 3, 3), np.float64),
+        scratch((count, 3 * MOST_CONTACTS), np.float64), scratch((count, MOST_CONTACTS), np.float64),
+        scratch((count, MOST_CONTACTS), np.int64), scratch(count, np.float64),
     )  # fmt: skip
     c = scratch((3, count), np.float64)
     for i in range(count):
@@ -66,73 +71,82 @@ def advance_bodies(body, chain, rule, state, ticket, size, halt):  # noqa: PLR09
                         begin, end = -1, -1
                         break
                 if state.left[begin] > 0.0:
-                    _load(state, lanes, pace, i, begin)
+                    _load(state, lanes, (pace, held), i, begin)
                 begin += 1
             live += pace.body[i] >= 0
         if live == 0:
             return Status.DONE, 0
         if passes >= halt[0]:
-            for i in range(count):
-                if pace.body[i] >= 0:
-                    _store(state, lanes, pace, i)
+            _store_all(state, lanes, pace)
             return Status.INTERRUPTED, 0
         passes += 1
+        _try(body, chains[1], rule, state, lanes, (pace, held))
+        _look(body[1], chains, lanes, pace, c)
         for i in range(count):
-            if pace.held[i] > 0 and pace.fresh[i]:
-                hold.begin(touching, chain, rule, lanes, pace, held, i)
-        _try(ties, rule, lanes, pace)
-        _look(touching, chain, lanes, pace, c)
-        for i in range(count):
-            pace.action[i] = blow.COMMIT if pace.body[i] >= 0 else blow.AGAIN
-            pace.fresh[i] = False
-            settles = pace.held[i] > 0 and pace.solved[i]
-            if settles and not hold.press(ties, touching, chain, rule, lanes, (pace, held), i):
-                pace.stuck[i] += 1
-                pace.action[i] = blow.AGAIN
-            elif pace.body[i] >= 0 and (pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]):
-                pace.action[i] = blow.judge(touching, chain, rule, lanes, pace, i, 2.0 * hold.tolerated(rule, pace, i))
-            if pace.body[i] >= 0 and (pace.action[i] == blow.FAILED or pace.stuck[i] > _STUCK):
-                status = Status.UNSOLVED if pace.action[i] == blow.FAILED else Status.STALLED
+            pace.action[i] = _judge(body[1], chains[1], rule, lanes, (pace, held), i)
+            if pace.body[i] >= 0 and (pace.action[i] == instant.FAILED or pace.stuck[i] > _STUCK):
+                status = Status.UNSOLVED if pace.action[i] == instant.FAILED else Status.STALLED
                 number = pace.body[i]
-                for j in range(count):
-                    if pace.body[j] >= 0:
-                        _store(state, lanes, pace, j)
+                _store_all(state, lanes, pace)
                 return status, number
         _commit(lanes, pace, rule.dt)
         for i in range(count):
-            action = pace.action[i]
-            if action != blow.AGAIN:
-                number = pace.body[i]
-                if action != blow.STRIKE_NOW:
-                    state.steps[number] += 1
-                    pace.stuck[i] = 0
-                if pace.held[i] > 0 and action != blow.STRIKE_NOW:
-                    hold.end(touching, lanes, pace, held, state, i)
-                if action != blow.COMMIT:
-                    short = action == blow.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
-                    state.short[number] = state.short[number] + 1 if short else 0
-                    blows = blow.strike(ties, touching, chain, rule, lanes, state, i, number)
-                    if (action == blow.STRIKE_NOW and blows == 0) or pace.stuck[i] > _LASTS:
-                        pace.held[i] = 1
-                    for a in range(rows):
-                        lanes.before[a, i] = lanes.recent[a, i]
-                pace.fresh[i] = True
-                pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
+            if pace.action[i] != instant.AGAIN:
+                _finish(body, chains[1], rule, state, lanes, (pace, held), i)
                 if pace.left[i] <= 0.0:
                     _store(state, lanes, pace, i)
                     pace.body[i] = -1
 
 
 @inlined
-def _load(state, lanes, pace, i, number):
+def _judge(touching, chain, rule, lanes, paces, i):
+    """What becomes of a lane after its trial."""
+    pace, _held = paces
+    pace.fresh[i] = False
+    if pace.body[i] < 0:
+        return instant.AGAIN
+    if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and hold.is_mixed(paces, i, rule.stages.size):
+        pace.whole[i] = True
+        return instant.AGAIN
+    if pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]:
+        return instant.judge(touching, chain, rule, lanes, pace, i, 2.0 * hold.ROOM * rule.room)
+    return instant.COMMIT
+
+
+@inlined
+def _finish(body, chain, rule, state, lanes, paces, i):
+    """After a step, or a blow."""
+    pace, _held = paces
+    number, action = pace.body[i], pace.action[i]
+    if action != instant.STRIKE_NOW:
+        state.steps[number] += 1
+        state.work[number] += pace.work[i]
+        pace.stuck[i] = 0
+        if pace.lasts[i]:
+            hold.end(paces, state, i)
+    if action != instant.COMMIT:
+        short = action == instant.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
+        state.short[number] = state.short[number] + 1 if short else 0
+        blows = blow.strike(body, chain, rule, lanes, state, i, number)
+        if (action == instant.STRIKE_NOW and blows == 0) or pace.stuck[i] > _LASTS:
+            pace.lasts[i] = True
+        for a in range(lanes.recent.shape[0]):
+            lanes.before[a, i] = lanes.recent[a, i]
+    pace.fresh[i], pace.whole[i] = True, False
+    pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
+
+
+@inlined
+def _load(state, lanes, paces, i, number):
     """Take a body into a lane."""
+    pace, _held = paces
     pace.body[i], pace.left[i], pace.stuck[i] = number, state.left[number], 0
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i], pace.point[i] = 0.0, 0.0, math.inf, -1, -1
-    pace.held[i], pace.fresh[i] = state.lasting[number], True
+    pace.lasts[i], pace.held[i] = state.lasting[number] == 1, 0
+    pace.fresh[i], pace.whole[i] = True, False
     for q in range(lanes.r.shape[0]):
         for x in range(3):
             lanes.r[q, x, i], lanes.v[q, x, i] = state.position[x, q, number], state.velocity[x, q, number]
-            lanes.load[q, x, i] = 0.0
     for a in range(lanes.f.shape[0]):
         lanes.recent[a, i], lanes.before[a, i] = state.guess[0, a, number], state.guess[1, a, number]
 
@@ -142,7 +156,7 @@ def _store(state, lanes, pace, i):
     """Give the body of a lane back, as it is at the start of its step."""
     number = pace.body[i]
     state.left[number] = pace.left[i]
-    state.lasting[number] = 1 if pace.held[i] > 0 else 0
+    state.lasting[number] = 1 if pace.lasts[i] else 0
     for q in range(lanes.r.shape[0]):
         for x in range(3):
             state.position[x, q, number], state.velocity[x, q, number] = lanes.r[q, x, i], lanes.v[q, x, i]
@@ -151,21 +165,37 @@ def _store(state, lanes, pace, i):
 
 
 @inlined
-def _try(ties, rule, lanes, pace):
+def _store_all(state, lanes, pace):
+    for i in range(pace.body.size):
+        if pace.body[i] >= 0:
+            _store(state, lanes, pace, i)
+
+
+@inlined
+def _try(body, chain, rule, state, lanes, paces):
     """The step of every lane, to r1 and v1."""
-    points, count = lanes.r.shape[0], lanes.r.shape[2]
+    tied = body[0]
+    pace, held = paces
+    points, count, stages = lanes.r.shape[0], lanes.r.shape[2], rule.stages.size
+    elapsed = 0.0
     for i in range(count):
         whole = select(pace.left[i] <= _SAME * rule.dt, pace.left[i], rule.dt)
         step = select(pace.trial[i] > 0.0, pace.trial[i], whole)
         pace.step[i] = select(pace.body[i] >= 0, step, 0.0)
+        pace.work[i] = 0.0
+    for i in range(count):
+        if pace.body[i] >= 0 and pace.lasts[i]:
+            if pace.fresh[i] or not pace.solved[i]:
+                hold.begin(body, chain, rule, lanes, paces, i)
+            hold.forget(held, i)
         pace.solved[i] = True
     for q in range(points):
         for x in range(3):
             for i in range(count):
                 lanes.ra[q, x, i], lanes.va[q, x, i] = lanes.r[q, x, i], lanes.v[q, x, i]
                 lanes.r1[q, x, i] = lanes.r[q, x, i]
-    single = rule.stages.size == 1
-    for stage in range(rule.stages.size):
+    single = stages == 1
+    for stage in range(stages):
         part = rule.stages[stage]
         for a in range(lanes.f.shape[0]):
             for i in range(count):
@@ -173,24 +203,34 @@ def _try(ties, rule, lanes, pace):
                 lanes.multiplier[a, i] = g + select(single, g - lanes.before[a, i], 0.0)
         for i in range(count):
             pace.h[i] = part * pace.step[i]
-            pace.done[i] = pace.body[i] < 0
-        solve(ties, rule.gravity, rule.noise, lanes, pace)
+        elapsed += part
+        for i in range(count):
+            if pace.whole[i]:
+                pace.h[i] = pace.step[i]
+        lead.lead(tied, rule, state, lanes, pace, elapsed)
+        for i in range(count):
+            pace.done[i] = (pace.body[i] < 0) | (pace.whole[i] & (stage < stages - 1))
+        solve(body, chain, rule, lanes, paces)
         for i in range(count):
             pace.solved[i] = pace.solved[i] & pace.done[i]
-        if stage + 1 < rule.stages.size:
+            if pace.held[i] > 0 and (not pace.whole[i] or stage == stages - 1):
+                hold.book(body[1], lanes, paces, i)
+        lead.book(body, lanes, paces, stage == stages - 1)
+        if stage + 1 < stages:
             for q in range(points):
                 for x in range(3):
                     for i in range(count):
-                        lanes.ra[q, x, i], lanes.va[q, x, i] = lanes.r1[q, x, i], lanes.v1[q, x, i]
+                        if not pace.whole[i]:
+                            lanes.ra[q, x, i], lanes.va[q, x, i] = lanes.r1[q, x, i], lanes.v1[q, x, i]
 
 
 @inlined
-def _look(touching, chain, lanes, pace, c):
+def _look(touching, chains, lanes, pace, c):
     """Which lanes end with a point outside."""
     count = pace.out.size
     for i in range(count):
         pace.out[i] = False
-    for k in range(touching.plain.size):
+    for k in range(touching.points):
         plain = touching.plain[k]
         if plain >= 0:
             for x in range(3):
@@ -207,7 +247,12 @@ def _look(touching, chain, lanes, pace, c):
                         for i in range(count):
                             c[x, i] += b * lanes.r1[q, x, i]
         for i in range(count):
-            pace.out[i] = pace.out[i] | walls.outside(chain, -1.0, Vec(c[0, i], c[1, i], c[2, i]))
+            pace.out[i] = pace.out[i] | walls.outside(chains[0], -1.0, Vec(c[0, i], c[1, i], c[2, i]))
+    # What a point carries is looked at one body after the other: a wall of thousands of bodies is none of theirs.
+    for k in range(touching.points + touching.guides, touching.plain.size):
+        wall = float(touching.walls + k - touching.points)
+        for i in range(count):
+            pace.out[i] = pace.out[i] | (walls.distance(chains[1], wall, point_of(touching, lanes.r1, k, i)) > 0.0)
 
 
 @inlined
@@ -215,7 +260,7 @@ def _commit(lanes, pace, whole):
     """Take the trial as the step where it is one."""
     count = pace.out.size
     for i in range(count):
-        pace.done[i] = (pace.action[i] == blow.COMMIT) | (pace.action[i] == blow.STRIKE)
+        pace.done[i] = (pace.action[i] == instant.COMMIT) | (pace.action[i] == instant.STRIKE)
         left = pace.left[i] - pace.step[i]
         pace.left[i] = select(pace.done[i], select(left > 0.0, left, 0.0), pace.left[i])
     for q in range(lanes.r.shape[0]):

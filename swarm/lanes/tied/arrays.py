@@ -15,24 +15,30 @@ class Ties(NamedTuple):
     rest: Any  # (L,) |y|^2 of a link and of an edge without stress, the rest length of a spring
     stiffness: Any  # (L,) of springs
     compliance: Any  # (E, E) 2/K of the edges
-    start: Any  # (L,) the first column of each row of the system that is not 0
+    start: Any  # (L + G,) the first column of each row of the system that is not 0; guides come after the ties
     inverse_mass: Any  # (P, P) W = 1/M, without rows and columns of points that are fixed
     mass: Any  # (P, P) M
     is_diagonal: bool
     is_free: Any  # (P,) whether a point can move
-    couplings: Any  # (L, L) beta W beta, where beta is +1 at a and -1 at b
+    led: Any  # (P,) the row of its path, -1 for a point that is not led
+    couplings: Any  # (L + K + G + C, the same) b W b of ties, whose b is +1 at a and -1 at b, then of contact points
 
 
 class Touching(NamedTuple):
-    """The points that may touch walls, and what walls do to them."""
+    """The points that may touch walls, and what walls do to them.
 
-    coefficients: Any  # (K, P) b of c = sum b_p r_p
-    plain: Any  # (K,) the base point that it is, -1 for a combination of several
-    reach: Any  # (K, P) W b
-    to_ties: Any  # (K, L) beta W b
-    to_others: Any  # (K, K) b W b
-    restitution: Any  # (walls,)
-    friction: Any  # (walls,)
+    First K contact points, which meet every wall of the scene; then G points in guides and C in cavities that a point
+    carries, each at a surface of its own, the walls after those of the scene.
+    """
+
+    coefficients: Any  # (K + G + C, P) b of c = sum b_p r_p; of a cavity relative to its carrier
+    plain: Any  # (K + G + C,) the base point that it is, -1 for a combination of several
+    reach: Any  # (K + G + C, P) W b
+    points: int  # K
+    walls: int  # of the scene
+    guides: int  # G
+    restitution: Any  # (walls + G + C,)
+    friction: Any  # (walls + G + C,)
 
 
 class Rule(NamedTuple):
@@ -41,6 +47,7 @@ class Rule(NamedTuple):
     dt: float
     stages: Any  # (S,) lengths of the stages of a composed step, in units of the step
     gravity: Any  # (3,)
+    end: float  # of the frame [s]
     room: float  # round-off of a position on a wall [m]
     noise: float  # round-off of |y|^2 of the shortest tie, relative
     lanes: int  # how many bodies at once
@@ -52,12 +59,14 @@ class BodyState(NamedTuple):
     position: Any  # (3, P, n)
     velocity: Any  # (3, P, n)
     left: Any  # (n,) of the frame [s]
-    guess: Any  # (2, L, n) multipliers of the last two steps
+    guess: Any  # (2, L + G, n) multipliers of the last two steps
+    path: Any  # (A, 13, n) of led points: start, velocity, cosine, sine, rate
     short: Any  # (n,) short steps between impacts, one after the other
     lasting: Any  # (n,) int8, whether a contact lasts
     impacts: Any  # (n,)
     impulse: Any  # (walls, n) [N s]
     dissipated: Any  # (n,) [J]
+    work: Any  # (n,) of led points on what is tied to them [J]
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
 
@@ -73,16 +82,15 @@ class Lanes(NamedTuple):
     r1: Any  # at its end
     v1: Any
     force: Any  # (P, 3, B) deceleration by the ties
-    load: Any  # (P, 3, B) and by the walls that a contact lasts at
-    y0: Any  # (L, 3, B) of every tie at the start of the stage
+    y0: Any  # (M, 3, B) of every tie and guide, M = L + G, at the start of the stage
     y1: Any
-    d: Any  # discrete gradient of |y|^2: y0 + y1
-    a: Any  # (L, L, B) system of the multipliers, factored
-    f: Any  # (L, B) its right side
-    soft: Any  # (L, B) of springs: its diagonal
-    multiplier: Any  # (L, B)
-    recent: Any  # (L, B) multipliers of the last step
-    before: Any  # (L, B) and of the one before
+    d: Any  # discrete gradient: y0 + y1 of |y|^2, a unit vector of a guide
+    a: Any  # (M, M, B) system of the multipliers, factored
+    f: Any  # (M, B) its right side
+    soft: Any  # (M, B) of springs: its diagonal
+    multiplier: Any  # (M, B)
+    recent: Any  # (M, B) multipliers of the last step
+    before: Any  # (M, B) and of the one before
 
 
 class Pace(NamedTuple):
@@ -94,9 +102,13 @@ class Pace(NamedTuple):
     error: Any
     previous: Any  # error
     rate: Any
+    residue: Any  # of the equations of ties and guides, in units of round-off
+    unsettled: Any  # of those of contacts too
     trial: Any  # length to try [s]; 0: a whole step
     low: Any  # bracket of the time of impact [s]
     high: Any
+    inside: Any  # gap of the bracket's lower end [m], by how much the worst contact is inside
+    outside: Any  # and of its upper end
     done: Any  # bool: the ties of this stage are solved
     last: Any  # bool: after this correction
     solved: Any  # bool: of all stages
@@ -106,8 +118,11 @@ class Pace(NamedTuple):
     wall: Any
     stuck: Any  # int: trials since the last step
     action: Any  # int
-    held: Any  # int: contacts that last
+    lasts: Any  # bool: a contact lasts
+    held: Any  # int: contacts that do
     fresh: Any  # bool: the step begins
+    whole: Any  # bool: the step is one stage
+    work: Any  # of led points in the step [J]
 
 
 class Held(NamedTuple):
@@ -116,3 +131,6 @@ class Held(NamedTuple):
     name: Any  # (B, C, 2) point and wall
     frame: Any  # (B, C, 3, 3) normal and two tangents
     press: Any  # (B, 3 C) force along each [N]
+    impulse: Any  # (B, C) of the step [N s]
+    stages: Any  # (B, C) in how many stages of the step it pushes
+    lost: Any  # (B,) to friction in the step [J]

@@ -1,8 +1,9 @@
-"""Contacts of a body that last: one more constraint g(q1) = g(q0) for each, as long as its multiplier pushes.
+"""Stages of a body whose contacts last, or whose points are in guides: one constraint more for each.
 
-The walls press with a force on each contact, part of the free motion of a trial step. After each trial the forces are
-corrected by Gauss-Seidel with the inverse mass that the links leave, until gaps and signs are right: then no contact
-has moved through its wall, so the forces have done no work but that of friction.
+A guide keeps its point on a surface, and pushes or pulls. A contact that lasts is g(q1) = g(q0) for as long as its
+multiplier pushes: no contact moves through its wall, so their forces do no work but that of friction. Newton's method
+solves ties and guides together; what is left of it for the contacts (Schur's complement) is solved by Gauss-Seidel,
+until gaps and signs are right.
 """
 
 import math
@@ -12,157 +13,294 @@ import numpy as np
 from ...kernel.jit import inlined, outlined, scratch
 from ...kernel.vector import Vec, cross, dot, norm
 from ...surfaces import fold as walls
-from . import blow
+from .contacts import MOST_CONTACTS, NEAR, direction, near, point_of, width
 
-# Sweeps over the contacts after a trial, and the rest of a gap, in units of round-off, with which the forces are right.
-_SWEEPS, _SETTLED = 50, 32.0
-# The most that an error of friction moves a contact [m/s]; and after so many trials gaps may be larger by the factor:
-# where more contacts than three hold a point, their forces converge slowly.
-_CREEP, _TRIALS, _LARGER = 1e-7, 60, 1e3
-
-
-@outlined
-def begin(touching, chain, rule, lanes, pace, held, i):
-    """The contacts at the start of a step, which press with nothing yet."""
-    name = scratch((blow.MOST_CONTACTS, 2), np.int64)
-    frame = scratch((blow.MOST_CONTACTS, 3, 3), np.float64)
-    found = blow.near(touching, chain, rule, (lanes.r, lanes.v), i, (name, frame), False)
-    pace.held[i] = found
-    for a in range(found):
-        held.name[i, a, 0], held.name[i, a, 1] = name[a, 0], name[a, 1]
-        for d in range(3):
-            held.press[i, 3 * a + d] = 0.0
-            for x in range(3):
-                held.frame[i, a, d, x] = frame[a, d, x]
-    _load(touching, lanes, pace, held, i)
+# From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
+# contacts than three hold a rigid body, their forces converge slowly.
+_PATIENT, _LARGER = 20, 1e3
+# Sweeps over the contacts in one correction.
+_SWEEPS = 60
+# How far outside a contact that lasts may end, in units of round-off.
+ROOM = 64.0
+# The most that an error of friction moves a contact [m/s].
+_CREEP = 1e-7
 
 
 @outlined
-def press(ties, touching, chain, rule, lanes, paces, i):
-    """Correct the forces after a trial; whether they were right."""
+def begin(body, chain, rule, lanes, paces, i):
+    """The contacts at the start of a step, which press as in the step before where they are the same."""
     pace, held = paces
-    found, h = pace.held[i], pace.step[i]
-    rows = 3 * found
-    name = scratch((blow.MOST_CONTACTS, 2), np.int64)
-    frame = scratch((blow.MOST_CONTACTS, 3, 3), np.float64)
-    system = scratch((ties.links, ties.links), np.float64)
-    answer = scratch((3 * blow.MOST_CONTACTS, ties.links), np.float64)
-    schur = scratch((3 * blow.MOST_CONTACTS, 3 * blow.MOST_CONTACTS), np.float64)
-    moved = scratch(3 * blow.MOST_CONTACTS, np.float64)
-    change = scratch(3 * blow.MOST_CONTACTS, np.float64)
+    name, frame = held.name[i], held.frame[i]
+    touching = body[1]
+    before, found = pace.held[i], 0
+    fresh = scratch((MOST_CONTACTS, 2), np.int64)
+    turned = scratch((MOST_CONTACTS, 3, 3), np.float64)
+    if pace.lasts[i]:
+        found = near(touching, chain, rule, (lanes.r, lanes.v), i, (fresh, turned), False)
+    # A trial without a solution leaves infinite forces.
+    same = found == before and pace.solved[i]
+    for a in range(found):
+        same = same and fresh[a, 0] == name[a, 0] and fresh[a, 1] == name[a, 1]
+    pace.held[i] = found
+    if not same:
+        for a in range(found):
+            name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
+            for d in range(3):
+                held.press[i, 3 * a + d] = 0.0
+                for x in range(3):
+                    frame[a, d, x] = turned[a, d, x]
+
+
+@outlined
+def turn(body, chain, lanes, held, pace, i, r1):
+    """Directions of guides and contacts: the discrete gradient of each gap from the start of the stage to r1."""
+    tied, touching = body
+    frame = held.frame[i]
+    for g in range(touching.guides):
+        k, row = touching.points + g, tied.ends.shape[0] + g
+        y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i)
+        n = walls.step_normal(chain, float(touching.walls + g), y0, y1)
+        lanes.d[row, 0, i], lanes.d[row, 1, i], lanes.d[row, 2, i] = n.x, n.y, n.z
+    for a in range(pace.held[i]):
+        k, wall = held.name[i, a, 0], held.name[i, a, 1]
+        n = walls.step_normal(chain, float(wall), point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
+        t = Vec(frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2])
+        t = t - dot(t, n) * n
+        t = t / norm(t)
+        s = cross(n, t)
+        frame[a, 0, 0], frame[a, 0, 1], frame[a, 0, 2] = n.x, n.y, n.z
+        frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2] = t.x, t.y, t.z
+        frame[a, 2, 0], frame[a, 2, 1], frame[a, 2, 2] = s.x, s.y, s.z
+
+
+@inlined
+def push(body, lanes, held, pace, i):
+    """Add the forces of guides and contacts to the deceleration."""
+    tied, touching = body
+    for g in range(touching.guides):
+        row = tied.ends.shape[0] + g
+        for q in range(lanes.force.shape[0]):
+            f = lanes.multiplier[row, i] * touching.reach[touching.points + g, q]
+            for x in range(3):
+                lanes.force[q, x, i] += f * lanes.d[row, x, i]
+    for a in range(pace.held[i]):
+        k = held.name[i, a, 0]
+        for d in range(3):
+            p = held.press[i, 3 * a + d]
+            if p != 0.0:
+                for q in range(lanes.force.shape[0]):
+                    for x in range(3):
+                        lanes.force[q, x, i] += p * touching.reach[k, q] * held.frame[i, a, d, x]
+
+
+@outlined
+def guide(body, chain, lanes, pace, i):
+    """The equations of the guides of a lane: D.(q1 - q0) + gap of q0 = 0."""
+    tied, touching = body
+    count = tied.ends.shape[0]
+    half = 0.5 * pace.h[i] * pace.h[i]
+    for g in range(touching.guides):
+        k, row, wall = touching.points + g, count + g, float(touching.walls + g)
+        y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, lanes.r1, k, i)
+        n = walls.unit_normal(chain, wall, y1)
+        lanes.y1[row, 0, i], lanes.y1[row, 1, i], lanes.y1[row, 2, i] = n.x, n.y, n.z
+        lanes.f[row, i] = dot(_of(lanes.d, row, i), y1 - y0) + walls.distance(chain, wall, y0)
+        for other in range(tied.start[row], row + 1):
+            c = half * tied.couplings[row + touching.points, _name(body, other)]
+            lanes.a[row, other, i] = c * dot(n, _of(lanes.d, other, i))
+            if other < row:
+                lanes.a[other, row, i] = c * dot(_slope(tied, lanes, other, i), _of(lanes.d, row, i))
+
+
+@inlined
+def _of(y, row, i):
+    return Vec(y[row, 0, i], y[row, 1, i], y[row, 2, i])
+
+
+@inlined
+def _name(body, row):
+    """The row of a tie or guide among all couplings."""
+    tied, touching = body
+    return row if row < tied.ends.shape[0] else row + touching.points
+
+
+@inlined
+def _slope(tied, lanes, row, i):
+    """The derivative of the equation of a tie, |y1|^2, or guide by its end."""
+    return (2.0 if row < tied.ends.shape[0] else 1.0) * _of(lanes.y1, row, i)
+
+
+@inlined
+def worst(touching, lanes, pace, rule, i):
+    """How far ties and guides are from their equations: the worst, in units of round-off."""
+    error = pace.error[i] / rule.noise
+    count = lanes.f.shape[0] - touching.guides
+    for g in range(touching.guides):
+        error = max(error, abs(lanes.f[count + g, i]) / rule.room)
+    return error
+
+
+@outlined
+def correct(body, chain, rule, lanes, paces, i, number):
+    """Correct the forces of contacts, and f, the corrections of ties and guides, for it; whether these are the last."""
+    touching = body[1]
+    pace, held = paces
+    found = pace.held[i]
+    wide = width(touching, held.name[i], found)
+    rows, m = wide * found, lanes.f.shape[0]
+    contacts = held.name[i], held.frame[i], held.press[i], wide, found
+    along, across = scratch((rows, m), np.float64), scratch((rows, m), np.float64)
+    schur = scratch((rows, rows), np.float64)
+    gap, change = scratch(rows, np.float64), scratch(rows, np.float64)
+    error = pace.residue[i]
     for a in range(found):
         k, wall = held.name[i, a, 0], held.name[i, a, 1]
-        name[a, 0], name[a, 1] = k, wall
-        y0, y1 = blow.point_of(touching, lanes.r, k, i), blow.point_of(touching, lanes.r1, k, i)
-        n = walls.step_normal(chain, float(wall), y0, y1)
-        _turn(held.frame, i, a, n)
-        for x in range(3):
-            for d in range(3):
-                frame[a, d, x] = held.frame[i, a, d, x]
-        # (q1 - q0)/|D| = n.(y1 - y0), and what a point was outside by round-off
-        for d in range(3):
-            moved[3 * a + d] = dot(blow.direction(frame, 3 * a + d), y1 - y0)
-        moved[3 * a] += max(walls.distance(chain, float(wall), y0), 0.0)
-    blow.links(ties, lanes.r, i, system)
-    blow.respond(ties, touching, (name, frame, rows), (lanes.r, i), system, answer, schur)
-    half = 0.5 * h * h
-    _sweep(touching, (name, found), schur, moved, (held.press, i), change, half)
-    # Which way a point creeps by friction is less exact: what it loses is booked whatever it is.
-    room, right = tolerated(rule, pace, i), True
-    for a in range(found):
-        off = moved[3 * a]
-        right = right and (abs(off) <= room if held.press[i, 3 * a] > 0.0 else off <= room)
-        creep = max(abs(change[3 * a + 1]), abs(change[3 * a + 2])) * schur[3 * a, 3 * a] * half
-        right = right and creep <= max(_CREEP * h, room)
-    _load(touching, lanes, pace, held, i)
-    return right
+        y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, lanes.r1, k, i)
+        for d in range(wide):
+            gap[wide * a + d] = dot(direction(held.frame[i], 3 * a + d), y1 - y0)
+        # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
+        away = walls.distance(chain, float(wall), y0)
+        gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
+        off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
+        error = max(error, off / rule.room)
+    before = pace.unsettled[i] if number > 0 else math.inf
+    pace.unsettled[i] = error
+    # One correction more than errors of round-off ask for
+    late = number >= _PATIENT
+    last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
+    _eliminate(body, chain, lanes, pace, contacts, (along, across, schur, gap), i)
+    creep = _sweep(touching, contacts, schur, gap, change)
+    for row in range(m):
+        for a in range(rows):
+            lanes.f[row, i] -= across[a, row] * change[a]
+    pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
 
 @inlined
-def tolerated(rule, pace, i):
-    """How far a contact that lasts may be off its wall [m]."""
-    larger = 1.0
-    for k in range(1, 4):
-        larger *= _LARGER if pace.stuck[i] > k * _TRIALS else 1.0
-    return _SETTLED * rule.room * larger
+def _eliminate(body, chain, lanes, pace, contacts, systems, i):
+    """Leave the contacts alone: schur, and gap without what the corrections of ties and guides do to it."""
+    name, frame, _press, wide, found = contacts
+    along, across, schur, gap = systems
+    tied, touching = body
+    m, rows, count = lanes.f.shape[0], wide * found, tied.ends.shape[0]
+    half = 0.5 * pace.h[i] * pace.h[i]
+    for a in range(rows):
+        k, wall, d = name[a // wide, 0], name[a // wide, 1], direction(frame, 3 * (a // wide) + a % wide)
+        e = d
+        if a % wide == 0:
+            e = walls.unit_normal(chain, float(wall), point_of(touching, lanes.r1, k, i))
+        for row in range(m):
+            c = half * tied.couplings[count + k, _name(body, row)]
+            along[a, row] = c * dot(e, _of(lanes.d, row, i))
+            across[a, row] = c * dot(_slope(tied, lanes, row, i), d)
+            gap[a] -= along[a, row] * lanes.f[row, i]
+        _substitute(tied.start, lanes.a, across, a, i)
+        for b in range(rows):
+            c = half * tied.couplings[count + k, count + name[b // wide, 0]]
+            schur[a, b] = c * dot(e, direction(frame, 3 * (b // wide) + b % wide))
+    for a in range(rows):
+        for b in range(rows):
+            for row in range(m):
+                schur[a, b] -= along[a, row] * across[b, row]
 
 
 @inlined
-def _turn(frame, i, a, n):
-    """Turn the frame of a contact to this normal."""
-    t = Vec(frame[i, a, 1, 0], frame[i, a, 1, 1], frame[i, a, 1, 2])
-    t = t - dot(t, n) * n
-    t = t / norm(t)
-    s = cross(n, t)
-    frame[i, a, 0, 0], frame[i, a, 0, 1], frame[i, a, 0, 2] = n.x, n.y, n.z
-    frame[i, a, 1, 0], frame[i, a, 1, 1], frame[i, a, 1, 2] = t.x, t.y, t.z
-    frame[i, a, 2, 0], frame[i, a, 2, 1], frame[i, a, 2, 2] = s.x, s.y, s.z
+def _substitute(start, a, x, k, i):
+    """x[k] = A^-1 x[k] with the factored system of a lane."""
+    m = x.shape[1]
+    for row in range(m):
+        for j in range(start[row], row):
+            x[k, row] -= a[row, j, i] * x[k, j]
+    for row in range(m - 1, -1, -1):
+        for j in range(row + 1, m):
+            if start[j] <= row:
+                x[k, row] -= a[row, j, i] * x[k, j]
+        x[k, row] *= a[row, row, i]
 
 
 @inlined
-def _sweep(touching, contacts, schur, moved, presses, change, half):
-    """Gauss-Seidel: no contact ends outside, none pulls, and one with friction stays or slides within its cone."""
-    name, found = contacts
-    press_of, i = presses
-    for a in range(3 * found):
-        change[a] = 0.0
+def _sweep(touching, contacts, schur, gap, change):
+    """Gauss-Seidel: no contact ends outside, none pulls, and one with friction stays or slides within its cone.
+
+    How far friction moves a contact by its change is returned: which way a point creeps is less exact, since what it
+    loses is booked whatever it is.
+    """
+    name, _frame, press, wide, found = contacts
+    rows, creep = wide * found, 0.0
     for _turn in range(_SWEEPS):
         largest, size = 0.0, 0.0
         for a in range(found):
-            j, mu = 3 * a, touching.friction[name[a, 1]]
-            left = moved[j]
-            for b in range(3 * found):
-                left -= half * schur[j, b] * change[b]
-            new = max(0.0, press_of[i, j] + left / (half * schur[j, j]))
-            largest, size = max(largest, abs(new - press_of[i, j])), max(size, new)
-            change[j] += new - press_of[i, j]
-            press_of[i, j] = new
+            j, mu = wide * a, touching.friction[name[a, 1]]
+            left = gap[j]
+            for b in range(rows):
+                left -= schur[j, b] * change[b]
+            new = max(0.0, press[3 * a] + left / schur[j, j])
+            largest, size = max(largest, abs(new - press[3 * a])), max(size, new)
+            change[j] += new - press[3 * a]
+            press[3 * a] = new
             if mu > 0.0:
-                one, other = moved[j + 1], moved[j + 2]
-                for b in range(3 * found):
-                    one -= half * schur[j + 1, b] * change[b]
-                    other -= half * schur[j + 2, b] * change[b]
-                stiff = half * max(schur[j + 1, j + 1], schur[j + 2, j + 2])
-                one, other = press_of[i, j + 1] + one / stiff, press_of[i, j + 2] + other / stiff
+                one, other = gap[j + 1], gap[j + 2]
+                for b in range(rows):
+                    one -= schur[j + 1, b] * change[b]
+                    other -= schur[j + 2, b] * change[b]
+                stiff = max(schur[j + 1, j + 1], schur[j + 2, j + 2])
+                one, other = press[3 * a + 1] + one / stiff, press[3 * a + 2] + other / stiff
                 length = math.sqrt(one * one + other * other)
                 within = min(1.0, mu * new / length) if length > 0.0 else 1.0
-                largest = max(largest, abs(within * one - press_of[i, j + 1]), abs(within * other - press_of[i, j + 2]))
-                change[j + 1] += within * one - press_of[i, j + 1]
-                change[j + 2] += within * other - press_of[i, j + 2]
-                press_of[i, j + 1], press_of[i, j + 2] = within * one, within * other
+                one, other = within * one, within * other
+                largest = max(largest, abs(one - press[3 * a + 1]), abs(other - press[3 * a + 2]))
+                change[j + 1] += one - press[3 * a + 1]
+                change[j + 2] += other - press[3 * a + 2]
+                press[3 * a + 1], press[3 * a + 2] = one, other
         if largest <= 1e-16 * size:
             break
+    for a in range(found):
+        for d in range(1, wide):
+            creep = max(creep, abs(change[wide * a + d]) * schur[wide * a, wide * a])
+    return creep
 
 
 @inlined
-def _load(touching, lanes, pace, held, i):
-    """The deceleration of every point by these forces, W sum b p d."""
-    for q in range(lanes.load.shape[0]):
-        for x in range(3):
-            total = 0.0
-            for a in range(3 * pace.held[i]):
-                force = held.press[i, a]
-                if force != 0.0:
-                    total += force * touching.reach[held.name[i, a // 3, 0], q] * held.frame[i, a // 3, a % 3, x]
-            lanes.load[q, x, i] = total
+def book(touching, lanes, paces, i):
+    """What the walls did in the stage."""
+    pace, held = paces
+    for a in range(pace.held[i]):
+        k, press = held.name[i, a, 0], held.press[i, 3 * a]
+        held.stages[i, a] += 1 if press > 0.0 else 0
+        held.impulse[i, a] += pace.h[i] * press
+        away = point_of(touching, lanes.r1, k, i) - point_of(touching, lanes.ra, k, i)
+        for d in range(1, 3):
+            held.lost[i] += held.press[i, 3 * a + d] * dot(direction(held.frame[i], 3 * a + d), away)
+
+
+@inlined
+def is_mixed(paces, i, stages):
+    """Whether a contact pushed in some stages of a composed step only: then energy went with it."""
+    pace, held = paces
+    mixed = False
+    for a in range(pace.held[i]):
+        mixed = mixed or 0 < held.stages[i, a] < stages
+    return mixed
+
+
+@inlined
+def forget(held, i):
+    """Forget what the walls did in a trial."""
+    held.lost[i] = 0.0
+    for a in range(MOST_CONTACTS):
+        held.impulse[i, a], held.stages[i, a] = 0.0, 0
 
 
 @outlined
-def end(touching, lanes, pace, held, state, i):
+def end(paces, state, i):
     """Book what the walls did in the step; the contacts last as long as one of them pushes."""
-    number, h, pushes = pace.body[i], pace.step[i], False
+    pace, held = paces
+    number, pushes = pace.body[i], False
     for a in range(pace.held[i]):
-        force = held.press[i, 3 * a]
-        pushes = pushes or force > 0.0
-        state.impulse[held.name[i, a, 1], number] += h * force
-        for d in range(1, 3):
-            along = Vec(held.frame[i, a, d, 0], held.frame[i, a, d, 1], held.frame[i, a, d, 2])
-            u = blow.point_of(touching, lanes.ra, held.name[i, a, 0], i)
-            c = blow.point_of(touching, lanes.r1, held.name[i, a, 0], i)
-            state.dissipated[number] += held.press[i, 3 * a + d] * dot(along, c - u)
-    state.sliding[number] += h
-    for q in range(lanes.load.shape[0]):
-        for x in range(3):
-            lanes.load[q, x, i] = 0.0
+        pushes = pushes or held.press[i, 3 * a] > 0.0
+        state.impulse[held.name[i, a, 1], number] += held.impulse[i, a]
+    state.dissipated[number] += held.lost[i]
+    state.sliding[number] += pace.step[i]
     if not pushes:
+        pace.lasts[i] = False
         pace.held[i] = 0

@@ -1,4 +1,4 @@
-"""One stage of a step: the multipliers of all ties by Newton's method, in all lanes at once.
+"""Ties: the equations of their multipliers in one stage of a step, in all lanes at once.
 
     r1 = p - (h^2/2) W sum lambda D,  v1 = v0 + h G - h W sum lambda D,  p = r0 + h v0 + h^2 G/2
 with D = y0 + y1, the discrete gradient of |y|^2 of each tie (a quadratic, so it is exact), and for every tie
@@ -7,9 +7,6 @@ with D = y0 + y1, the discrete gradient of |y|^2 of each tie (a quadratic, so it
     edges    lambda = K ((|y0|^2 + |y1|^2)/2 - s0)
 so that links do no work and what springs and edges do is the change of their energy, exactly. v1 in this form, because
 2 (r1 - r0)/h - v0 cancels: 3e-10 instead of 1e-15.
-
-The system is factored once for several corrections, which are cheap; each shrinks errors by some (h omega)^2. Each lane
-stops by itself, so that its bits do not depend on its neighbours.
 """
 
 import math
@@ -18,8 +15,6 @@ from ...kernel.jit import inlined, select
 
 # Where the relative error of |y|^2 would be below this after a correction, it is the last.
 _TOLERANCE = 1e-15
-# Most corrections, and after how many the system is factored again.
-MOST, _AGAIN = 40, 5
 # By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
 _NEGLECTED = 4.0
 # The rest length that scales the equation of a spring is at least this part of its length.
@@ -27,19 +22,15 @@ _SHORTEST = 1e-8
 
 
 @inlined
-def solve(ties, gravity, noise, lanes, pace):
-    """The end r1, v1 of a stage from (ra, va) with the steps pace.h; pace.done is False where none is found.
-
-    Points that are led must be in r1 already.
-    """
-    force = lanes.force
-    points, count = force.shape[0], force.shape[2]
+def launch(ties, gravity, lanes, pace):
+    """Where the stage would end without ties, p, and D for that."""
+    points, count = lanes.force.shape[0], lanes.force.shape[2]
     for q in range(points):
         if ties.is_free[q]:
             for x in range(3):
                 g = gravity[x]
                 for i in range(count):
-                    pull = 0.5 * pace.h[i] * (g - lanes.load[q, x, i])
+                    pull = 0.5 * pace.h[i] * g
                     lanes.p[q, x, i] = lanes.ra[q, x, i] + pace.h[i] * (lanes.va[q, x, i] + pull)
         else:
             for x in range(3):
@@ -52,33 +43,22 @@ def solve(ties, gravity, noise, lanes, pace):
                 y = lanes.ra[first, x, i] - lanes.ra[second, x, i]
                 lanes.y0[a, x, i] = y
                 lanes.d[a, x, i] = y + (lanes.p[first, x, i] - lanes.p[second, x, i])
-    for turn in range(MOST + 1):
-        # D follows the multipliers before they are corrected: together, the second makes up again for the first.
-        _push(ties, lanes, pace)
-        _follow(ties, lanes, pace)
-        _push(ties, lanes, pace)
-        if turn == MOST or _all(pace.done):
-            break
-        _residual(ties, lanes, pace, turn, noise)
-        if turn % _AGAIN == 0:
-            _assemble(ties, lanes, pace)
-            _factor(ties.start, lanes.a)
-        _correct(ties.start, lanes, pace)
-        if _all(pace.done):
-            _push(ties, lanes, pace)
-            break
-    for q in range(points):
-        if ties.is_free[q]:
-            for x in range(3):
-                g = gravity[x]
-                for i in range(count):
-                    lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - lanes.load[q, x, i] - force[q, x, i])
 
 
 @inlined
-def _push(ties, lanes, pace):
-    """r1 = p - (h^2/2) W sum lambda D"""
-    accelerate(ties, lanes)
+def arrive(ties, gravity, lanes, pace):
+    """v1 = v0 + h G - h W sum lambda D"""
+    for q in range(lanes.force.shape[0]):
+        if ties.is_free[q]:
+            for x in range(3):
+                g = gravity[x]
+                for i in range(lanes.force.shape[2]):
+                    lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - lanes.force[q, x, i])
+
+
+@inlined
+def move(lanes, pace):
+    """r1 = p - (h^2/2) of the deceleration"""
     for q in range(lanes.r1.shape[0]):
         for x in range(3):
             for i in range(lanes.r1.shape[2]):
@@ -87,7 +67,7 @@ def _push(ties, lanes, pace):
 
 
 @inlined
-def _follow(ties, lanes, pace):
+def follow(ties, lanes, pace):
     """D = y0 + y1
 
     In a lane that is done D stays as it is: with the multipliers, which stay too, it gives the same r1 again.
@@ -98,15 +78,6 @@ def _follow(ties, lanes, pace):
             for i in range(lanes.r1.shape[2]):
                 d = lanes.y0[a, x, i] + (lanes.r1[first, x, i] - lanes.r1[second, x, i])
                 lanes.d[a, x, i] = select(pace.done[i], lanes.d[a, x, i], d)
-
-
-@inlined
-def _all(done):
-    """Whether every lane is done."""
-    undone = 0
-    for i in range(done.size):
-        undone += select(done[i], 0, 1)
-    return undone == 0
 
 
 @inlined
@@ -131,30 +102,33 @@ def accelerate(ties, lanes):
                 for i in range(count):
                     force[q, x, i] *= w
         return
+    # v1 of points that are not free is their path's.
+    for q in range(points):
+        if ties.is_free[q]:
+            for x in range(3):
+                for i in range(count):
+                    lanes.v1[q, x, i] = 0.0
+            for s in range(points):
+                w = ties.inverse_mass[q, s]
+                if w != 0.0:
+                    for x in range(3):
+                        for i in range(count):
+                            lanes.v1[q, x, i] += w * force[s, x, i]
     for q in range(points):
         for x in range(3):
             for i in range(count):
-                lanes.v1[q, x, i] = 0.0
-        for s in range(points):
-            w = ties.inverse_mass[q, s]
-            if w != 0.0:
-                for x in range(3):
-                    for i in range(count):
-                        lanes.v1[q, x, i] += w * force[s, x, i]
-    for q in range(points):
-        for x in range(3):
-            for i in range(count):
-                force[q, x, i] = lanes.v1[q, x, i]
+                force[q, x, i] = lanes.v1[q, x, i] if ties.is_free[q] else 0.0
 
 
 @inlined
-def _residual(ties, lanes, pace, turn, noise):
+def residual(ties, lanes, pace, turn, noise):
     """How far each tie is from its equation, as an error of |y1|^2; which lanes need no more than one correction."""
-    f, count, links, soft = lanes.f, lanes.f.shape[1], ties.links, ties.links + ties.springs
+    f, count, rows = lanes.f, lanes.f.shape[1], ties.ends.shape[0]
+    links, soft = ties.links, ties.links + ties.springs
     for i in range(count):
         pace.error[i] = 0.0
         pace.rate[i] = 0.0
-    for a in range(f.shape[0]):
+    for a in range(rows):
         first, second = ties.ends[a, 0], ties.ends[a, 1]
         for i in range(count):
             f[a, i] = 0.0
@@ -186,7 +160,7 @@ def _residual(ties, lanes, pace, turn, noise):
             for i in range(count):
                 y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
                 f[a, i] += (y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) - rest
-            for b in range(soft, f.shape[0]):
+            for b in range(soft, rows):
                 give = ties.compliance[a - soft, b - soft]
                 if give != 0.0:
                     for i in range(count):
@@ -213,11 +187,11 @@ def _worse(worst, i, value):
 
 
 @inlined
-def _assemble(ties, lanes, pace):
+def assemble(ties, lanes, pace):
     """The derivative of each equation by each multiplier, h^2 (beta W beta) y1.D, within the skyline."""
     a, y, d, count = lanes.a, lanes.y1, lanes.d, lanes.f.shape[1]
     links, soft = ties.links, ties.links + ties.springs
-    for row in range(a.shape[0]):
+    for row in range(ties.ends.shape[0]):
         for column in range(ties.start[row], row + 1):
             w = ties.couplings[row, column]
             give = 0.0
@@ -238,7 +212,7 @@ def _assemble(ties, lanes, pace):
 
 
 @inlined
-def _factor(start, a):
+def factor(start, a):
     """A = L U in place, with 1/U on the diagonal; the entries before `start` of a row, and of its column, are 0."""
     count = a.shape[2]
     for row in range(a.shape[0]):
@@ -259,9 +233,9 @@ def _factor(start, a):
 
 
 @inlined
-def _correct(start, lanes, pace):
-    """Add A^-1 f to the multipliers of lanes that are not done."""
-    a, f, count = lanes.a, lanes.f, lanes.f.shape[1]
+def substitute(start, a, f):
+    """f = A^-1 f, where A is factored."""
+    count = f.shape[1]
     for row in range(f.shape[0]):
         for k in range(start[row], row):
             for i in range(count):
@@ -273,7 +247,14 @@ def _correct(start, lanes, pace):
                     f[row, i] -= a[row, k, i] * f[k, i]
         for i in range(count):
             f[row, i] *= a[row, row, i]
+
+
+@inlined
+def correct(lanes, pace):
+    """Add A^-1 f to the multipliers of lanes that are not done."""
+    for row in range(lanes.f.shape[0]):
+        for i in range(lanes.f.shape[1]):
             g = lanes.multiplier[row, i]
-            lanes.multiplier[row, i] = select(pace.done[i], g, g + f[row, i])
-    for i in range(count):
+            lanes.multiplier[row, i] = select(pace.done[i], g, g + lanes.f[row, i])
+    for i in range(lanes.f.shape[1]):
         pace.done[i] = pace.done[i] | pace.last[i]

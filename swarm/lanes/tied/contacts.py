@@ -1,0 +1,83 @@
+"""The contacts of a body: where its points are, which walls they can meet, and which are at one."""
+
+import numpy as np
+
+from ...kernel.jit import inlined
+from ...kernel.vector import Vec, cross, dot, norm
+from ...surfaces import fold as walls
+
+# A contact this many times round-off away from its wall is at it.
+NEAR = 64.0
+# Most contacts at one instant; more follow in the next blow at the same instant.
+MOST_CONTACTS = 16
+
+
+@inlined
+def point_of(touching, r, k, i):
+    """The place, or velocity, of contact point k of a lane."""
+    q = touching.plain[k]
+    if q >= 0:
+        return Vec(r[q, 0, i], r[q, 1, i], r[q, 2, i])
+    x, y, z = 0.0, 0.0, 0.0
+    for p in range(r.shape[0]):
+        b = touching.coefficients[k, p]
+        x += b * r[p, 0, i]
+        y += b * r[p, 1, i]
+        z += b * r[p, 2, i]
+    return Vec(x, y, z)
+
+
+@inlined
+def span(touching, k):
+    """The walls that a contact point can meet: from the first to the one before the last."""
+    own = k - touching.points
+    first = 0 if own < 0 else touching.walls + own
+    last = touching.walls if own < 0 else first + (1 if own >= touching.guides else 0)
+    return first, last
+
+
+@inlined
+def width(touching, name, found):
+    """How many directions of each contact matter: the normal, or the tangents too, where there is friction."""
+    rough = False
+    for a in range(found):
+        rough = rough or touching.friction[name[a, 1]] > 0.0
+    return 3 if rough else 1
+
+
+@inlined
+def near(touching, chain, rule, motion, i, contacts, approaching):
+    """The contacts at their walls, or those that approach: their names (point, wall), a normal and two tangents."""
+    r, v = motion
+    name, frame = contacts
+    found = 0
+    for k in range(touching.plain.size):
+        c, u = point_of(touching, r, k, i), point_of(touching, v, k, i)
+        start, stop = span(touching, k)
+        for w in range(start, stop):
+            if found < MOST_CONTACTS and walls.distance(chain, float(w), c) >= -NEAR * rule.room:
+                n = walls.unit_normal(chain, float(w), c)
+                # What is left of an approach by round-off is none.
+                if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
+                    name[found, 0], name[found, 1] = k, w
+                    _frame(frame, found, n)
+                    found += 1
+    return found
+
+
+@inlined
+def direction(frame, a):
+    """Direction a of the contacts: normal, tangent, tangent, normal of the next, ..."""
+    return Vec(frame[a // 3, a % 3, 0], frame[a // 3, a % 3, 1], frame[a // 3, a % 3, 2])
+
+
+@inlined
+def _frame(frame, a, n):
+    """The normal and two unit vectors across it."""
+    flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
+    t = cross(n, flat)
+    t = t / norm(t)
+    s = cross(n, t)
+    frame[a, 0, 0], frame[a, 0, 1], frame[a, 0, 2] = n.x, n.y, n.z
+    frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2] = t.x, t.y, t.z
+    frame[a, 2, 0], frame[a, 2, 1], frame[a, 2, 2] = s.x, s.y, s.z

@@ -1,0 +1,93 @@
+"""The instant of an impact: where the step of a body is cut, by secants in a bracket."""
+
+import math
+
+from ...kernel.jit import inlined, outlined
+from ...kernel.vector import dot
+from ...surfaces import fold as walls
+from .contacts import NEAR, point_of, span
+
+# What becomes of a lane after a trial.
+AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
+# A bracket of the time of impact this narrow, as a part of a whole step, is a point; a step this short from a wall to
+# itself is none.
+_NARROW, _SHORTEST = 1e-13, 1e-5
+# Trials after which the bracket is halved each time.
+_QUICK = 40
+# A step whose ties have no solution is halved this often.
+_HALVED = 2.0**-20
+
+
+@outlined
+def judge(touching, chain, rule, lanes, pace, i, larger):
+    """What becomes of a lane whose trial step ends outside, has no solution, or looks for the time of an impact."""
+    tau = pace.step[i]
+    pace.stuck[i] += 1
+    if not pace.solved[i]:
+        pace.trial[i] = 0.5 * tau
+        pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
+        return AGAIN if tau > _HALVED * rule.dt else FAILED
+    # The forces of contacts that last leave a part of it.
+    room = rule.room if pace.held[i] == 0 else larger
+    worst, first, point, wall = -math.inf, tau, -1, -1
+    for k in range(touching.plain.size):
+        c = point_of(touching, lanes.r1, k, i)
+        start, stop = span(touching, k)
+        for w in range(start, stop):
+            gap = walls.distance(chain, float(w), c)
+            worst = max(worst, gap)
+            if not gap <= room:
+                rate = dot(walls.unit_normal(chain, float(w), c), point_of(touching, lanes.v1, k, i))
+                time = tau - gap / rate if rate > 0.0 else 0.0
+                if wall < 0 or time < first:
+                    first, point, wall = time, k, w
+    if wall < 0:
+        return _inside(rule, pace, i, worst)
+    again, low = pace.wall[i] >= 0, pace.low[i]
+    pace.point[i], pace.wall[i] = point, wall
+    if tau - low <= _NARROW * rule.dt:
+        pace.trial[i] = low
+        return STRIKE_NOW if low == 0.0 else AGAIN
+    if low == 0.0 and tau <= _SHORTEST * rule.dt:
+        # It is at the wall, and does not leave it.
+        start = walls.distance(chain, float(wall), point_of(touching, lanes.r, point, i))
+        if start >= -NEAR * rule.room:
+            return STRIKE_NOW
+    if pace.high[i] < math.inf and again:
+        pace.inside[i] *= _weight(worst, pace.outside[i])
+    pace.high[i], pace.outside[i] = tau, worst
+    # The first guess is by the velocity at the end. It is none where that has a part along the ties.
+    pace.trial[i] = first if low < first < tau and not again else _between(rule, pace, i)
+    return AGAIN
+
+
+@inlined
+def _inside(rule, pace, i, gap):
+    """The trial ends inside: it is the step, the step to the impact, or a lower end of the bracket."""
+    wall, tau = pace.wall[i], pace.step[i]
+    if wall < 0:
+        return COMMIT
+    if gap >= -rule.room or pace.high[i] - tau <= _NARROW * rule.dt:
+        return STRIKE
+    if pace.low[i] > 0.0:
+        pace.outside[i] *= _weight(gap, pace.inside[i])
+    pace.low[i], pace.inside[i] = tau, gap
+    pace.trial[i] = _between(rule, pace, i)
+    return AGAIN
+
+
+@inlined
+def _weight(gap, before):
+    """What an end that stays counts when the other moves again (Anderson and Bjorck)."""
+    weight = 1.0 - gap / before
+    return weight if weight > 0.0 else 0.5
+
+
+@inlined
+def _between(rule, pace, i):
+    """The next time to try in the bracket: by the secant, to where the worst contact is half of round-off inside."""
+    low, high = pace.low[i], pace.high[i]
+    inside, outside = pace.inside[i] + 0.5 * rule.room, pace.outside[i] + 0.5 * rule.room
+    time = low - (high - low) * inside / (outside - inside)
+    halves = low == 0.0 or pace.stuck[i] > _QUICK or not low < time < high
+    return 0.5 * (low + high) if halves else time

@@ -1,0 +1,51 @@
+"""Points that are led along a path s(t), and the work that leading them takes."""
+
+import math
+
+from ...kernel.jit import inlined
+
+
+@inlined
+def lead(ties, rule, state, lanes, pace, elapsed):
+    """Put led points where their paths are at the end of a stage, with the velocity there.
+
+    `elapsed` is the part of the step at the end of the stage.
+    """
+    for q in range(lanes.r1.shape[0]):
+        row = ties.led[q]
+        if row >= 0:
+            path = state.path
+            for i in range(lanes.r1.shape[2]):
+                if pace.body[i] >= 0:
+                    n = pace.body[i]
+                    part = 1.0 if pace.whole[i] else elapsed
+                    t = rule.end - (pace.left[i] - part * pace.step[i])
+                    rate = path[row, 12, n]
+                    half, sine, cosine = math.sin(0.5 * rate * t), math.sin(rate * t), math.cos(rate * t)
+                    for x in range(3):
+                        # cos - 1 = -2 sin^2 of the half angle
+                        turned = path[row, 9 + x, n] * sine - path[row, 6 + x, n] * (2.0 * half * half)
+                        lanes.r1[q, x, i] = path[row, x, n] + path[row, 3 + x, n] * t + turned
+                        turned = path[row, 9 + x, n] * cosine - path[row, 6 + x, n] * sine
+                        lanes.v1[q, x, i] = path[row, 3 + x, n] + rate * turned
+
+
+@inlined
+def book(body, lanes, paces, last):
+    """Add the work of led points in a stage on ties and contacts: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
+    ties, touching = body
+    pace, held = paces
+    for q in range(lanes.r1.shape[0]):
+        if ties.led[q] >= 0:
+            for i in range(lanes.r1.shape[2]):
+                if pace.body[i] >= 0 and (last or not pace.whole[i]):
+                    for x in range(3):
+                        force = 0.0
+                        for a in range(ties.ends.shape[0]):
+                            sign = (ties.ends[a, 0] == q) - (ties.ends[a, 1] == q)
+                            force += sign * lanes.multiplier[a, i] * lanes.d[a, x, i]
+                        for a in range(pace.held[i]):
+                            b = touching.coefficients[held.name[i, a, 0], q]
+                            for d in range(3):
+                                force += b * held.press[i, 3 * a + d] * held.frame[i, a, d, x]
+                        pace.work[i] += force * (lanes.r1[q, x, i] - lanes.ra[q, x, i])

@@ -1,0 +1,87 @@
+"""One stage of a step: the multipliers of all that holds a body, by Newton's method, in all lanes at once.
+
+The system of the ties is factored once for several corrections, which are cheap; each shrinks errors by some
+(h omega)^2. Each lane stops by itself, so that its bits do not depend on its neighbours.
+"""
+
+from ...kernel.jit import inlined, select
+from . import hold, ties
+
+# Most corrections, and after how many the system is factored again.
+_MOST, _AGAIN = 40, 5
+
+
+@inlined
+def solve(body, chain, rule, lanes, paces):
+    """The end r1, v1 of a stage from (ra, va) with the steps pace.h; pace.done is False where none is found.
+
+    Points that are led must be in r1 already. Lanes that are done at the start are left out.
+    """
+    tied, touching = body
+    pace, held = paces
+    count, guides = pace.h.size, touching.guides
+    ties.launch(tied, rule.gravity, lanes, pace)
+    more = guides
+    for i in range(count):
+        more += pace.held[i] > 0
+        if _is_held(touching, pace, i):
+            hold.turn(body, chain, lanes, held, pace, i, lanes.ra)
+    for turn in range(_MOST + 1):
+        # D follows the multipliers before they are corrected: together, the second makes up again for the first.
+        _push(body, lanes, paces, more)
+        ties.follow(tied, lanes, pace)
+        if more > 0:
+            for i in range(count):
+                if _is_held(touching, pace, i):
+                    hold.turn(body, chain, lanes, held, pace, i, lanes.r1)
+        _push(body, lanes, paces, more)
+        if turn == _MOST or _all(pace.done):
+            break
+        ties.residual(tied, lanes, pace, turn, rule.noise)
+        if turn % _AGAIN == 0 or more > 0:
+            ties.assemble(tied, lanes, pace)
+            if guides > 0:
+                for i in range(count):
+                    if not pace.done[i]:
+                        hold.guide(body, chain, lanes, pace, i)
+            ties.factor(tied.start, lanes.a)
+        if more > 0:
+            for i in range(count):
+                pace.residue[i] = hold.worst(touching, lanes, pace, rule, i)
+        ties.substitute(tied.start, lanes.a, lanes.f)
+        if more > 0:
+            for i in range(count):
+                if _is_held(touching, pace, i):
+                    hold.correct(body, chain, rule, lanes, paces, i, turn)
+        ties.correct(lanes, pace)
+        if _all(pace.done):
+            _push(body, lanes, paces, more)
+            break
+    ties.arrive(tied, rule.gravity, lanes, pace)
+
+
+@inlined
+def _is_held(touching, pace, i):
+    """Whether more than ties is to be solved in a lane."""
+    return (not pace.done[i]) and (touching.guides > 0 or pace.held[i] > 0)
+
+
+@inlined
+def _push(body, lanes, paces, more):
+    """r1 = p - (h^2/2) W (sum lambda D + sum p b d)"""
+    pace, held = paces
+    ties.accelerate(body[0], lanes)
+    if more > 0:
+        for i in range(pace.h.size):
+            if body[1].guides > 0 or pace.held[i] > 0:
+                hold.push(body, lanes, held, pace, i)
+    ties.move(lanes, pace)
+
+
+@inlined
+def _all(done):
+    """Whether every lane is done."""
+    undone = 0
+    for i in range(done.size):
+        undone += select(done[i], 0, 1)
+    return undone == 0
