@@ -19,6 +19,8 @@ _SAME = 1.0 + 1e-9
 _STUCK = 2000
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
 _SHORT = 1.0 / 16.0
+# A step that is put off more often has no solution.
+_WAITS = 20
 # After so many blows without a step the contacts last.
 _LASTS = 20
 
@@ -39,7 +41,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         scratch((rows, 3, count), np.float64), scratch((rows, rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
-        scratch((rows, count), np.float64),
+        scratch((rows, count), np.float64), scratch((rows, count), np.float64),
     )  # fmt: skip
     pace = Pace(
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
@@ -49,12 +51,13 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_),
         scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64),
         scratch(count, np.int64), scratch(count, np.bool_), scratch(count, np.int64), scratch(count, np.bool_),
-        scratch(count, np.bool_), scratch(count, np.float64),
+        scratch(count, np.bool_), scratch(count, np.float64), scratch(count, np.int64),
     )  # fmt: skip
     held = Held(
         scratch((count, MOST_CONTACTS, 2), np.int64), scratch((count, MOST_CONTACTS, 3, 3), np.float64),
-        scratch((count, 3 * MOST_CONTACTS), np.float64), scratch((count, MOST_CONTACTS), np.float64),
-        scratch((count, MOST_CONTACTS), np.int64), scratch(count, np.float64),
+        scratch((count, 3 * MOST_CONTACTS), np.float64), scratch((count, 3 * MOST_CONTACTS), np.float64),
+        scratch((count, MOST_CONTACTS), np.float64), scratch((count, MOST_CONTACTS), np.int64),
+        scratch(count, np.float64),
     )  # fmt: skip
     c = scratch((3, count), np.float64)
     for i in range(count):
@@ -103,8 +106,10 @@ def _judge(touching, chain, rule, lanes, paces, i):
     """What becomes of a lane after its trial."""
     pace, _held = paces
     pace.fresh[i] = False
-    if pace.body[i] < 0:
+    if pace.body[i] < 0 or 0 < pace.waits[i] <= _WAITS:
         return instant.AGAIN
+    pace.solved[i] = pace.solved[i] and pace.waits[i] == 0
+    pace.waits[i] = 0
     if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and hold.is_mixed(paces, i, rule.stages.size):
         pace.whole[i] = True
         return instant.AGAIN
@@ -131,7 +136,7 @@ def _finish(body, chain, rule, state, lanes, paces, i):
         if (action == instant.STRIKE_NOW and blows == 0) or pace.stuck[i] > _LASTS:
             pace.lasts[i] = True
         for a in range(lanes.recent.shape[0]):
-            lanes.before[a, i] = lanes.recent[a, i]
+            lanes.older[a, i] = math.nan
     pace.fresh[i], pace.whole[i] = True, False
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
 
@@ -143,12 +148,13 @@ def _load(state, lanes, paces, i, number):
     pace.body[i], pace.left[i], pace.stuck[i] = number, state.left[number], 0
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i], pace.point[i] = 0.0, 0.0, math.inf, -1, -1
     pace.lasts[i], pace.held[i] = state.lasting[number] == 1, 0
-    pace.fresh[i], pace.whole[i] = True, False
+    pace.fresh[i], pace.whole[i], pace.waits[i] = True, False, 0
     for q in range(lanes.r.shape[0]):
         for x in range(3):
             lanes.r[q, x, i], lanes.v[q, x, i] = state.position[x, q, number], state.velocity[x, q, number]
     for a in range(lanes.f.shape[0]):
         lanes.recent[a, i], lanes.before[a, i] = state.guess[0, a, number], state.guess[1, a, number]
+        lanes.older[a, i] = state.guess[2, a, number]
 
 
 @inlined
@@ -162,6 +168,7 @@ def _store(state, lanes, pace, i):
             state.position[x, q, number], state.velocity[x, q, number] = lanes.r[q, x, i], lanes.v[q, x, i]
     for a in range(lanes.f.shape[0]):
         state.guess[0, a, number], state.guess[1, a, number] = lanes.recent[a, i], lanes.before[a, i]
+        state.guess[2, a, number] = lanes.older[a, i]
 
 
 @inlined
@@ -199,8 +206,12 @@ def _try(body, chain, rule, state, lanes, paces):
         part = rule.stages[stage]
         for a in range(lanes.f.shape[0]):
             for i in range(count):
-                g = lanes.recent[a, i]
-                lanes.multiplier[a, i] = g + select(single, g - lanes.before[a, i], 0.0)
+                # Exact for what grows steadily, and for round-off, whose part alternates from step to step.
+                more = lanes.before[a, i] - lanes.older[a, i]
+                share = 0.5 + 0.5 * pace.step[i] / rule.dt
+                known = single & (more == more)
+                guess = lanes.recent[a, i] + select(known, share * more, 0.0)
+                lanes.multiplier[a, i] = select(pace.waits[i] > 0, lanes.multiplier[a, i], guess)
         for i in range(count):
             pace.h[i] = part * pace.step[i]
         elapsed += part
@@ -273,6 +284,8 @@ def _commit(lanes, pace, whole):
         pace.done[i] = pace.done[i] & (pace.step[i] > _SHORT * whole)
     for a in range(lanes.f.shape[0]):
         for i in range(count):
-            g = lanes.recent[a, i]
-            lanes.recent[a, i] = select(pace.done[i], lanes.multiplier[a, i], g)
-            lanes.before[a, i] = select(pace.done[i], g, lanes.before[a, i])
+            new, g, old = lanes.multiplier[a, i], lanes.recent[a, i], lanes.before[a, i]
+            known = lanes.older[a, i] == lanes.older[a, i]
+            lanes.recent[a, i] = select(pace.done[i], new, g)
+            lanes.before[a, i] = select(pace.done[i], select(known, g, new), old)
+            lanes.older[a, i] = select(pace.done[i], select(known, old, new), lanes.older[a, i])

@@ -59,7 +59,7 @@ class BodyState(NamedTuple):
     position: Any  # (3, P, n)
     velocity: Any  # (3, P, n)
     left: Any  # (n,) of the frame [s]
-    guess: Any  # (2, L + G, n) multipliers of the last two steps
+    guess: Any  # (3, L + G, n) multipliers of the last three steps, NaN where there is none since the last blow
     path: Any  # (A, 13, n) of led points: start, velocity, cosine, sine, rate
     short: Any  # (n,) short steps between impacts, one after the other
     lasting: Any  # (n,) int8, whether a contact lasts
@@ -90,7 +90,8 @@ class Lanes(NamedTuple):
     soft: Any  # (M, B) of springs: its diagonal
     multiplier: Any  # (M, B)
     recent: Any  # (M, B) multipliers of the last step
-    before: Any  # (M, B) and of the one before
+    before: Any  # (M, B) of the one before
+    older: Any  # (M, B) and before that; NaN: no step since the last blow
 
 
 class Pace(NamedTuple):
@@ -109,7 +110,7 @@ class Pace(NamedTuple):
     high: Any
     inside: Any  # gap of the bracket's lower end [m], by how much the worst contact is inside
     outside: Any  # and of its upper end
-    done: Any  # bool: the ties of this stage are solved
+    done: Any  # bool: the ties of this stage are solved, or put off
     last: Any  # bool: after this correction
     solved: Any  # bool: of all stages
     out: Any  # bool: a point is outside
@@ -123,6 +124,7 @@ class Pace(NamedTuple):
     fresh: Any  # bool: the step begins
     whole: Any  # bool: the step is one stage
     work: Any  # of led points in the step [J]
+    waits: Any  # int: how often the solution of this step was put off to the next pass
 
 
 class Held(NamedTuple):
@@ -131,6 +133,7 @@ class Held(NamedTuple):
     name: Any  # (B, C, 2) point and wall
     frame: Any  # (B, C, 3, 3) normal and two tangents
     press: Any  # (B, 3 C) force along each [N]
+    before: Any  # (B, 3 C) and in the step before, NaN where there is none
     impulse: Any  # (B, C) of the step [N s]
     stages: Any  # (B, C) in how many stages of the step it pushes
     lost: Any  # (B,) to friction in the step [J]

@@ -42,6 +42,11 @@ def begin(body, chain, rule, lanes, paces, i):
     for a in range(found):
         same = same and fresh[a, 0] == name[a, 0] and fresh[a, 1] == name[a, 1]
     pace.held[i] = found
+    for a in range(3 * found):
+        # Steadily growing forces are guessed exactly.
+        p, before = held.press[i, a], held.before[i, a]
+        held.press[i, a] = 2.0 * p - before if same and before == before else p
+        held.before[i, a] = p if same else math.nan
     if not same:
         for a in range(found):
             name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
@@ -64,13 +69,14 @@ def turn(body, chain, lanes, held, pace, i, r1):
     for a in range(pace.held[i]):
         k, wall = held.name[i, a, 0], held.name[i, a, 1]
         n = walls.step_normal(chain, float(wall), point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
-        t = Vec(frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2])
-        t = t - dot(t, n) * n
-        t = t / norm(t)
-        s = cross(n, t)
         frame[a, 0, 0], frame[a, 0, 1], frame[a, 0, 2] = n.x, n.y, n.z
-        frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2] = t.x, t.y, t.z
-        frame[a, 2, 0], frame[a, 2, 1], frame[a, 2, 2] = s.x, s.y, s.z
+        if touching.friction[wall] > 0.0:
+            t = Vec(frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2])
+            t = t - dot(t, n) * n
+            t = t / norm(t)
+            s = cross(n, t)
+            frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2] = t.x, t.y, t.z
+            frame[a, 2, 0], frame[a, 2, 1], frame[a, 2, 2] = s.x, s.y, s.z
 
 
 @inlined
@@ -163,11 +169,12 @@ def correct(body, chain, rule, lanes, paces, i, number):
         gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
         off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
         error = max(error, off / rule.room)
-    before = pace.unsettled[i] if number > 0 else math.inf
+    before = pace.unsettled[i] if number > 0 else 1.0
     pace.unsettled[i] = error
-    # One correction more than errors of round-off ask for
     late = number >= _PATIENT
-    last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
+    # This correction shrinks the error at least as much as the one before did.
+    last = error <= 1.0 or (number > 0 and error * max(error / before, pace.rate[i]) <= 1.0)
+    last = last or (late and error <= _LARGER and error >= 0.5 * before)
     _eliminate(body, chain, lanes, pace, contacts, (along, across, schur, gap), i)
     creep = _sweep(touching, contacts, schur, gap, change)
     for row in range(m):

@@ -9,6 +9,9 @@ from . import hold, ties
 
 # Most corrections, and after how many the system is factored again.
 _MOST, _AGAIN = 40, 5
+# After this correction a lane that needs more goes on in the next pass: a step after a blow takes five corrections, and
+# 31 lanes would wait for each. Later corrections are one of 80 in free steps.
+_SOON = 1
 
 
 @inlined
@@ -20,12 +23,16 @@ def solve(body, chain, rule, lanes, paces):
     tied, touching = body
     pace, held = paces
     count, guides = pace.h.size, touching.guides
+    alone = rule.stages.size == 1 and guides == 0
     ties.launch(tied, rule.gravity, lanes, pace)
     more = guides
     for i in range(count):
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
             hold.turn(body, chain, lanes, held, pace, i, lanes.ra)
+    # Where the multipliers are guessed well, D is the only error: it follows once more.
+    _push(body, lanes, paces, 0)
+    ties.follow(tied, lanes, pace)
     for turn in range(_MOST + 1):
         # D follows the multipliers before they are corrected: together, the second makes up again for the first.
         _push(body, lanes, paces, more)
@@ -38,7 +45,7 @@ def solve(body, chain, rule, lanes, paces):
         if turn == _MOST or _all(pace.done):
             break
         ties.residual(tied, lanes, pace, turn, rule.noise)
-        if turn % _AGAIN == 0 or more > 0:
+        if turn % _AGAIN == 0 or guides > 0:
             ties.assemble(tied, lanes, pace)
             if guides > 0:
                 for i in range(count):
@@ -54,6 +61,11 @@ def solve(body, chain, rule, lanes, paces):
                 if _is_held(touching, pace, i):
                     hold.correct(body, chain, rule, lanes, paces, i, turn)
         ties.correct(lanes, pace)
+        if alone and turn <= _SOON:
+            for i in range(count):
+                late = (turn == _SOON) & (pace.held[i] == 0) & (not pace.done[i])
+                pace.waits[i] = select(late, pace.waits[i] + 1, select(pace.done[i], 0, pace.waits[i]))
+                pace.done[i] = pace.done[i] | late
         if _all(pace.done):
             _push(body, lanes, paces, more)
             break

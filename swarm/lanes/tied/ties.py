@@ -17,6 +17,8 @@ from ...kernel.jit import inlined, select
 _TOLERANCE = 1e-15
 # By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
 _NEGLECTED = 4.0
+# What a first correction is trusted with: D lags behind it, and what D is off by is missing in the energy.
+_AT_FIRST = 1e-3
 # The rest length that scales the equation of a spring is at least this part of its length.
 _SHORTEST = 1e-8
 
@@ -42,7 +44,8 @@ def launch(ties, gravity, lanes, pace):
             for i in range(count):
                 y = lanes.ra[first, x, i] - lanes.ra[second, x, i]
                 lanes.y0[a, x, i] = y
-                lanes.d[a, x, i] = y + (lanes.p[first, x, i] - lanes.p[second, x, i])
+                d = y + (lanes.p[first, x, i] - lanes.p[second, x, i])
+                lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
 
 
 @inlined
@@ -173,7 +176,7 @@ def residual(ties, lanes, pace, turn, noise):
             _worse(pace.rate, i, abs(k2 * ties.couplings[a, a] * lanes.multiplier[a, i]))
     for i in range(count):
         error, before = pace.error[i], pace.previous[i]
-        rate = select(turn == 0, error, error / before)
+        rate = select((turn == 0) & (pace.waits[i] == 0), _AT_FIRST, error / before)
         rate = select(rate > pace.rate[i], rate, pace.rate[i])
         pace.previous[i] = error
         pace.last[i] = (error * rate <= _TOLERANCE) | (error <= noise)
