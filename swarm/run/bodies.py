@@ -55,8 +55,8 @@ class BodyRun:
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), walls + len(own)
         shape = 3, points, n
         self._bodies = BodyState(
-            particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), np.full((3, rows, n), math.nan),
-            self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
+            particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n),
+            np.full((3, rows, n), math.nan), self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
             np.zeros((walls, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
         )  # fmt: skip
         none = np.zeros(0)
@@ -250,6 +250,8 @@ class BodyRun:
             "link_error": self._link_error(),
             "work": float(work.sum()),
         }
+        if self._body.cavities:
+            self._seen["cavity_impulse"] = pushed[walls + self._touching.guides :]
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""

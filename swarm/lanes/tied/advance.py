@@ -133,7 +133,8 @@ def _finish(body, chain, rule, state, lanes, paces, i):
         short = action == instant.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
         state.short[number] = state.short[number] + 1 if short else 0
         blows = blow.strike(body, chain, rule, lanes, state, i, number)
-        if (action == instant.STRIKE_NOW and blows == 0) or pace.stuck[i] > _LASTS:
+        stays = blow.chatters(body[1], state, number) or pace.stuck[i] > _LASTS
+        if stays or (action == instant.STRIKE_NOW and blows == 0):
             pace.lasts[i] = True
         for a in range(lanes.recent.shape[0]):
             lanes.older[a, i] = math.nan

@@ -15,6 +15,12 @@ _BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
 _CHATTER = 12
 
 
+@inlined
+def chatters(touching, state, number):
+    """Whether bounces follow one another ever faster: then they end."""
+    return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
+
+
 @outlined
 def strike(body, chain, rule, lanes, state, i, number):
     """The blows at one instant, after which no contact at its wall approaches it; how many there are.
@@ -23,8 +29,7 @@ def strike(body, chain, rule, lanes, state, i, number):
     guides leave: K = W - W J (J W J)^-1 J W with a row of J for each. It is the contact step of the scheme for h -> 0.
     """
     touching = body[1]
-    # Bounces that follow one another ever faster end here.
-    bounces = 0.0 if state.short[number] > _CHATTER and min(touching.restitution) < 1.0 else 1.0
+    bounces = 0.0 if chatters(touching, state, number) else 1.0
     name = scratch((MOST_CONTACTS, 2), np.int64)
     frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
     for turn in range(_BLOWS):

@@ -11,7 +11,9 @@ from .contacts import NEAR, point_of, span
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
 # A bracket of the time of impact this narrow, as a part of a whole step, is a point; a step this short from a wall to
 # itself is none.
-_NARROW, _SHORTEST = 1e-13, 1e-5
+_NARROW, _SHORTEST = 1e-13, 1e-4
+# A guess by the velocity that leaves less than this part of the gap is a good one.
+_CLOSER = 0.25
 # Trials after which the bracket is halved each time.
 _QUICK = 40
 # A step whose ties have no solution is halved this often.
@@ -53,11 +55,19 @@ def judge(touching, chain, rule, lanes, pace, i, larger):
         start = walls.distance(chain, float(wall), point_of(touching, lanes.r, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
+    closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]
     if pace.high[i] < math.inf and again:
         pace.inside[i] *= _weight(worst, pace.outside[i])
     pace.high[i], pace.outside[i] = tau, worst
-    # The first guess is by the velocity at the end. It is none where that has a part along the ties.
-    pace.trial[i] = first if low < first < tau and not again else _between(rule, pace, i)
+    # The first guess is by the velocity at the end. It is none where that has a part along the ties. Where it is a good
+    # one, twice as far is just inside.
+    beyond = 2.0 * first - tau
+    if low < first < tau and not again:
+        pace.trial[i] = first
+    elif low == 0.0 and closer and 0.0 < beyond < tau:
+        pace.trial[i] = beyond
+    else:
+        pace.trial[i] = _between(rule, pace, i)
     return AGAIN
 
 
