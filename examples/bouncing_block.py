@@ -44,7 +44,7 @@ def main() -> None:
             label = "elastic" if name == "contact" else name
             energies.plot(seen["time"], seen[f"{name}_energy"], color=color, label=label)
         energies.set(title="energy", xlabel="time [s]", ylabel="energy [J]")
-        energies.legend(loc="upper right")
+        energies.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), ncols=2)
         error.semilogy(seen["time"], np.maximum(seen["energy_error"], 1e-17), ".", color=BLUE, markersize=1.5)
         error.set(title="energy error", xlabel="time [s]", ylabel="relative")
     print(f"written {asked.output}")

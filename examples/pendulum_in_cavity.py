@@ -21,7 +21,7 @@ STEP, EVERY = 1e-3, 5e-3
 def start() -> swarm.Bodies:
     """At rest, both rods nearly level."""
     x, y, z = TOP
-    bobs = [TOP, (x + RODS[0] * np.sin(1.2), y, z - RODS[0] * np.cos(1.2)), (0.05, 0.1, 0.0)]
+    bobs = [TOP, (x + RODS[0] * np.sin(1.2), y, z - RODS[0] * np.cos(1.2)), (0.05, 0.0, 0.0)]
     bobs[2] = tuple(bobs[1] + RODS[1] * (np.array(bobs[2]) - bobs[1]) / np.linalg.norm(np.array(bobs[2]) - bobs[1]))
     body = swarm.Body(bobs, mass=[1.0, *MASSES], links=[(0, 1), (1, 2)], anchors={0: None})
     return swarm.Bodies(body, body.points.T[:, :, None], np.zeros((3, 3, 1)))
@@ -49,7 +49,9 @@ def main() -> None:
         with swarm.load(Path(folder) / "pendulum.h5") as trajectory:
             paths = [trajectory.particle(point)[0] for point in (1, 2)]
     print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}")
-    print(f"rods {seen['link_error'].max():.1e} of their lengths, deepest {seen['max_penetration'].max():.1e} m outside")
+    print(
+        f"rods {seen['link_error'].max():.1e} of their lengths, deepest {seen['max_penetration'].max():.1e} m outside"
+    )
     with page(asked.output, "A double pendulum in a ball", 1, 2, (7.0, 3.4)) as (side, energy):
         circle = np.linspace(0.0, 2.0 * np.pi, 400)
         side.plot(RADIUS * np.cos(circle), RADIUS * np.sin(circle), color=GREY)

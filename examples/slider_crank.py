@@ -106,7 +106,9 @@ def main() -> None:
     asked = ask.parse_args()
     result, motion = run(asked.revolutions, asked.restitution)
     seen = result.observables
-    print(f"{asked.revolutions} revolutions, {seen['impacts'][-1]} impacts, {seen['sliding_time'][-1]:.3g} s in contact")
+    print(
+        f"{asked.revolutions} revolutions, {seen['impacts'][-1]} impacts, {seen['sliding_time'][-1]:.3g} s in contact"
+    )
     print(f"work of the crank {seen['work'][-1]:.6g} J, {seen['dissipated_energy'][-1]:.6g} J lost in impacts")
     print(f"energy error {seen['energy_error'].max():.1e}, rod {seen['link_error'].max():.1e} of its length")
     print(f"largest force, mean of a degree, {motion.force.max():.4g} N")

@@ -137,7 +137,9 @@ class Scene:
     def distances_outside(self, points: ArrayLike) -> NDArray[np.float64]:
         """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
         slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
-        return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
+        # At the centre of a ball the slope is 0, and a point is as far inside as can be.
+        with np.errstate(over="ignore"):
+            return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
     def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
         """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""

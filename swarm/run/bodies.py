@@ -54,13 +54,13 @@ class BodyRun:
         self._chains = scene.chain(), chain_of([*scene.surfaces, *own])
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), walls + len(own)
         shape = 3, points, n
+        none, never = np.zeros(0), np.zeros((3, rows, n))
+        never[1:] = math.nan
         self._bodies = BodyState(
-            particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n),
-            np.full((3, rows, n), math.nan), self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
+            particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), never,
+            self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
             np.zeros((walls, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
         )  # fmt: skip
-        none = np.zeros(0)
-        self._bodies.guess[0] = 0.0
         impacts = np.zeros(points * n, np.int64)
         # What files take of a run.
         self.state = State(
