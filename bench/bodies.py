@@ -7,8 +7,10 @@ import numpy as np
 
 import swarm
 
+from .peers import mujoco
 from .report import Row, in_turn, show, write
 
+WALLS = (0.5, 0.4, 0.3)
 COUNT, DT, SPEED, SPIN = 10_000, 5e-3, 0.5, 2.0
 # Steps that are timed, and how long impacts are counted and figures conserved [s].
 _STEPS, _LONG = 100, 200.0
@@ -102,13 +104,79 @@ def impacts(name: str, quick: bool) -> list[Row]:
     ]
 
 
+def leaning() -> dict[str, tuple[swarm.Body, np.ndarray]]:
+    """Bodies one corner of which stays on a floor, and their velocities."""
+    rod = swarm.Body([(0, 0, 0), (0.06, 0, 0.08)], mass=1.0, links=[(0, 1)], contacts=[0])
+    edges = swarm.tetrahedron(0.1, 4.0).points
+    arms = edges - edges[0]
+    up = arms.mean(axis=0) / np.linalg.norm(arms.mean(axis=0))
+    side = np.cross(up, (1.0, 0.0, 0.0))
+    side /= np.linalg.norm(side)
+    corners = arms @ np.stack([side, np.cross(up, side), up]).T
+    top = swarm.Body(corners, mass=1.0, links=[(i, j) for i in range(4) for j in range(i)], contacts=[0])
+    return {
+        "dumbbell": (rod, np.zeros((2, 3))),
+        "tetrahedron": (top, np.cross((0.0, 0.0, 10.0), corners)),
+    }
+
+
+def contacts(name: str, quick: bool) -> list[Row]:
+    """A step with a contact that lasts: a corner slides on a floor, and the same body far above it."""
+    count = 32 if quick else 2_000
+    body, velocity = leaning()[name]
+    start = swarm.Bodies(body, *(np.repeat(part.T[:, :, None], count, axis=2) for part in (body.points, velocity)))
+    ways = {}
+    for what, depth in {"with a contact": 0.0, "without": 50.0}.items():
+        walls = [swarm.Plane((0.0, 0.0, -1.0), depth, restitution=0.0), swarm.Sphere(100.0)]
+        scene = swarm.Scene(walls, gravity=(0.0, 0.0, -1.0))
+        _run(scene, start, DT, 1)
+        ways[what] = _nanoseconds(scene, start, 2 if quick else 2 * _STEPS, 1, 2)
+    figures = in_turn(ways, 1 if quick else 5)
+    share = figures["with a contact"][0] / figures["without"][0]
+    bar = str(4 * int(_BARS[name]))
+    return [
+        Row(f"{name} on a floor, a step with a contact", *figures["with a contact"], "ns", bar),
+        Row("  in steps without contact", share, share, "steps", "4"),
+    ]
+
+
+def beside(quick: bool) -> list[Row]:
+    """A tetrahedron in a box here and in MuJoCo: energy error, and microseconds for a second of its motion."""
+    until, count = (1.0, 16) if quick else (10.0, 1_000)
+    scene = swarm.Scene([swarm.Box(WALLS)])
+    start = swarm.place(scene, makers()["tetrahedron"](), count, speed=SPEED, spin=SPIN, seed=0)
+    _run(scene, start, DT, 1)
+    begin = time.perf_counter()
+    seen = _run(scene, start, until, 1).observables
+    spent = 1e6 * (time.perf_counter() - begin) / until / count
+    error = float(seen["energy_error"].max())
+    rows = [
+        Row("tetrahedron in a box, swarm, dt = 5e-3 s, a second of one body", spent, spent, "us"),
+        Row("  energy error", error, error, ""),
+    ]
+    try:
+        name = mujoco.version()
+    except ImportError:
+        print(f"MuJoCo is not installed, and left out: {mujoco.INSTALL}")
+        return rows
+    for dt in (5e-3, 1e-3) if quick else (5e-3, 1e-3, 1e-4, 1e-5):
+        error, seconds = mujoco.run(start.body.points, WALLS, 4.0, (SPEED, SPIN), (dt, until))
+        cost = 1e6 * seconds / until
+        rows.append(Row(f"tetrahedron in a box, {name}, dt = {dt:g} s", cost, cost, "us"))
+        rows.append(Row("  energy error", error, error, ""))
+    return rows
+
+
 def main(quick: bool) -> None:
     """Measure, print, and write the table of this machine."""
     rows = []
     for name in makers():
         rows += steps(name, quick)
     for name in ("dumbbell", "tetrahedron"):
+        rows += contacts(name, quick)
+    for name in ("dumbbell", "tetrahedron"):
         rows += impacts(name, quick)
+    rows += beside(quick)
     show(rows)
     if not quick:
         write(rows, "bodies")

@@ -91,7 +91,8 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
     count = len(arms)
     turns, middles, found, tried = np.empty((3, 3, n)), np.empty((3, n)), 0, 0
     while found < n:
-        size = max(1, min(_BATCH // count, 2 * (n - found) + 64))
+        # Ever more at once, while none is found.
+        size = max(1, min(_BATCH // count, max(2 * (n - found) + 64, 0 if found else tried)))
         trial, turn = low + (high - low) * random.random((3, size)), _rotations(random, size)
         inside = np.ones(size, bool)
         for arm in arms:

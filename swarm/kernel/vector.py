@@ -1,9 +1,9 @@
 """Vectors of three numbers, with the operators of Python: the same definitions in kernels and in plain Python."""
 
-import math
 import operator
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
@@ -110,7 +110,8 @@ def square(a):
 @inlined
 def norm(a):
     """|a|"""
-    return math.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+    # Of NumPy, so that in plain Python too 1/|0| is an infinity.
+    return np.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
 
 
 @inlined

@@ -30,9 +30,10 @@ def solve(body, chain, rule, lanes, paces):
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
             hold.turn(body, chain, lanes, held, pace, i, lanes.ra)
-    # Where the multipliers are guessed well, D is the only error: it follows once more.
-    _push(body, lanes, paces, 0)
-    ties.follow(tied, lanes, pace)
+    if tied.ends.shape[0] > 1:
+        # Where the multipliers are guessed well, D is the only error, and with one tie none: it follows once more.
+        _push(body, lanes, paces, 0)
+        ties.follow(tied, lanes, pace)
     for turn in range(_MOST + 1):
         # D follows the multipliers before they are corrected: together, the second makes up again for the first.
         _push(body, lanes, paces, more)

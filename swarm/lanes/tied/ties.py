@@ -17,6 +17,8 @@ from ...kernel.jit import inlined, select
 _TOLERANCE = 1e-15
 # By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
 _NEGLECTED = 4.0
+# A tie under pressure makes the first guess of D longer; at most by 1 over this.
+_LEAST = 0.5
 # What a first correction is trusted with: D lags behind it, and what D is off by is missing in the energy.
 _AT_FIRST = 1e-3
 # The rest length that scales the equation of a spring is at least this part of its length.
@@ -40,11 +42,16 @@ def launch(ties, gravity, lanes, pace):
                     lanes.p[q, x, i] = lanes.r1[q, x, i]
     for a in range(ties.ends.shape[0]):
         first, second = ties.ends[a, 0], ties.ends[a, 1]
+        w = ties.couplings[a, a]
+        for i in range(count):
+            longer = 1.0 + 0.5 * pace.h[i] * pace.h[i] * w * lanes.multiplier[a, i]
+            pace.rate[i] = 1.0 / select(longer > _LEAST, longer, _LEAST)
         for x in range(3):
             for i in range(count):
                 y = lanes.ra[first, x, i] - lanes.ra[second, x, i]
                 lanes.y0[a, x, i] = y
-                d = y + (lanes.p[first, x, i] - lanes.p[second, x, i])
+                # With one tie it is this much shorter, exactly.
+                d = (y + (lanes.p[first, x, i] - lanes.p[second, x, i])) * pace.rate[i]
                 lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
 
 
