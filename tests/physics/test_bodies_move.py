@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.run.bodies import BodyRun
 
 ROOT = Path(__file__).parents[2]
 STEP = 5e-3
@@ -214,3 +215,44 @@ def test_impacts_share_the_energy_of_cubes_over_their_six_freedoms():
     assert translation / rotation == pytest.approx(1.0, abs=0.2)
     assert result.observables["energy_error"].max() < 1e-12
     assert result.observables["max_penetration"].max() < 1e-13
+
+
+# --- Halts in the middle of a frame ------------------------------------------------------------------------
+
+
+def rough():
+    walls = [swarm.Box((0.5, 0.4, 0.3), restitution=0.3, friction=0.3)]
+    return swarm.Scene(walls, gravity=(0.0, 0.0, -5.0)), some("tetrahedron", walls, 40), 2
+
+
+def whipping():
+    scene = swarm.Scene(SPHERE, gravity=(0.0, 0.0, -9.81))
+    return scene, swarm.place(scene, swarm.chain(6, 0.4, 1.0), 40, speed=1.0, spin=4.0, seed=1), 2
+
+
+def tumbling():
+    return swarm.Scene(BOX), some("tetrahedron", BOX, 80), 2
+
+
+def composed():
+    return swarm.Scene(BOX), some("dumbbell", BOX, 80), 4
+
+
+@pytest.mark.parametrize("make", [rough, whipping, tumbling, composed])
+def test_a_frame_that_is_halted_again_and_again_has_the_same_bits(make):
+    scene, start, order = make()
+    method, ends = swarm.Impact(dt=STEP, order=order), []
+    for first, threads, size in ((None, 2, 16), (3, 1, 40), (50, 2, 7)):
+        with BodyRun(scene, start, start.particles(), method, threads, size) as one:
+            for k in range(3):
+                passes = first
+                while True:
+                    if first is not None:
+                        one.halt(passes)
+                    if one.advance(0.7, 0.7 * (k + 1)):
+                        break
+                    passes = 2 * passes
+            ends.append({name: array.copy() for name, array in one.arrays().items()})
+    for end in ends[1:]:
+        for name, array in end.items():
+            np.testing.assert_array_equal(array, ends[0][name], err_msg=name)

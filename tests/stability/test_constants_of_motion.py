@@ -25,7 +25,7 @@ def shipped(name, number):
     Losses would end the impacts; soft walls and multipliers are not tested here.
     """
     job = scene_file.read(SCENES / f"{name}.toml")
-    surfaces = [replace(s, restitution=1.0) if s.restitution < 1.0 else s for s in job.scene.surfaces]
+    surfaces = [replace(s, restitution=1.0, friction=0.0) for s in job.scene.surfaces]
     particles = job.start()
     few = swarm.Particles(
         *(column[..., :number] for column in (particles.position, particles.velocity, particles.mass))
@@ -80,6 +80,7 @@ CONSTANTS = {
     "floor": [spin],
     "formula": [spin],
     "groove": [sideways],
+    "hopper": [],
     "multipliers": [spin],
     "obstacles": [],
     "splash": [spin],

@@ -21,6 +21,9 @@ _STUCK = 2000
 _SHORT = 1.0 / 16.0
 # A step that is put off more often has no solution.
 _WAITS = 20
+# The forces of contacts that last are guessed from the step before, but each time after so many steps, where a run can
+# be halted: they are not part of its state.
+_AFRESH = 32
 # After so many blows without a step the contacts last.
 _LASTS = 20
 
@@ -64,6 +67,10 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         pace.body[i] = -1
     begin, end, passes = 0, 0, 0
     while True:
+        halted = passes >= halt[0]
+        if halted:
+            begin, end = -1, -1
+            _stop(state, lanes, pace)
         live = 0
         for i in range(count):
             while pace.body[i] < 0 and begin >= 0:
@@ -78,10 +85,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
                 begin += 1
             live += pace.body[i] >= 0
         if live == 0:
-            return Status.DONE, 0
-        if passes >= halt[0]:
-            _store_all(state, lanes, pace)
-            return Status.INTERRUPTED, 0
+            return (Status.INTERRUPTED if halted else Status.DONE), 0
         passes += 1
         _try(body, chains[1], rule, state, lanes, (pace, held))
         _look(body[1], chains, lanes, pace, c)
@@ -173,6 +177,16 @@ def _store(state, lanes, pace, i):
 
 
 @inlined
+def _stop(state, lanes, pace):
+    """Give back the bodies that go on with the same bits from their positions and velocities alone."""
+    for i in range(pace.body.size):
+        number = pace.body[i]
+        if number >= 0 and pace.stuck[i] == 0 and (not pace.lasts[i] or state.steps[number] % _AFRESH == 0):
+            _store(state, lanes, pace, i)
+            pace.body[i] = -1
+
+
+@inlined
 def _store_all(state, lanes, pace):
     for i in range(pace.body.size):
         if pace.body[i] >= 0:
@@ -194,6 +208,8 @@ def _try(body, chain, rule, state, lanes, paces):
     for i in range(count):
         if pace.body[i] >= 0 and pace.lasts[i]:
             if pace.fresh[i] or not pace.solved[i]:
+                if state.steps[pace.body[i]] % _AFRESH == 0:
+                    pace.held[i] = 0
                 hold.begin(body, chain, rule, lanes, paces, i)
             hold.forget(held, i)
         pace.solved[i] = True

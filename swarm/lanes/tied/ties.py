@@ -185,7 +185,8 @@ def residual(ties, lanes, pace, turn, noise):
         error, before = pace.error[i], pace.previous[i]
         rate = select((turn == 0) & (pace.waits[i] == 0), _AT_FIRST, error / before)
         rate = select(rate > pace.rate[i], rate, pace.rate[i])
-        pace.previous[i] = error
+        # What is put off goes on from here in the next pass, however many corrections its neighbours take in this one.
+        pace.previous[i] = select(pace.done[i], before, error)
         pace.last[i] = (error * rate <= _TOLERANCE) | (error <= noise)
 
 
