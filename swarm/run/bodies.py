@@ -51,6 +51,7 @@ class BodyRun:
         self._ties = ties_of(bodies.body)
         self._touching = touching_of(bodies.body, self._ties, scene)
         own = own_surfaces(bodies.body)
+        self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
         self._chains = scene.chain(), chain_of([*scene.surfaces, *own])
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), walls + len(own)
         shape = 3, points, n
@@ -212,8 +213,8 @@ class BodyRun:
     def _out_of_own(self) -> Iterator[NDArray[np.float64]]:
         """How far points are out of the cavities that others carry."""
         r = self._bodies.position
-        for surface, carrier, point in self._body.cavities:
-            yield Scene([surface]).distances_outside(r[:, point] - r[:, carrier])
+        for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+            yield scene.distances_outside(r[:, point] - r[:, carrier])
 
     def observe(self) -> None:
         """Observe the bodies as they are."""
@@ -225,9 +226,10 @@ class BodyRun:
         state.impacts[:] = np.tile(bodies.impacts, len(self._body))
         momentum = np.tensordot(self._ties.mass, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
         spin = np.cross(bodies.position, momentum, axis=0).sum(axis=(1, 2))
-        points = np.tensordot(self._body.contacts, bodies.position, axes=(1, 1)).transpose(1, 0, 2)
-        depth = self._scene.distances_outside(points.reshape(3, -1)).max(initial=0.0)
-        depth = max(depth, *(out.max() for out in self._out_of_own()), 0.0)
+        depth = max([0.0, *(out.max() for out in self._out_of_own())])
+        if len(self._body.contacts):
+            points = np.tensordot(self._body.contacts, bodies.position, axes=(1, 1)).transpose(1, 0, 2)
+            depth = max(depth, self._scene.distances_outside(points.reshape(3, -1)).max(initial=0.0))
         pushed, walls = bodies.impulse.sum(axis=1), len(self._owners)
         impulse = np.bincount(self._owners, weights=pushed[:walls], minlength=len(self._scene.surfaces))
         self._seen = {

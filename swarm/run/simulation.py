@@ -41,7 +41,8 @@ class Result:
     Attributes:
         particles: the particles at `until`.
         observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
-            and "wall_heat" (frames, surfaces).
+            and "wall_heat" (frames, surfaces). Of bodies also "link_error", the "work" of led anchors [J], and
+            "cavity_impulse" (frames, cavities) of what points carry [N s].
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
