@@ -47,7 +47,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
     )  # fmt: skip
     pace = Pace(
-        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
+        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),

@@ -101,6 +101,7 @@ class Pace(NamedTuple):
     step: Any  # the step that is tried [s]
     h: Any  # of the stage [s]
     error: Any
+    lag: Any  # by how much D changed when it followed last: the sum of squares [m^2]
     previous: Any  # error
     rate: Any
     residue: Any  # of the equations of ties and guides, in units of round-off

@@ -45,7 +45,7 @@ def solve(body, chain, rule, lanes, paces):
         _push(body, lanes, paces, more)
         if turn == _MOST or _all(pace.done):
             break
-        ties.residual(tied, lanes, pace, turn, rule.noise)
+        ties.residual(tied, lanes, pace, turn, rule)
         if turn % _AGAIN == 0 or guides > 0:
             ties.assemble(tied, lanes, pace)
             if guides > 0:

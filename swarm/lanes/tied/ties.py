@@ -17,6 +17,8 @@ from ...kernel.jit import inlined, select
 _TOLERANCE = 1e-15
 # By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
 _NEGLECTED = 4.0
+# By how much D may still change, in units of round-off of a place.
+_SETTLED = 64.0
 # A tie under pressure makes the first guess of D longer; at most by 1 over this.
 _LEAST = 0.5
 # What a first correction is trusted with: D lags behind it, and what D is off by is missing in the energy.
@@ -82,11 +84,15 @@ def follow(ties, lanes, pace):
 
     In a lane that is done D stays as it is: with the multipliers, which stay too, it gives the same r1 again.
     """
+    for i in range(lanes.r1.shape[2]):
+        pace.lag[i] = 0.0
     for a in range(ties.ends.shape[0]):
         first, second = ties.ends[a, 0], ties.ends[a, 1]
         for x in range(3):
             for i in range(lanes.r1.shape[2]):
                 d = lanes.y0[a, x, i] + (lanes.r1[first, x, i] - lanes.r1[second, x, i])
+                change = d - lanes.d[a, x, i]
+                pace.lag[i] += change * change
                 lanes.d[a, x, i] = select(pace.done[i], lanes.d[a, x, i], d)
 
 
@@ -131,7 +137,7 @@ def accelerate(ties, lanes):
 
 
 @inlined
-def residual(ties, lanes, pace, turn, noise):
+def residual(ties, lanes, pace, turn, rule):
     """How far each tie is from its equation, as an error of |y1|^2; which lanes need no more than one correction."""
     f, count, rows = lanes.f, lanes.f.shape[1], ties.ends.shape[0]
     links, soft = ties.links, ties.links + ties.springs
@@ -184,10 +190,16 @@ def residual(ties, lanes, pace, turn, noise):
     for i in range(count):
         error, before = pace.error[i], pace.previous[i]
         rate = select((turn == 0) & (pace.waits[i] == 0), _AT_FIRST, error / before)
+        # Of slow turns what D lags behind is along D, where it does no work.
+        turned = select(pace.rate[i] < 1.0, pace.rate[i], 1.0)
+        counts = turned * turned * turned * turned
         rate = select(rate > pace.rate[i], rate, pace.rate[i])
         # What is put off goes on from here in the next pass, however many corrections its neighbours take in this one.
         pace.previous[i] = select(pace.done[i], before, error)
-        pace.last[i] = (error * rate <= _TOLERANCE) | (error <= noise)
+        # A turn by 1 in a step can meet the lengths with a D that is far off, and loses 2e-8 of the energy.
+        room = _SETTLED * rule.room
+        settled = counts * counts * pace.lag[i] <= room * room
+        pace.last[i] = settled & ((error * rate <= _TOLERANCE) | (error <= rule.noise))
 
 
 @inlined
