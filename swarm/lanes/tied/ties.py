@@ -190,8 +190,8 @@ def residual(ties, lanes, pace, turn, rule):
     for i in range(count):
         error, before = pace.error[i], pace.previous[i]
         rate = select((turn == 0) & (pace.waits[i] == 0), _AT_FIRST, error / before)
-        # Of slow turns what D lags behind is along D, where it does no work.
-        turned = select(pace.rate[i] < 1.0, pace.rate[i], 1.0)
+        # Of slow turns what D lags behind is along D, where it does no work, but for ties whose length changes.
+        turned = select((pace.rate[i] < 1.0) & (links == rows), pace.rate[i], 1.0)
         counts = turned * turned * turned * turned
         rate = select(rate > pace.rate[i], rate, pace.rate[i])
         # What is put off goes on from here in the next pass, however many corrections its neighbours take in this one.
