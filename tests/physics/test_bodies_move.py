@@ -41,7 +41,8 @@ def test_energy_links_and_walls_are_kept(kind, surfaces, gravity):
 def test_angular_momentum_about_the_centre_of_a_sphere_is_kept():
     seen = run(some("tetrahedron", SPHERE, 40), SPHERE, 20.0, every=5.0).observables
     change = np.abs(seen["angular_momentum"] - seen["angular_momentum"][0]).max()
-    assert change < 1e-11 * np.abs(seen["angular_momentum"][0]).max()
+    # A first guess of D that is not the same for all ties leaves 1e-12.
+    assert change < 1e-13 * np.abs(seen["angular_momentum"][0]).max()
 
 
 def test_momentum_of_free_flight_is_kept():

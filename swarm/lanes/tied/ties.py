@@ -45,14 +45,16 @@ def launch(ties, gravity, lanes, pace):
     for a in range(ties.ends.shape[0]):
         first, second = ties.ends[a, 0], ties.ends[a, 1]
         w = ties.couplings[a, a]
+        alone = ties.ends.shape[0] == 1
         for i in range(count):
             longer = 1.0 + 0.5 * pace.h[i] * pace.h[i] * w * lanes.multiplier[a, i]
-            pace.rate[i] = 1.0 / select(longer > _LEAST, longer, _LEAST)
+            pace.rate[i] = 1.0 / select(longer > _LEAST, longer, _LEAST) if alone else 1.0
         for x in range(3):
             for i in range(count):
                 y = lanes.ra[first, x, i] - lanes.ra[second, x, i]
                 lanes.y0[a, x, i] = y
-                # With one tie it is this much shorter, exactly.
+                # One tie alone is this much shorter, exactly. Of several, each made shorter by its own would turn the
+                # forces between them: 1e-13 of the angular momentum a step, where all as they are leave its round-off.
                 d = (y + (lanes.p[first, x, i] - lanes.p[second, x, i])) * pace.rate[i]
                 lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
 
@@ -189,7 +191,9 @@ def residual(ties, lanes, pace, turn, rule):
             _worse(pace.rate, i, abs(k2 * ties.couplings[a, a] * lanes.multiplier[a, i]))
     for i in range(count):
         error, before = pace.error[i], pace.previous[i]
-        rate = select((turn == 0) & (pace.waits[i] == 0), _AT_FIRST, error / before)
+        # In a pass that goes on D has followed twice since: the ratio says too little.
+        rate = select(pace.waits[i] == 0, 0.0, error / before)
+        rate = select(turn > 0, error / before, select(rate > _AT_FIRST, rate, _AT_FIRST))
         # Of slow turns what D lags behind is along D, where it does no work, but for ties whose length changes.
         turned = select((pace.rate[i] < 1.0) & (links == rows), pace.rate[i], 1.0)
         counts = turned * turned * turned * turned
