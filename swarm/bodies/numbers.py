@@ -1,8 +1,14 @@
-"""A body as its kernels take it."""
+"""A body, and the method that advances it, as kernels take them."""
+
+import math
 
 import numpy as np
 
 from ..lanes.tied.arrays import Ties, Touching
+from ..lanes.tied.contacts import MOST_CONTACTS
+from ..lanes.tied.soft import Soft
+from ..methods import AugmentedLagrangian
+from ..methods.base import Method
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces.surface import Surface
@@ -10,18 +16,26 @@ from .body import Body
 from .checked import Pairs
 
 
-def ties_of(body: Body) -> Ties:
-    """What ties its points."""
+def ties_of(body: Body, penalty: float | None = None) -> Ties:
+    """What ties its points; with a penalty its links are held by multipliers of Uzawa's loop."""
     ends = body.bonds()
     links, springs, edges = len(body.links), len(body.springs), 0 if body.strain is None else len(body.strain.edges)
+    relaxed = 0 if penalty is None else links
+    order = np.arange(len(ends))
+    if relaxed:
+        # After the springs: they are edges of a diagonal stiffness.
+        order = np.concatenate([order[links : links + springs], order[:links], order[links + springs :]])
+        ends = ends[order]
     tied = body.points[ends[:, 0]] - body.points[ends[:, 1]]
     rest, stiffness = (tied**2).sum(axis=1), np.zeros(len(ends))
-    compliance: Floats = np.zeros((edges, edges))
-    for row, (_i, _j, k, length) in enumerate(body.springs, start=links):
+    for row, (_i, _j, k, length) in enumerate(body.springs, start=links - relaxed):
         stiffness[row], rest[row] = k, length
+    compliance = np.zeros((relaxed + edges, relaxed + edges))
+    if penalty is not None:
+        compliance[:relaxed, :relaxed] = np.diag(8.0 / penalty * rest[springs : springs + relaxed])
     if body.strain is not None:
         rest[links + springs :] = body.strain.rest
-        compliance = np.asarray(2.0 * np.linalg.inv(body.strain.stiffness), dtype=np.float64)
+        compliance[relaxed:, relaxed:] = 2.0 * np.linalg.inv(body.strain.stiffness)
     is_free = np.ones(len(body), np.bool_)
     is_free[list(body.anchors)] = False
     free = np.flatnonzero(is_free)
@@ -38,8 +52,8 @@ def ties_of(body: Body) -> Ties:
     led = np.full(len(body), -1)
     led[led_points(body)] = np.arange(len(led_points(body)))
     return Ties(
-        ends, links, springs, rest, stiffness, compliance, start, inverse, body.mass_matrix, is_diagonal, is_free,
-        led, couplings,
+        ends, links - relaxed, springs, relaxed, rest, stiffness, compliance, start, inverse, body.mass_matrix,
+        is_diagonal, is_free, led, couplings,
     )  # fmt: skip
 
 
@@ -61,6 +75,26 @@ def _combinations(body: Body) -> Floats:
     held = np.eye(len(body))[[point for point, _surface in body.guides]]
     carried = np.array([(point, carrier) for _surface, carrier, point in body.cavities], np.int64).reshape(-1, 2)
     return np.concatenate([body.contacts, held, _differences(carried, len(body))])
+
+
+def walls_of(method: Method) -> Soft | None:
+    """What the walls are: None for rigid ones."""
+    if method.is_rigid():
+        return None
+    law = method.law()
+    if not isinstance(method, AugmentedLagrangian):
+        return Soft(law, math.inf, 1, False, 0.0)
+    # The gap at which V is the tolerance, alpha g^(a+1)/(a+1)
+    power = method.exponent + 1.0
+    deepest = (power * method.tolerance / method.penalty) ** (1.0 / power)
+    return Soft(law, method.tolerance, method.max_sweeps, True, deepest)
+
+
+def most_contacts_of(touching: Touching, walls: Soft | None) -> int:
+    """How many contacts of a body are solved at once: where walls are springs all that there can be."""
+    if walls is None or walls.is_cut:
+        return MOST_CONTACTS
+    return max(1, touching.points * touching.walls + len(touching.plain) - touching.points - touching.guides)
 
 
 def own_surfaces(body: Body) -> list[Surface]:

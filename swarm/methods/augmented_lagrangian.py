@@ -48,6 +48,10 @@ class AugmentedLagrangian(base.Method):
     The converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of
     the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
+    Of bodies the multipliers hold walls and links together, with exponent 1 and adaptive=True: V is the sum of
+    alpha g^2/2 of contacts and alpha c^2/2 of links, c = (|y|^2 - l^2)/(2 l). A step shorter than dt, cut at an impact,
+    has the penalty alpha (dt/h)^2, since a sweep shrinks errors by alpha h^2/m. The converged one is Impact(dt=...).
+
     Args:
         dt: step h > 0 [s]. Frames must fall on whole steps, unless adaptive.
         penalty: alpha > 0, the weight of the loop (N/m for a = 1 and a gap in m); larger ones need fewer sweeps.

@@ -35,6 +35,7 @@ class Penalty(fixed_step.SoftWalls):
     Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt: a contact step counts only
     if its energy balances, and one that cannot be solved (a step longer than the cavity into several walls at once)
     ends the run with an error. Walls are compliant: for a = 1 a particle is up to |v| sqrt(m/alpha) deep in one.
+    Of bodies the links stay rigid, and walls are springs for their contact points, each alone or in cavities.
     Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
     look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
     edge of a solid that is shorter than |v| dt.

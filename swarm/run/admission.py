@@ -4,8 +4,9 @@ import numpy as np
 
 from ..bodies.state import Bodies
 from ..errors import SceneError
-from ..methods import Impact
-from ..methods.base import Method, check_surfaces
+from ..methods import AugmentedLagrangian, Impact, Penalty
+from ..methods.base import Method, check_laws, check_surfaces
+from ..methods.fixed_step import check_solids
 from ..motion import led
 from ..particles import Particles
 from ..scene import Scene
@@ -50,10 +51,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
     """A run of bodies, checked."""
-    if not isinstance(method, Impact) or method.dt is None:
-        raise SceneError(f"bodies need the method Impact with a step, got {method}; give Impact(dt=...) [s]")
-    if method.contact_step > 0.0:
-        raise SceneError(f"contact_step must be 0 with bodies, whose blows are exact, got {method.contact_step:g}")
+    _require_method_of_bodies(scene, bodies, method, options)
     for i, surface in enumerate(scene.surfaces):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
@@ -70,6 +68,53 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
             scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2)))
         )
     return Task(scene, bodies.particles(), method, options, bodies)
+
+
+def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
+    """Raise a `SceneError` where the method does not know bodies, or an argument of it none."""
+    if not isinstance(method, (Impact, Penalty, AugmentedLagrangian)) or method.dt is None:
+        raise SceneError(
+            f"bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {method}; give "
+            "Impact(dt=...) [s]"
+        )
+    if isinstance(method, Impact):
+        if method.contact_step > 0.0:
+            raise SceneError(f"contact_step must be 0 with bodies, whose blows are exact, got {method.contact_step:g}")
+        return
+    _require_of_soft(scene, bodies, method)
+    if isinstance(method, Penalty):
+        if len(bodies.body.contacts):
+            velocity = np.tensordot(bodies.body.contacts, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
+            both = bodies.contact_points(), velocity
+            check_solids(scene, Particles(*(np.ascontiguousarray(one.reshape(3, -1)) for one in both)), method.dt)
+        method.span("until", options.times.until)
+        assert options.times.every is not None
+        method.span("every", options.times.every)
+
+
+def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLagrangian) -> None:
+    """Raise a `SceneError` where an argument of the method, or a wall, is none for bodies."""
+    name = type(method).__name__
+    for argument, value in (("gradient", "composite"), ("acceleration", "none")):
+        given = getattr(method, argument, value)
+        if given != value:
+            raise SceneError(f'{argument} of {name} must be "{value}" with bodies, got "{given}"')
+    if isinstance(method, AugmentedLagrangian) and method.exponent != 1.0:
+        raise SceneError(
+            f"exponent of AugmentedLagrangian must be 1 with bodies, got {method.exponent:g}: its loop has no limit "
+            "for others; such walls are for Penalty"
+        )
+    if isinstance(method, AugmentedLagrangian) and not method.adaptive:
+        raise SceneError(
+            "adaptive of AugmentedLagrangian must be True with bodies, got False: a loop that does not start from the "
+            "wall has no limit, and its multiplier would tear the links"
+        )
+    if getattr(method, "on_unconverged", "raise") == "impact":
+        raise SceneError('on_unconverged must be "raise" or "count" with bodies, got "impact"; use Impact(dt=...)')
+    check_laws(name, scene)
+    for k, (surface, _carrier, _point) in enumerate(bodies.body.cavities):
+        if surface.restitution != 1.0 or surface.friction != 0.0:
+            raise SceneError(f"cavities[{k}] must be elastic with {name}, got {surface}; use Impact(dt=...)")
 
 
 def _lead(bodies: Bodies) -> None:

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.numbers import led_points, own_surfaces, ties_of, touching_of
+from ..bodies.numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
 from ..bodies.state import Bodies
+from ..contact.energy import contact_energy
 from ..errors import RunError
+from ..kernel.vector import column
 from ..lanes.tied.advance import advance_bodies
 from ..lanes.tied.arrays import BodyState, Rule
-from ..methods import Impact
+from ..methods.base import Method
 from ..particles import Particles, State
 from ..scene import Scene
 from ..status import Status
@@ -41,14 +43,15 @@ class BodyRun:
     """The copies of a body, advanced from frame to frame; a context that ends its threads."""
 
     def __init__(
-        self, scene: Scene, bodies: Bodies, particles: Particles, method: Impact, threads: int,
+        self, scene: Scene, bodies: Bodies, particles: Particles, method: Method, threads: int,
         block_size: int | None = None, compile: str = "always",
     ) -> None:  # fmt: skip
-        assert method.dt is not None
-        self._scene, self._body = scene, bodies.body
+        self._scene, self._body, self._method = scene, bodies.body, method
+        self._law = method.law()
+        looped = method.has_multipliers()
         n, points, walls = len(bodies), len(bodies.body), len(scene.owners())
         self._owners = scene.owners()
-        self._ties = ties_of(bodies.body)
+        self._ties = ties_of(bodies.body, self._law.alpha if looped else None)
         self._touching = touching_of(bodies.body, self._ties, scene)
         own = own_surfaces(bodies.body)
         self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
@@ -61,6 +64,7 @@ class BodyRun:
             particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), never,
             self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
             np.zeros((walls, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
+            np.zeros(n, np.int64), np.zeros(n, np.int64),
         )  # fmt: skip
         impacts = np.zeros(points * n, np.int64)
         # What files take of a run.
@@ -69,17 +73,23 @@ class BodyRun:
             None,
         )  # fmt: skip
         size = scene.finite_size()
-        self._deepest = _OUTSIDE * size
+        self._deepest = _OUTSIDE * size if method.is_rigid() else math.inf
         # Sines of two libraries differ in the last bit.
         choice = "always" if compile == "auto" and led_points(bodies.body) else compile
         self._tier = Tier(choice, self._chains, n * points)
-        per_lane = 8 * (24 * points + 10 * rows + rows * rows + 40)
+        soft = walls_of(method)
+        contacts = most_contacts_of(self._touching, soft)
+        per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
         most = max(1, min(_MOST_LANES, _STACK // per_lane, n))
         lanes = 1 if self._tier.is_plain else most
         room = _ROUND_OFF * max(size, scene.extent())
-        noise = room / math.sqrt(min([*self._ties.rest[: self._ties.links], size * size]))
+        noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
         gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
-        self._rule = Rule(method.dt, np.array(STAGES[method.order]), gravity, 0.0, room, noise, lanes)
+        strict = getattr(method, "on_unconverged", "") == "raise"
+        dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
+        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
+        # Frames of fixed steps are counted in steps.
+        self._unit = 1.0 if soft is None or soft.is_cut else dt
         self._size = max(1, block_size or _AT_ONCE)
         self._halt = np.full(1, _NEVER)
         self._threads = min(threads, math.ceil(n / self._size))
@@ -111,7 +121,7 @@ class BodyRun:
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every body by `span` [s] and observe it: whether the frame is done, as `engine.Run.advance`."""
         if not self._cut_short:
-            self._bodies.left.fill(span)
+            self._bodies.left.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
         if self._tier.is_plain and self._tier.left < math.inf:
             self._tier.left = 0.0
@@ -146,13 +156,19 @@ class BodyRun:
                 f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; lengths at its start "
                 f"are off by {self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
             )
+        if status == Status.UNCONVERGED:
+            method: Any = self._method
+            return sentence + (
+                f"{method.max_sweeps} sweeps of a step left V above tolerance = {method.tolerance:g} J. The loop "
+                'converges from the surface: use adaptive=True, a larger penalty, or on_unconverged="count"'
+            )
         return sentence + (
             "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"
         )
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the bodies."""
-        return float((1.0 - self._bodies.left / span).mean())
+        return float((1.0 - self._bodies.left / (span * self._unit)).mean())
 
     # --- What is observed --------------------------------------------------------------------------------
 
@@ -181,8 +197,26 @@ class BodyRun:
             total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
         return total
 
+    def _stored(self) -> NDArray[np.float64]:
+        """What walls that are springs store, of each copy."""
+        total = np.zeros(len(self._bodies.left))
+        if self._law is not None:
+            places = [(self._scene, self._contact_points())]
+            r = self._bodies.position
+            for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+                places.append((scene, (r[:, point] - r[:, carrier])[:, None, :]))
+            for scene, points in places:
+                chain, flat = scene.chain(), points.reshape(3, -1)
+                for k in np.flatnonzero((scene.gaps(flat) > 0.0).any(axis=0)) if flat.size else ():
+                    total[k % total.size] += contact_energy(self._law, chain, 1.0, column(flat, 0, k))
+        return total
+
+    def _contact_points(self) -> NDArray[np.float64]:
+        """(3, K, n)"""
+        return np.tensordot(self._body.contacts, self._bodies.position, axes=(1, 1)).transpose(1, 0, 2)
+
     def _energies(self) -> NDArray[np.float64]:
-        return self._kinetic() + self._fall() + self._elastic()
+        return self._kinetic() + self._fall() + self._elastic() + self._stored()
 
     def _led_energy(self) -> NDArray[np.float64]:
         """Kinetic and potential energy of led points themselves."""
@@ -203,12 +237,15 @@ class BodyRun:
         return np.ascontiguousarray(rows.transpose(0, 2, 1))
 
     def _link_error(self) -> float:
-        r, links = self._bodies.position, self._ties.links
-        ends, rest = self._ties.ends[:links], self._ties.rest[:links, None]
-        if not links:
+        r, ends = self._bodies.position, self._body.links
+        if not len(ends):
             return 0.0
         length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
-        return float(0.5 * np.abs(length2 / rest - 1.0).max())
+        return float(0.5 * np.abs(length2 / self._link_lengths()[:, None] ** 2 - 1.0).max())
+
+    def _link_lengths(self) -> NDArray[np.float64]:
+        tied = self._body.points[self._body.links]
+        return np.asarray(np.sqrt(((tied[:, 0] - tied[:, 1]) ** 2).sum(axis=1)))
 
     def _out_of_own(self) -> Iterator[NDArray[np.float64]]:
         """How far points are out of the cavities that others carry."""
@@ -219,7 +256,7 @@ class BodyRun:
     def observe(self) -> None:
         """Observe the bodies as they are."""
         state, bodies = self.state, self._bodies
-        kinetic, fall, elastic = self._kinetic(), self._fall(), self._elastic()
+        kinetic, fall, elastic = self._kinetic(), self._fall(), self._elastic() + self._stored()
         work = bodies.work + self._led_energy() - self._led_start
         error = np.abs(kinetic + fall + elastic + bodies.dissipated - work - self._start)
         scaled = np.divide(error, self._scale, out=np.zeros_like(error), where=self._scale > 0.0)
@@ -228,8 +265,7 @@ class BodyRun:
         spin = np.cross(bodies.position, momentum, axis=0).sum(axis=(1, 2))
         depth = max([0.0, *(out.max() for out in self._out_of_own())])
         if len(self._body.contacts):
-            points = np.tensordot(self._body.contacts, bodies.position, axes=(1, 1)).transpose(1, 0, 2)
-            depth = max(depth, self._scene.distances_outside(points.reshape(3, -1)).max(initial=0.0))
+            depth = max(depth, self._scene.distances_outside(self._contact_points().reshape(3, -1)).max(initial=0.0))
         pushed, walls = bodies.impulse.sum(axis=1), len(self._owners)
         impulse = np.bincount(self._owners, weights=pushed[:walls], minlength=len(self._scene.surfaces))
         self._seen = {
@@ -247,11 +283,13 @@ class BodyRun:
             "sliding": int(np.count_nonzero(bodies.lasting)),
             "sliding_time": float(bodies.sliding.sum()),
             "wall_heat": np.zeros(len(self._scene.surfaces)),
-            "unconverged": 0,
+            "unconverged": int(bodies.unconverged.sum()),
             "escaped": 0,
             "link_error": self._link_error(),
             "work": float(work.sum()),
         }
+        if self._rule.loop:
+            self._seen["sweeps"] = int(bodies.sweeps.sum())
         if self._body.cavities:
             self._seen["cavity_impulse"] = pushed[walls + self._touching.guides :]
 

@@ -16,7 +16,6 @@ from .. import interrupt
 from ..bodies.state import Bodies
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
-from ..methods import Impact
 from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
@@ -99,7 +98,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     Args:
         scene: the walls and gravity.
         particles: the start, particles or bodies; it is not changed.
-        method: how to advance.
+        method: how to advance; bodies by Impact with a dt, Penalty, or AugmentedLagrangian with adaptive=True.
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
@@ -189,7 +188,6 @@ def _run_of(task: Task) -> Run | BodyRun:
     how = options.thread_count(), options.block_size, options.compile
     if task.bodies is None:
         return Run(task.scene, task.particles, task.method, *how, options.seed)
-    assert isinstance(task.method, Impact)
     return BodyRun(task.scene, task.bodies, task.particles, task.method, *how)
 
 

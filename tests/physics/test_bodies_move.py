@@ -178,7 +178,7 @@ def test_a_run_that_is_resumed_has_the_same_bits(tmp_path):
     [
         (swarm.Impact(), "Impact with a step"),
         (swarm.Impact(dt=0.01, contact_step=0.001), "contact_step must be 0"),
-        (swarm.Penalty(dt=0.01, penalty=1.0), "Impact with a step"),
+        (swarm.Verlet(dt=0.01, penalty=1.0), "Impact with a step"),
     ],
 )
 def test_a_method_that_cannot_serve_bodies_says_so(method, said):

@@ -8,24 +8,20 @@ from ...kernel.jit import inlined, kernel, next_of, scratch, select
 from ...kernel.vector import Vec
 from ...status import Status
 from ...surfaces import fold as walls
-from . import blow, hold, instant, lead
+from . import blow, contract, hold, instant, lead, soft
 from .arrays import Held, Lanes, Pace
-from .contacts import MOST_CONTACTS, point_of
+from .contacts import point_of
 from .stage import solve
 
 # A step longer than the frame that is left by this part is the last of it.
 _SAME = 1.0 + 1e-9
 # Trials after which a body is stuck: brackets take a hundred at most.
 _STUCK = 2000
-# A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
-_SHORT = 1.0 / 16.0
 # A step that is put off more often has no solution.
 _WAITS = 20
 # The forces of contacts that last are guessed from the step before, but each time after so many steps, where a run can
 # be halted: they are not part of its state.
 _AFRESH = 32
-# After so many blows without a step the contacts last.
-_LASTS = 20
 
 
 @kernel
@@ -45,6 +41,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
         scratch((rows, count), np.float64), scratch((rows, count), np.float64),
+        scratch((rows if rule.loop else 0, count), np.float64),
     )  # fmt: skip
     pace = Pace(
         scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
@@ -55,12 +52,13 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64),
         scratch(count, np.int64), scratch(count, np.bool_), scratch(count, np.int64), scratch(count, np.bool_),
         scratch(count, np.bool_), scratch(count, np.float64), scratch(count, np.int64),
+        scratch(count, np.int64), scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.bool_),
     )  # fmt: skip
     held = Held(
-        scratch((count, MOST_CONTACTS, 2), np.int64), scratch((count, MOST_CONTACTS, 3, 3), np.float64),
-        scratch((count, 3 * MOST_CONTACTS), np.float64), scratch((count, 3 * MOST_CONTACTS), np.float64),
-        scratch((count, MOST_CONTACTS), np.float64), scratch((count, MOST_CONTACTS), np.int64),
-        scratch(count, np.float64),
+        scratch((count, rule.most, 2), np.int64), scratch((count, rule.most, 3, 3), np.float64),
+        scratch((count, 3 * rule.most), np.float64), scratch((count, 3 * rule.most), np.float64),
+        scratch((count, rule.most), np.float64), scratch((count, rule.most), np.int64),
+        scratch(count, np.float64), scratch((count, rule.most), np.float64),
     )  # fmt: skip
     c = scratch((3, count), np.float64)
     for i in range(count):
@@ -93,6 +91,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
             pace.action[i] = _judge(body[1], chains[1], rule, lanes, (pace, held), i)
             if pace.body[i] >= 0 and (pace.action[i] == instant.FAILED or pace.stuck[i] > _STUCK):
                 status = Status.UNSOLVED if pace.action[i] == instant.FAILED else Status.STALLED
+                status = Status.UNCONVERGED if pace.loose[i] and rule.strict else status
                 number = pace.body[i]
                 _store_all(state, lanes, pace)
                 return status, number
@@ -114,11 +113,13 @@ def _judge(touching, chain, rule, lanes, paces, i):
         return instant.AGAIN
     pace.solved[i] = pace.solved[i] and pace.waits[i] == 0
     pace.waits[i] = 0
+    if pace.loose[i]:
+        return instant.FAILED if rule.strict else instant.COMMIT
     if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and hold.is_mixed(paces, i, rule.stages.size):
         pace.whole[i] = True
         return instant.AGAIN
     if pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]:
-        return instant.judge(touching, chain, rule, lanes, pace, i, 2.0 * hold.ROOM * rule.room)
+        return contract.judge(rule.walls, touching, chain, rule, lanes, paces, i)
     return instant.COMMIT
 
 
@@ -131,15 +132,13 @@ def _finish(body, chain, rule, state, lanes, paces, i):
         state.steps[number] += 1
         state.work[number] += pace.work[i]
         pace.stuck[i] = 0
+        if rule.loop:
+            state.sweeps[number] += pace.turns[i]
+            state.unconverged[number] += pace.loose[i]
         if pace.lasts[i]:
-            hold.end(paces, state, i)
+            contract.end(rule.walls, body, chain, lanes, paces, state, i)
     if action != instant.COMMIT:
-        short = action == instant.STRIKE_NOW or pace.step[i] < _SHORT * rule.dt
-        state.short[number] = state.short[number] + 1 if short else 0
-        blows = blow.strike(body, chain, rule, lanes, state, i, number)
-        stays = blow.chatters(body[1], state, number) or pace.stuck[i] > _LASTS
-        if stays or (action == instant.STRIKE_NOW and blows == 0):
-            pace.lasts[i] = True
+        contract.strike(rule.walls, body, chain, rule, lanes, paces, state, i)
         for a in range(lanes.recent.shape[0]):
             lanes.older[a, i] = math.nan
     pace.fresh[i], pace.whole[i] = True, False
@@ -207,10 +206,9 @@ def _try(body, chain, rule, state, lanes, paces):
         pace.work[i] = 0.0
     for i in range(count):
         if pace.body[i] >= 0 and pace.lasts[i]:
-            if pace.fresh[i] or not pace.solved[i]:
-                if state.steps[pace.body[i]] % _AFRESH == 0:
-                    pace.held[i] = 0
-                hold.begin(body, chain, rule, lanes, paces, i)
+            if (pace.fresh[i] or not pace.solved[i]) and state.steps[pace.body[i]] % _AFRESH == 0:
+                pace.held[i] = 0
+            contract.begin(rule.walls, body, chain, rule, lanes, paces, i)
             hold.forget(held, i)
         pace.solved[i] = True
     for q in range(points):
@@ -238,9 +236,15 @@ def _try(body, chain, rule, state, lanes, paces):
         lead.lead(tied, rule, state, lanes, pace, elapsed)
         for i in range(count):
             pace.done[i] = (pace.body[i] < 0) | (pace.whole[i] & (stage < stages - 1))
-        solve(body, chain, rule, lanes, paces)
+        if rule.loop:
+            soft.begin_loop(tied, rule, lanes, paces)
+        while True:
+            solve(body, chain, rule, lanes, paces)
+            for i in range(count):
+                pace.solved[i] = pace.solved[i] & pace.done[i]
+            if not rule.loop or contract.again(rule.walls, body, chain, rule, lanes, paces) == 0:
+                break
         for i in range(count):
-            pace.solved[i] = pace.solved[i] & pace.done[i]
             if pace.held[i] > 0 and (not pace.whole[i] or stage == stages - 1):
                 hold.book(body[1], lanes, paces, i)
         lead.book(body, lanes, paces, stage == stages - 1)
@@ -298,7 +302,7 @@ def _commit(lanes, pace, whole):
                 lanes.v[q, x, i] = select(pace.done[i], lanes.v1[q, x, i], lanes.v[q, x, i])
     for i in range(count):
         # In a short step round-off over h^2 is all that a multiplier is.
-        pace.done[i] = pace.done[i] & (pace.step[i] > _SHORT * whole)
+        pace.done[i] = pace.done[i] & (pace.step[i] > blow.SHORT * whole)
     for a in range(lanes.f.shape[0]):
         for i in range(count):
             new, g, old = lanes.multiplier[a, i], lanes.recent[a, i], lanes.before[a, i]

@@ -12,9 +12,10 @@ class Ties(NamedTuple):
     ends: Any  # (L, 2) the points a, b
     links: int  # how many of the rows are rigid
     springs: int  # how many are springs
+    relaxed: int  # how many edges are links that multipliers hold; they come before those of the strain
     rest: Any  # (L,) |y|^2 of a link and of an edge without stress, the rest length of a spring
     stiffness: Any  # (L,) of springs
-    compliance: Any  # (E, E) 2/K of the edges
+    compliance: Any  # (E, E) 2/K of the edges, 8 l^2/alpha of relaxed links
     start: Any  # (L + G,) the first column of each row of the system that is not 0; guides come after the ties
     inverse_mass: Any  # (P, P) W = 1/M, without rows and columns of points that are fixed
     mass: Any  # (P, P) M
@@ -51,6 +52,10 @@ class Rule(NamedTuple):
     room: float  # round-off of a position on a wall [m]
     noise: float  # round-off of |y|^2 of the shortest tie, relative
     lanes: int  # how many bodies at once
+    walls: Any  # None: they are rigid and strike; `Soft`: they are springs
+    most: int  # contacts of a body at once
+    loop: bool  # whether multipliers are found by Uzawa's loop
+    strict: bool  # whether one that does not converge ends the run
 
 
 class BodyState(NamedTuple):
@@ -69,6 +74,8 @@ class BodyState(NamedTuple):
     work: Any  # (n,) of led points on what is tied to them [J]
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
+    sweeps: Any  # (n,) of Uzawa's loop
+    unconverged: Any  # (n,) steps whose loop did not
 
 
 class Lanes(NamedTuple):
@@ -92,6 +99,7 @@ class Lanes(NamedTuple):
     recent: Any  # (M, B) multipliers of the last step
     before: Any  # (M, B) of the one before
     older: Any  # (M, B) and before that; NaN: no step since the last blow
+    offset: Any  # (M or 0, B) 4 l lambda/alpha of relaxed links
 
 
 class Pace(NamedTuple):
@@ -126,10 +134,14 @@ class Pace(NamedTuple):
     whole: Any  # bool: the step is one stage
     work: Any  # of led points in the step [J]
     waits: Any  # int: how often the solution of this step was put off to the next pass
+    turns: Any  # int: sweeps of Uzawa's loop in this step
+    ease: Any  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
+    loops: Any  # bool: it goes on
+    loose: Any  # bool: it ended above its tolerance
 
 
 class Held(NamedTuple):
-    """The contacts of each lane that last, at most C of them."""
+    """The contacts of each lane that last, at most C of them; of walls that are springs all."""
 
     name: Any  # (B, C, 2) point and wall
     frame: Any  # (B, C, 3, 3) normal and two tangents
@@ -138,3 +150,4 @@ class Held(NamedTuple):
     impulse: Any  # (B, C) of the step [N s]
     stages: Any  # (B, C) in how many stages of the step it pushes
     lost: Any  # (B,) to friction in the step [J]
+    multiplier: Any  # (B, C) lambda of walls that are springs

@@ -4,19 +4,37 @@ import math
 
 import numpy as np
 
+from ...kernel.gravity import Nothing
 from ...kernel.jit import inlined, outlined, scratch
 from ...kernel.vector import Vec, dot
 from ...surfaces import fold as walls
+from . import contract
 from .contacts import MOST_CONTACTS, direction, near, point_of, width
+from .instant import STRIKE_NOW
 
 # Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
 _BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
 # After so many short steps from impact to impact a wall that takes energy takes all of the approach.
 _CHATTER = 12
+# A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
+SHORT = 1.0 / 16.0
+# After so many blows without a step the contacts last.
+_LASTS = 20
+
+
+@contract.strike.register(Nothing)
+def _(kind, body, chain, rule, lanes, paces, state, i):
+    pace = paces[0]
+    number, at_once = pace.body[i], pace.action[i] == STRIKE_NOW
+    short = at_once or pace.step[i] < SHORT * rule.dt
+    state.short[number] = state.short[number] + 1 if short else 0
+    blows = strike(body, chain, rule, lanes, state, i, number)
+    stays = _chatters(body[1], state, number) or pace.stuck[i] > _LASTS
+    pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
 
 
 @inlined
-def chatters(touching, state, number):
+def _chatters(touching, state, number):
     """Whether bounces follow one another ever faster: then they end."""
     return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
 
@@ -29,7 +47,7 @@ def strike(body, chain, rule, lanes, state, i, number):
     guides leave: K = W - W J (J W J)^-1 J W with a row of J for each. It is the contact step of the scheme for h -> 0.
     """
     touching = body[1]
-    bounces = 0.0 if chatters(touching, state, number) else 1.0
+    bounces = 0.0 if _chatters(touching, state, number) else 1.0
     name = scratch((MOST_CONTACTS, 2), np.int64)
     frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
     for turn in range(_BLOWS):

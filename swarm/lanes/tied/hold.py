@@ -10,9 +10,11 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import inlined, outlined, scratch
+from ...kernel.gravity import Nothing
+from ...kernel.jit import by_type, inlined, outlined, scratch
 from ...kernel.vector import Vec, cross, dot, norm
 from ...surfaces import fold as walls
+from . import contract
 from .contacts import MOST_CONTACTS, NEAR, direction, near, point_of, width
 
 # From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
@@ -26,10 +28,12 @@ ROOM = 64.0
 _CREEP = 1e-7
 
 
-@outlined
-def begin(body, chain, rule, lanes, paces, i):
-    """The contacts at the start of a step, which press as in the step before where they are the same."""
+@contract.begin.register(Nothing)
+def _(kind, body, chain, rule, lanes, paces, i):
+    # In a step they press as in the step before where they are the same.
     pace, held = paces
+    if not (pace.fresh[i] or not pace.solved[i]):
+        return
     name, frame = held.name[i], held.frame[i]
     touching = body[1]
     before, found = pace.held[i], 0
@@ -57,15 +61,20 @@ def begin(body, chain, rule, lanes, paces, i):
 
 
 @outlined
-def turn(body, chain, lanes, held, pace, i, r1):
-    """Directions of guides and contacts: the discrete gradient of each gap from the start of the stage to r1."""
+def turn_guides(body, chain, lanes, i, r1):
+    """Directions of guides: the discrete gradient of each gap from the start of the stage to r1."""
     tied, touching = body
-    frame = held.frame[i]
     for g in range(touching.guides):
         k, row = touching.points + g, tied.ends.shape[0] + g
         y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i)
         n = walls.step_normal(chain, float(touching.walls + g), y0, y1)
         lanes.d[row, 0, i], lanes.d[row, 1, i], lanes.d[row, 2, i] = n.x, n.y, n.z
+
+
+@contract.turn.register(Nothing)
+def _(kind, body, chain, lanes, held, pace, i, r1):
+    touching = body[1]
+    frame = held.frame[i]
     for a in range(pace.held[i]):
         k, wall = held.name[i, a, 0], held.name[i, a, 1]
         n = walls.step_normal(chain, float(wall), point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
@@ -146,9 +155,8 @@ def worst(touching, lanes, pace, rule, i):
     return error
 
 
-@outlined
-def correct(body, chain, rule, lanes, paces, i, number):
-    """Correct the forces of contacts, and f, the corrections of ties and guides, for it; whether these are the last."""
+@contract.correct.register(Nothing)
+def _(kind, body, chain, rule, lanes, paces, i, number):
     touching = body[1]
     pace, held = paces
     found = pace.held[i]
@@ -175,7 +183,7 @@ def correct(body, chain, rule, lanes, paces, i, number):
     # One correction more than errors of round-off ask for, since directions lag behind forces: to stop where the next
     # would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
     last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
-    _eliminate(body, chain, lanes, pace, contacts, (along, across, schur, gap), i)
+    eliminate(kind, body, chain, lanes, pace, contacts, (along, across, schur, gap), i)
     creep = _sweep(touching, contacts, schur, gap, change)
     for row in range(m):
         for a in range(rows):
@@ -183,8 +191,14 @@ def correct(body, chain, rule, lanes, paces, i, number):
     pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
 
+@by_type
+def gap_gradient(kind, chain, wall, y):
+    """The gradient of the gap that the contacts solve for."""
+    return walls.unit_normal(chain, wall, y)
+
+
 @inlined
-def _eliminate(body, chain, lanes, pace, contacts, systems, i):
+def eliminate(kind, body, chain, lanes, pace, contacts, systems, i):
     """Leave the contacts alone: schur, and gap without what the corrections of ties and guides do to it."""
     name, frame, _press, wide, found = contacts
     along, across, schur, gap = systems
@@ -195,7 +209,7 @@ def _eliminate(body, chain, lanes, pace, contacts, systems, i):
         k, wall, d = name[a // wide, 0], name[a // wide, 1], direction(frame, 3 * (a // wide) + a % wide)
         e = d
         if a % wide == 0:
-            e = walls.unit_normal(chain, float(wall), point_of(touching, lanes.r1, k, i))
+            e = gap_gradient(kind, chain, float(wall), point_of(touching, lanes.r1, k, i))
         for row in range(m):
             c = half * tied.couplings[count + k, _name(body, row)]
             along[a, row] = c * dot(e, _of(lanes.d, row, i))
@@ -274,7 +288,7 @@ def book(touching, lanes, paces, i):
     for a in range(pace.held[i]):
         k, press = held.name[i, a, 0], held.press[i, 3 * a]
         held.stages[i, a] += 1 if press > 0.0 else 0
-        held.impulse[i, a] += pace.h[i] * press
+        held.impulse[i, a] += pace.h[i] * press * norm(direction(held.frame[i], 3 * a))
         away = point_of(touching, lanes.r1, k, i) - point_of(touching, lanes.ra, k, i)
         for d in range(1, 3):
             held.lost[i] += held.press[i, 3 * a + d] * dot(direction(held.frame[i], 3 * a + d), away)
@@ -294,13 +308,13 @@ def is_mixed(paces, i, stages):
 def forget(held, i):
     """Forget what the walls did in a trial."""
     held.lost[i] = 0.0
-    for a in range(MOST_CONTACTS):
+    for a in range(held.name.shape[1]):
         held.impulse[i, a], held.stages[i, a] = 0.0, 0
 
 
-@outlined
-def end(paces, state, i):
-    """Book what the walls did in the step; the contacts last as long as one of them pushes."""
+@contract.end.register(Nothing)
+def _(kind, body, chain, lanes, paces, state, i):
+    # Contacts last as long as one of them pushes.
     pace, held = paces
     number, pushes = pace.body[i], False
     for a in range(pace.held[i]):

@@ -2,10 +2,13 @@
 
 import math
 
+from ...kernel.gravity import Nothing
 from ...kernel.jit import inlined, outlined
 from ...kernel.vector import dot
 from ...surfaces import fold as walls
+from . import contract
 from .contacts import NEAR, point_of, span
+from .hold import ROOM
 
 # What becomes of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
@@ -20,15 +23,26 @@ _QUICK = 40
 _HALVED = 2.0**-20
 
 
+@contract.judge.register(Nothing)
+def _(kind, touching, chain, rule, lanes, paces, i):
+    return look(touching, chain, rule, lanes, paces[0], i, 2.0 * ROOM * rule.room)
+
+
+@inlined
+def halve(rule, pace, i):
+    """A step whose ties have no solution is halved, but not for ever."""
+    pace.trial[i] = 0.5 * pace.step[i]
+    pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
+    return AGAIN if pace.step[i] > _HALVED * rule.dt else FAILED
+
+
 @outlined
-def judge(touching, chain, rule, lanes, pace, i, larger):
-    """What becomes of a lane whose trial step ends outside, has no solution, or looks for the time of an impact."""
+def look(touching, chain, rule, lanes, pace, i, larger):
+    """Where to cut a step that ends outside; contacts that last may end outside by `larger`."""
     tau = pace.step[i]
     pace.stuck[i] += 1
     if not pace.solved[i]:
-        pace.trial[i] = 0.5 * tau
-        pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
-        return AGAIN if tau > _HALVED * rule.dt else FAILED
+        return halve(rule, pace, i)
     # The forces of contacts that last leave a part of it.
     room = rule.room if pace.held[i] == 0 else larger
     worst, first, point, wall = -math.inf, tau, -1, -1

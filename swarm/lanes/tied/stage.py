@@ -5,7 +5,7 @@ The system of the ties is factored once for several corrections, which are cheap
 """
 
 from ...kernel.jit import inlined, select
-from . import hold, ties
+from . import contract, hold, ties
 
 # Most corrections, and after how many the system is factored again.
 _MOST, _AGAIN = 40, 5
@@ -21,15 +21,15 @@ def solve(body, chain, rule, lanes, paces):
     Points that are led must be in r1 already. Lanes that are done at the start are left out.
     """
     tied, touching = body
-    pace, held = paces
+    pace = paces[0]
     count, guides = pace.h.size, touching.guides
-    alone = rule.stages.size == 1 and guides == 0
+    alone = rule.stages.size == 1 and guides == 0 and not rule.loop
     ties.launch(tied, rule.gravity, lanes, pace)
     more = guides
     for i in range(count):
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
-            hold.turn(body, chain, lanes, held, pace, i, lanes.ra)
+            _turn(body, chain, rule, lanes, paces, i, lanes.ra)
     if tied.ends.shape[0] > 1:
         # Where the multipliers are guessed well, D is the only error, and with one tie none: it follows once more.
         _push(body, lanes, paces, 0)
@@ -41,7 +41,7 @@ def solve(body, chain, rule, lanes, paces):
         if more > 0:
             for i in range(count):
                 if _is_held(touching, pace, i):
-                    hold.turn(body, chain, lanes, held, pace, i, lanes.r1)
+                    _turn(body, chain, rule, lanes, paces, i, lanes.r1)
         _push(body, lanes, paces, more)
         if turn == _MOST or _all(pace.done):
             break
@@ -60,7 +60,7 @@ def solve(body, chain, rule, lanes, paces):
         if more > 0:
             for i in range(count):
                 if _is_held(touching, pace, i):
-                    hold.correct(body, chain, rule, lanes, paces, i, turn)
+                    contract.correct(rule.walls, body, chain, rule, lanes, paces, i, turn)
         ties.correct(lanes, pace)
         if alone and turn <= _SOON:
             for i in range(count):
@@ -71,6 +71,14 @@ def solve(body, chain, rule, lanes, paces):
             _push(body, lanes, paces, more)
             break
     ties.arrive(tied, rule.gravity, lanes, pace)
+
+
+@inlined
+def _turn(body, chain, rule, lanes, paces, i, r1):
+    """Directions of guides and contacts."""
+    pace, held = paces
+    hold.turn_guides(body, chain, lanes, i, r1)
+    contract.turn(rule.walls, body, chain, lanes, held, pace, i, r1)
 
 
 @inlined

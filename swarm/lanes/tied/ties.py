@@ -5,6 +5,8 @@ with D = y0 + y1, the discrete gradient of |y|^2 of each tie (a quadratic, so it
     link     |y1|^2 = l^2
     spring   lambda = k (1 - 2 l/(|y0| + |y1|))/2, the composite discrete gradient of k (|y| - l)^2/2
     edges    lambda = K ((|y0|^2 + |y1|^2)/2 - s0)
+    relaxed  alpha (c0 + c1)/2 + lambda' of the link c = (|y|^2 - l^2)/(2 l) along its discrete gradient D/(2 l): an
+             edge with K = alpha/(4 l^2), and 4 l lambda'/alpha more on the left
 so that links do no work and what springs and edges do is the change of their energy, exactly. v1 in this form, because
 2 (r1 - r0)/h - v0 cancels: 3e-10 instead of 1e-15.
 """
@@ -56,7 +58,7 @@ def launch(ties, gravity, lanes, pace):
                 # One tie alone is this much shorter, exactly. Of several, each made shorter by its own would turn the
                 # forces between them: 1e-13 of the angular momentum a step, where all as they are leave its round-off.
                 d = (y + (lanes.p[first, x, i] - lanes.p[second, x, i])) * pace.rate[i]
-                lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
+                lanes.d[a, x, i] = select((pace.waits[i] > 0) | pace.done[i], lanes.d[a, x, i], d)
 
 
 @inlined
@@ -178,11 +180,16 @@ def residual(ties, lanes, pace, turn, rule):
             for i in range(count):
                 y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
                 f[a, i] += (y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) - rest
-            for b in range(soft, rows):
-                give = ties.compliance[a - soft, b - soft]
-                if give != 0.0:
-                    for i in range(count):
-                        f[a, i] -= give * lanes.multiplier[b, i]
+            if a < soft + ties.relaxed:
+                give = ties.compliance[a - soft, a - soft]
+                for i in range(count):
+                    f[a, i] += lanes.offset[a, i] - give * pace.ease[i] * lanes.multiplier[a, i]
+            else:
+                for b in range(soft + ties.relaxed, rows):
+                    give = ties.compliance[a - soft, b - soft]
+                    if give != 0.0:
+                        for i in range(count):
+                            f[a, i] -= give * lanes.multiplier[b, i]
             for i in range(count):
                 _worse(pace.error, i, abs(f[a, i]) * inverse)
         for i in range(count):
@@ -222,7 +229,7 @@ def assemble(ties, lanes, pace):
         for column in range(ties.start[row], row + 1):
             w = ties.couplings[row, column]
             give = 0.0
-            if column >= soft:
+            if column >= soft + ties.relaxed:
                 give = ties.compliance[row - soft, column - soft]
             for i in range(count):
                 k = w * pace.h[i] * pace.h[i]
@@ -236,6 +243,9 @@ def assemble(ties, lanes, pace):
         if links <= row < soft:
             for i in range(count):
                 a[row, row, i] += lanes.soft[row, i]
+        elif soft <= row < soft + ties.relaxed:
+            for i in range(count):
+                a[row, row, i] += ties.compliance[row - soft, row - soft] * pace.ease[i]
 
 
 @inlined
