@@ -21,21 +21,18 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
     ends = body.bonds()
     links, springs, edges = len(body.links), len(body.springs), 0 if body.strain is None else len(body.strain.edges)
     relaxed = 0 if penalty is None else links
-    order = np.arange(len(ends))
-    if relaxed:
-        # After the springs: they are edges of a diagonal stiffness.
-        order = np.concatenate([order[links : links + springs], order[:links], order[links + springs :]])
-        ends = ends[order]
+    if penalty is not None:
+        # After the springs: like them they have a stiffness of their own.
+        ends = np.concatenate([ends[links : links + springs], ends[:links], ends[links + springs :]])
     tied = body.points[ends[:, 0]] - body.points[ends[:, 1]]
     rest, stiffness = (tied**2).sum(axis=1), np.zeros(len(ends))
+    give = np.zeros(len(ends)) if penalty is None else 8.0 / penalty * rest
     for row, (_i, _j, k, length) in enumerate(body.springs, start=links - relaxed):
         stiffness[row], rest[row] = k, length
-    compliance = np.zeros((relaxed + edges, relaxed + edges))
-    if penalty is not None:
-        compliance[:relaxed, :relaxed] = np.diag(8.0 / penalty * rest[springs : springs + relaxed])
+    compliance: Floats = np.zeros((edges, edges))
     if body.strain is not None:
         rest[links + springs :] = body.strain.rest
-        compliance[relaxed:, relaxed:] = 2.0 * np.linalg.inv(body.strain.stiffness)
+        compliance = np.asarray(2.0 * np.linalg.inv(body.strain.stiffness), dtype=np.float64)
     is_free = np.ones(len(body), np.bool_)
     is_free[list(body.anchors)] = False
     free = np.flatnonzero(is_free)
@@ -52,8 +49,8 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
     led = np.full(len(body), -1)
     led[led_points(body)] = np.arange(len(led_points(body)))
     return Ties(
-        ends, links - relaxed, springs, relaxed, rest, stiffness, compliance, start, inverse, body.mass_matrix,
-        is_diagonal, is_free, led, couplings,
+        ends, links - relaxed, springs + relaxed, relaxed, rest, stiffness, give, compliance, start, inverse,
+        body.mass_matrix, is_diagonal, is_free, led, couplings,
     )  # fmt: skip
 
 

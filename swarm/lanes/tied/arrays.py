@@ -11,11 +11,12 @@ class Ties(NamedTuple):
 
     ends: Any  # (L, 2) the points a, b
     links: int  # how many of the rows are rigid
-    springs: int  # how many are springs
-    relaxed: int  # how many edges are links that multipliers hold; they come before those of the strain
+    springs: int  # how many are springs, or links that multipliers hold
+    relaxed: int  # how many of these are such links, which come after the springs
     rest: Any  # (L,) |y|^2 of a link and of an edge without stress, the rest length of a spring
     stiffness: Any  # (L,) of springs
-    compliance: Any  # (E, E) 2/K of the edges, 8 l^2/alpha of relaxed links
+    give: Any  # (L,) 8 l^2/alpha of relaxed links
+    compliance: Any  # (E, E) 2/K of the edges
     start: Any  # (L + G,) the first column of each row of the system that is not 0; guides come after the ties
     inverse_mass: Any  # (P, P) W = 1/M, without rows and columns of points that are fixed
     mass: Any  # (P, P) M
@@ -94,7 +95,7 @@ class Lanes(NamedTuple):
     d: Any  # discrete gradient: y0 + y1 of |y|^2, a unit vector of a guide
     a: Any  # (M, M, B) system of the multipliers, factored
     f: Any  # (M, B) its right side
-    soft: Any  # (M, B) of springs: its diagonal
+    soft: Any  # (M, B) of springs and relaxed links: its diagonal
     multiplier: Any  # (M, B)
     recent: Any  # (M, B) multipliers of the last step
     before: Any  # (M, B) of the one before

@@ -58,7 +58,7 @@ def launch(ties, gravity, lanes, pace):
                 # One tie alone is this much shorter, exactly. Of several, each made shorter by its own would turn the
                 # forces between them: 1e-13 of the angular momentum a step, where all as they are leave its round-off.
                 d = (y + (lanes.p[first, x, i] - lanes.p[second, x, i])) * pace.rate[i]
-                lanes.d[a, x, i] = select((pace.waits[i] > 0) | pace.done[i], lanes.d[a, x, i], d)
+                lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
 
 
 @inlined
@@ -162,7 +162,7 @@ def residual(ties, lanes, pace, turn, rule):
             for i in range(count):
                 f[a, i] -= rest
                 _worse(pace.error, i, abs(f[a, i]) * inverse)
-        elif a < soft:
+        elif a < soft - ties.relaxed:
             rest, softness = ties.rest[a], 2.0 / ties.stiffness[a]
             for i in range(count):
                 y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
@@ -175,34 +175,43 @@ def residual(ties, lanes, pace, turn, rule):
                 f[a, i] = scale * unmet
                 lanes.soft[a, i] = scale * softness
                 _worse(pace.error, i, abs(unmet))
+        elif a < soft:
+            rest, give, inverse = 2.0 * ties.rest[a], ties.give[a], 1.0 / ties.rest[a]
+            for i in range(count):
+                y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
+                f[a, i] += (y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) - rest
+                lanes.soft[a, i] = give * pace.ease[i]
+                f[a, i] += lanes.offset[a, i] - lanes.soft[a, i] * lanes.multiplier[a, i]
+                _worse(pace.error, i, abs(f[a, i]) * inverse)
         else:
             rest, inverse = 2.0 * ties.rest[a], 1.0 / ties.rest[a]
             for i in range(count):
                 y = lanes.y0[a, 0, i] * lanes.y0[a, 0, i] + lanes.y0[a, 1, i] * lanes.y0[a, 1, i]
                 f[a, i] += (y + lanes.y0[a, 2, i] * lanes.y0[a, 2, i]) - rest
-            if a < soft + ties.relaxed:
-                give = ties.compliance[a - soft, a - soft]
-                for i in range(count):
-                    f[a, i] += lanes.offset[a, i] - give * pace.ease[i] * lanes.multiplier[a, i]
-            else:
-                for b in range(soft + ties.relaxed, rows):
-                    give = ties.compliance[a - soft, b - soft]
-                    if give != 0.0:
-                        for i in range(count):
-                            f[a, i] -= give * lanes.multiplier[b, i]
+            for b in range(soft, rows):
+                give = ties.compliance[a - soft, b - soft]
+                if give != 0.0:
+                    for i in range(count):
+                        f[a, i] -= give * lanes.multiplier[b, i]
             for i in range(count):
                 _worse(pace.error, i, abs(f[a, i]) * inverse)
         for i in range(count):
             # What the correction neglects: that D changes with r1
             k2 = _NEGLECTED * pace.h[i] * pace.h[i]
             _worse(pace.rate, i, abs(k2 * ties.couplings[a, a] * lanes.multiplier[a, i]))
-    for i in range(count):
+    _decide(links == rows, pace, turn, rule)
+
+
+@inlined
+def _decide(is_rigid, pace, turn, rule):
+    """Which lanes need no more than one correction; `is_rigid`: no tie of the body changes its length."""
+    for i in range(pace.error.size):
         error, before = pace.error[i], pace.previous[i]
         # In a pass that goes on D has followed twice since: the ratio says too little.
         rate = select(pace.waits[i] == 0, 0.0, error / before)
         rate = select(turn > 0, error / before, select(rate > _AT_FIRST, rate, _AT_FIRST))
         # Of slow turns what D lags behind is along D, where it does no work, but for ties whose length changes.
-        turned = select((pace.rate[i] < 1.0) & (links == rows), pace.rate[i], 1.0)
+        turned = select((pace.rate[i] < 1.0) & is_rigid, pace.rate[i], 1.0)
         counts = turned * turned * turned * turned
         rate = select(rate > pace.rate[i], rate, pace.rate[i])
         # What is put off goes on from here in the next pass, however many corrections its neighbours take in this one.
@@ -229,7 +238,7 @@ def assemble(ties, lanes, pace):
         for column in range(ties.start[row], row + 1):
             w = ties.couplings[row, column]
             give = 0.0
-            if column >= soft + ties.relaxed:
+            if column >= soft:
                 give = ties.compliance[row - soft, column - soft]
             for i in range(count):
                 k = w * pace.h[i] * pace.h[i]
@@ -243,9 +252,6 @@ def assemble(ties, lanes, pace):
         if links <= row < soft:
             for i in range(count):
                 a[row, row, i] += lanes.soft[row, i]
-        elif soft <= row < soft + ties.relaxed:
-            for i in range(count):
-                a[row, row, i] += ties.compliance[row - soft, row - soft] * pace.ease[i]
 
 
 @inlined
