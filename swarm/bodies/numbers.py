@@ -49,8 +49,8 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
     led = np.full(len(body), -1)
     led[led_points(body)] = np.arange(len(led_points(body)))
     return Ties(
-        ends, links - relaxed, springs + relaxed, relaxed, rest, stiffness, give, compliance, start, inverse,
-        body.mass_matrix, is_diagonal, is_free, led, couplings,
+        ends, links - relaxed, springs + relaxed, relaxed, rest, stiffness, give, compliance, start,
+        inverse, body.mass_matrix, is_diagonal, is_free, led, couplings,
     )  # fmt: skip
 
 

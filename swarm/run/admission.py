@@ -60,6 +60,8 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
     _lead(bodies)
+    assert method.dt is not None  # type: ignore[attr-defined]
+    workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled(scene.surfaces)

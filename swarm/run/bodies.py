@@ -64,7 +64,7 @@ class BodyRun:
             particles.position.reshape(shape), particles.velocity.reshape(shape), np.zeros(n), never,
             self._paths(bodies), np.zeros(n, np.int64), np.zeros(n, np.int8), np.zeros(n, np.int64),
             np.zeros((walls, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
-            np.zeros(n, np.int64), np.zeros(n, np.int64),
+            np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n),
         )  # fmt: skip
         impacts = np.zeros(points * n, np.int64)
         # What files take of a run.
@@ -97,6 +97,7 @@ class BodyRun:
         self._cut_short = False
         self._led_start = self._led_energy()
         self._start = self._energies()
+        self._bodies.energy[:] = self._start
         self._scale = np.maximum(np.abs(self._start), self._kinetic()) + self._fall_scale()
         self._seen: dict[str, Any] = {}
         self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])

@@ -1,6 +1,7 @@
 """Bodies: what a run conserves, its order, blows against closed forms, and its bits."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import numpy as np
@@ -268,3 +269,17 @@ def test_a_body_that_turns_by_radians_in_a_step_keeps_its_energy(kind, spin):
     seen = run(start, walls, 0.05, dt=0.01).observables
     assert seen["energy_error"].max() < 1e-10
     assert seen["link_error"].max() < 1e-13
+
+
+def test_a_body_that_turns_far_in_a_step_is_said_before_the_run(caplog):
+    scene = swarm.Scene([swarm.Sphere(1000.0)])
+    for spin, said in ((20.0, ""), (400.0, r"body 0 turns by 2 rad in a step of 0.005 s \(links\[0\]\)")):
+        start = swarm.place(scene, MAKERS["dumbbell"](), 1, spin=1.0, seed=1)
+        relative = start.velocity[:, 0] - start.velocity[:, 1]
+        rate = np.sqrt((relative**2).sum()) / 0.1
+        turning = swarm.Bodies(start.body, start.position, start.velocity * (spin / rate))
+        caplog.clear()
+        swarm.simulate(scene, turning, swarm.Impact(dt=STEP), until=STEP)
+        assert bool(said) == bool(caplog.text)
+        if said:
+            assert re.search(said, caplog.text)

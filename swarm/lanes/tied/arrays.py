@@ -77,6 +77,7 @@ class BodyState(NamedTuple):
     steps: Any  # (n,)
     sweeps: Any  # (n,) of Uzawa's loop
     unconverged: Any  # (n,) steps whose loop did not
+    energy: Any  # (n,) at the start of the run [J]
 
 
 class Lanes(NamedTuple):

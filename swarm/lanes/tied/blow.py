@@ -18,6 +18,8 @@ _BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
 _CHATTER = 12
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
 SHORT = 1.0 / 16.0
+# Units of round-off by which a body may miss its energy.
+_ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 # After so many blows without a step the contacts last.
 _LASTS = 20
 
@@ -29,6 +31,9 @@ def _(kind, body, chain, rule, lanes, paces, state, i):
     short = at_once or pace.step[i] < SHORT * rule.dt
     state.short[number] = state.short[number] + 1 if short else 0
     blows = strike(body, chain, rule, lanes, state, i, number)
+    # The energy of a strain takes as many products as the square of its edges.
+    if blows > 0 and max(body[0].led) < 0 and body[0].compliance.shape[0] == 0:
+        _restore(body[0], rule, lanes, state, i, number)
     stays = _chatters(body[1], state, number) or pace.stuck[i] > _LASTS
     pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
 
@@ -37,6 +42,42 @@ def _(kind, body, chain, rule, lanes, paces, state, i):
 def _chatters(touching, state, number):
     """Whether bounces follow one another ever faster: then they end."""
     return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
+
+
+@outlined
+def _restore(ties, rule, lanes, state, i, number):
+    """Restore the energy of a body after a blow, where only round-off is missing: else it is an error to be seen.
+
+    Steps miss 1.5e-16 of it and blows 3e-16, at random: after 10^5 impacts 3e-12. All velocities are scaled, so that
+    links keep their lengths.
+    """
+    kinetic, fall, elastic = _kinetic(ties, lanes.v, i), 0.0, _stretched(ties, lanes.r, i)
+    for p in range(ties.mass.shape[0]):
+        mass = 0.0
+        for q in range(ties.mass.shape[0]):
+            mass += ties.mass[p, q]
+        for x in range(3):
+            fall -= mass * rule.gravity[x] * lanes.r[p, x, i]
+    missing = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
+    if abs(missing) <= _ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
+        factor = 0.5 * missing / kinetic
+        for q in range(lanes.v.shape[0]):
+            for x in range(3):
+                lanes.v[q, x, i] += factor * lanes.v[q, x, i]
+
+
+@inlined
+def _stretched(ties, r, i):
+    """The energy of springs."""
+    total = 0.0
+    for a in range(ties.links, ties.ends.shape[0]):
+        length2 = 0.0
+        for x in range(3):
+            y = r[ties.ends[a, 0], x, i] - r[ties.ends[a, 1], x, i]
+            length2 += y * y
+        longer = math.sqrt(length2) - ties.rest[a]
+        total += 0.5 * ties.stiffness[a] * longer * longer
+    return total
 
 
 @outlined
