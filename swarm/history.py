@@ -88,6 +88,8 @@ def contact_history(
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
+    if scene.moves():
+        raise SceneError("scene must have no wall that moves: a contact step knows walls at rest only")
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")

@@ -1,20 +1,25 @@
-"""Given motions: how a point that is led moves in time.
+"""Given motions: how a point that is led, or a wall, moves in time.
 
-All have one form, so that one kernel serves every motion:
+A led point has one form for all, so that one kernel serves every motion:
     s(t) = start + velocity t + cosine (cos(rate t) - 1) + sine sin(rate t).
+A wall that is given at rest as the points xi is at time t where
+    x(t) = c + d(t) + A(t) (xi - c),
+with the displacement d, and the rotation A about the centre c, both of one motion or of the sum of several.
 """
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .checks import Vector
 from .errors import SceneError
-from .particles import Floats
+
+Floats = NDArray[np.float64]
 
 
 class Led(NamedTuple):
@@ -48,8 +53,18 @@ class Led(NamedTuple):
         return self.velocity + self.rate * (self.sine * math.cos(angle) - self.cosine * math.sin(angle))
 
 
+class Given:
+    """A motion that is given; motions add up: `Translation(...) + Rotation(...)`."""
+
+    def __add__(self, other: "Given") -> "Sum":
+        return Sum((*parts_of(self), *parts_of(other)))
+
+    def __radd__(self, other: Any) -> "Given":
+        return self if other == 0 else NotImplemented
+
+
 @dataclass(frozen=True)
-class Translation:
+class Translation(Given):
     """Steady motion along a straight line.
 
     Args:
@@ -73,7 +88,7 @@ class Translation:
 
 
 @dataclass(frozen=True)
-class Oscillation:
+class Oscillation(Given):
     """Displacement amplitude (sin(2 pi frequency t + phase) - sin(phase)).
 
     Args:
@@ -108,7 +123,7 @@ class Oscillation:
 
 
 @dataclass(frozen=True)
-class Rotation:
+class Rotation(Given):
     """Steady rotation about an axis that is fixed in space.
 
     Args:
@@ -141,10 +156,7 @@ class Rotation:
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
-        point = _point(start)
-        # By the largest part first: the squares of small components are 0.
-        axis = np.array(self.axis) / np.abs(self.axis).max()
-        axis /= np.sqrt((axis**2).sum())
+        point, axis = _point(start), unit_axis(self)
         arm = point - self.center
         radius = arm - (arm * axis).sum() * axis
         return Led(point, np.zeros(3), radius, np.cross(axis, radius), self.rate)
@@ -153,9 +165,205 @@ class Rotation:
 Motion = Translation | Oscillation | Rotation
 
 
+@dataclass(frozen=True)
+class Path(Given):
+    """Displacement along a cubic spline, which is C^2: of a wall, not of a point.
+
+    Args:
+        times: at least two, ascending [s].
+        positions: for each time three numbers, the displacement from where the wall is given [m].
+
+    The second derivative is 0 at both ends (the natural spline); there is no motion beyond them.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Path(times=(0.0, 1.0, 2.0), positions=((0, 0, 0), (0, 0, 1), (0, 0, 0))).displacement(0.5)
+    array([0.    , 0.    , 0.6875])
+    """
+
+    times: tuple[float, ...]
+    positions: tuple[Vector, ...]
+
+    def __post_init__(self) -> None:
+        times = checks.array("times", self.times)
+        if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
+            wrong = np.flatnonzero(~(np.diff(times) > 0.0)) if times.ndim == 1 else np.empty(0)
+            came = f"{times[wrong[0]]:g} before {times[wrong[0] + 1]:g}" if wrong.size else f"the shape {times.shape}"
+            raise SceneError(f"times must be at least two, ascending, got {came}")
+        if not np.isfinite(times).all():
+            raise SceneError(f"times must be finite, got {times[~np.isfinite(times)][0]:g}")
+        if isinstance(self.positions, (str, bytes)) or len(self.positions) != times.size:
+            raise SceneError(f"positions must be one for each of the {times.size} times, got {len(self.positions)}")
+        object.__setattr__(self, "times", tuple(times.tolist()))
+        places = tuple(_vector(f"positions[{k}]", place) for k, place in enumerate(self.positions))
+        object.__setattr__(self, "positions", places)
+
+    def cubics(self) -> Floats:
+        """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""
+        t, x = np.array(self.times), np.array(self.positions).T
+        h, slope = np.diff(t), np.diff(x) / np.diff(t)
+        bends = np.zeros_like(x)  # second derivatives at the knots
+        # h_k-1 m_k-1 + 2 (h_k-1 + h_k) m_k + h_k m_k+1 = 6 (slope_k - slope_k-1), a tridiagonal system
+        upper, right = np.zeros(t.size), np.zeros_like(x)
+        for k in range(1, t.size - 1):
+            pivot = 2.0 * (h[k - 1] + h[k]) - h[k - 1] * upper[k - 1]
+            upper[k] = h[k] / pivot
+            right[:, k] = (6.0 * (slope[:, k] - slope[:, k - 1]) - h[k - 1] * right[:, k - 1]) / pivot
+        for k in range(t.size - 2, 0, -1):
+            bends[:, k] = right[:, k] - upper[k] * bends[:, k + 1]
+        first = slope - h * (2.0 * bends[:, :-1] + bends[:, 1:]) / 6.0
+        return np.array([x[:, :-1], first, 0.5 * bends[:, :-1], np.diff(bends) / (6.0 * h)])
+
+    def displacement(self, time: float) -> Floats:
+        """The displacement (3,) at a time [s]."""
+        k = min(max(int(np.searchsorted(self.times, time, "right")) - 1, 0), len(self.times) - 2)
+        s, (a, b, c, d) = time - self.times[k], self.cubics()[:, :, k]
+        return np.asarray(a + s * (b + s * (c + s * d)))
+
+
+@dataclass(frozen=True)
+class Sum(Given):
+    """Several motions of a wall at once: displacements add up, and at most one part is a rotation.
+
+    Args:
+        parts: at least one motion; the centre of a rotation moves with the displacements.
+
+    Raises:
+        SceneError: two rotations.
+
+    >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
+    >>> len(both.parts)
+    2
+    """
+
+    parts: "tuple[WallMotion, ...]"
+
+    def __post_init__(self) -> None:
+        turns = [one for one in self.parts if isinstance(one, Rotation)]
+        if len(turns) > 1:
+            raise SceneError(f"a sum of motions must have at most one rotation, got {len(turns)}")
+
+
+WallMotion = Translation | Oscillation | Rotation | Path | Sum
+# The motions by their kind in a scene file.
+KINDS: dict[str, Any] = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation, "path": Path}
+
+
+class Pose(NamedTuple):
+    """Where a wall is: x = center + shift + turn (xi - center)."""
+
+    shift: Floats  # (3,) [m]
+    turn: Floats  # (3, 3)
+    center: Floats  # (3,) [m]
+    quaternion: tuple[float, float, float, float]  # of the turn, (w, x, y, z)
+
+    def position(self) -> Floats:
+        """Where the origin of the frame in which the wall is given is now, (3,)."""
+        return np.asarray(self.center + self.shift - _product(self.turn, self.center))
+
+    def placed(self, points: Floats) -> Floats:
+        """Points (3, N) of the wall as it is given, where they are now."""
+        middle = self.center[:, None]
+        return np.asarray(middle + self.shift[:, None] + _product(self.turn, points - middle))
+
+    def turned(self, vectors: Floats) -> Floats:
+        """Vectors (3, N) of the frame of the wall in the scene."""
+        return _product(self.turn, vectors)
+
+    def given(self, points: Floats) -> Floats:
+        """Points (3, N) of the scene in the frame in which the wall is given."""
+        middle = self.center[:, None]
+        return np.asarray(middle + _product(self.turn.T, points - self.shift[:, None] - middle))
+
+
+def pose(motion: "WallMotion | None", time: float) -> Pose:
+    """Where a wall with this motion is at a time [s]."""
+    found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
+    for one in parts_of(motion):
+        if isinstance(one, Rotation):
+            center, turn, half = np.array(one.center), _turned_by(one, one.rate * time), 0.5 * one.rate * time
+            x, y, z = (math.sin(half) * unit_axis(one)).tolist()
+            quaternion = (math.cos(half), x, y, z)
+        else:
+            found = found + displacement(one, time)
+    return Pose(found, turn, center, quaternion)
+
+
+def displacement(motion: "Translation | Oscillation | Path", time: float) -> Floats:
+    """The displacement (3,) of a wall at a time [s]."""
+    if isinstance(motion, Path):
+        return motion.displacement(time)
+    return motion.harmonic((0.0, 0.0, 0.0)).position(time)
+
+
+def parts_of(motion: Any) -> tuple[Any, ...]:
+    """What a motion is the sum of; nothing of None."""
+    if motion is None:
+        return ()
+    return motion.parts if isinstance(motion, Sum) else (motion,)
+
+
+def unit_axis(rotation: Rotation) -> Floats:
+    """The unit vector (3,) along its axis."""
+    # By the largest part first: the squares of small components are 0.
+    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()
+    return np.asarray(axis / np.sqrt((axis**2).sum()))
+
+
+def parts_of_wall(value: Any) -> "WallMotion | None":
+    """`value` as the motion of a wall: None, a motion, its table, or a list of several.
+
+    Raises:
+        SceneError: it is none of these.
+    """
+    if value is None or isinstance(value, WallMotion):
+        return value
+    if isinstance(value, Mapping):
+        kind = checks.one_of("motion.kind", value.get("kind"), KINDS)
+        given = {key: part for key, part in value.items() if key != "kind"}
+        names = list(KINDS[kind].__dataclass_fields__)
+        for key in given:
+            if key not in names:
+                raise SceneError(
+                    f"motion.{key}: unknown key, expected {checks.listed(names)}{checks.closest(key, names)}"
+                )
+        for name in names:
+            if name not in given and name != "phase":
+                raise SceneError(f"motion.{name}: expected a value of a {kind}, got nothing; add {name} = ...")
+        return KINDS[kind](**given)  # type: ignore[no-any-return]
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
+        parts = [part for one in value for part in parts_of(parts_of_wall(one))]
+        return parts[0] if len(parts) == 1 else Sum(tuple(parts))
+    raise SceneError(
+        f"motion must be None, swarm.Translation, Oscillation, Rotation, Path or a sum of them, got {value!r}"
+    )
+
+
+def table_of(motion: "WallMotion") -> Any:
+    """The table of a wall's motion, of a sum a list of tables."""
+    names = {cls: kind for kind, cls in KINDS.items()}
+    tables = [{"kind": names[type(one)], **asdict(one)} for one in parts_of(motion)]
+    return tables[0] if len(tables) == 1 else tables
+
+
 def led(motion: Motion | None, start: ArrayLike) -> Led:
     """The path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
     return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
+
+
+def _turned_by(rotation: Rotation, angle: float) -> Floats:
+    """The matrix (3, 3) of a rotation by an angle [rad]."""
+    # Rodrigues: cos a + (1 - cos a) k k^T + sin a [k], where 1 - cos a = 2 sin^2(a/2)
+    k, half = unit_axis(rotation), math.sin(0.5 * angle)
+    across = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    versine = 2.0 * half * half
+    return np.asarray((1.0 - versine) * np.eye(3) + versine * np.multiply.outer(k, k) + math.sin(angle) * across)
+
+
+def _product(matrix: Floats, rows: Floats) -> Floats:
+    """(3, 3) times (3, N), rounded term by term: the last bit of BLAS depends on the processor."""
+    return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))
 
 
 def _vector(name: str, value: Vector) -> Vector:

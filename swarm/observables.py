@@ -15,6 +15,7 @@ from .particles import Floats, State
 from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
+from .surfaces.moving import at
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
@@ -103,10 +104,10 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                 for j in range(min(_COLUMNS, end - left)):
                     i = left + j
                     m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
-                    e = _energies(law, chain, gravity, m, r, v)
+                    e = _energies(law, at(chain, 0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = penetration(chain, r)
+                    depth = penetration(at(chain, 0.0), r)
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * e.fall
                     sums[_CONTACT, j] += m * e.stored
@@ -158,7 +159,7 @@ def _escapes(gravity, chain, r, v):
 
 @_escapes.register(Nothing)
 def _(gravity, chain, r, v):
-    return (flights.first_hit(chain, gravity, r, v).time == np.inf) & (square(v) > 0.0)
+    return (flights.first_hit(at(chain, 0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
 def drift(seen: dict[str, Any]) -> float:
@@ -169,6 +170,7 @@ def drift(seen: dict[str, Any]) -> float:
     energy, lost = seen["total_energy"], seen["dissipated_energy"]
     # Files of older versions have no heat, and those of particles no work.
     given = np.sum(seen.get("wall_heat", [0.0])[-1]) + seen.get("work", [0.0])[-1]
+    given += np.sum(seen.get("wall_work", [0.0])[-1])
     change = abs(energy[-1] + lost[-1] - given - energy[0])
     return float(change / abs(energy[0]) if energy[0] else change)
 
@@ -179,7 +181,10 @@ def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> di
     `owners` says which surface each wall belongs to, `lasts` whether a contact has lasted in this run.
     """
     multipliers, contacts = state.multipliers, state.contacts if lasts else None
-    impulse = np.bincount(owners, weights=state.impulse.sum(axis=1))
+    # The work of walls that move is booked behind their impulses.
+    booked = state.impulse.sum(axis=1)
+    impulse = np.bincount(owners, weights=booked[: len(owners)])
+    moves = {} if booked.size == len(owners) else {"wall_work": np.bincount(owners, weights=booked[len(owners) :])}
     heat = np.zeros_like(impulse) if state.heat is None else np.bincount(owners, weights=state.heat.sum(axis=1))
     loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
     totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
@@ -200,6 +205,7 @@ def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> di
         "sliding": 0 if contacts is None else int(np.count_nonzero(contacts.phase)),
         "sliding_time": 0.0 if contacts is None else float(contacts.sliding.sum()),
         "wall_heat": heat,
+        **moves,
         **loops,
         "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }

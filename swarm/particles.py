@@ -145,7 +145,7 @@ class State(NamedTuple):
     energy: Floats  # (N,) total energy per mass [J/kg]: that of the start, less what was dissipated
     inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
     impacts: NDArray[np.int64]  # (N,) since the start
-    impulse: Floats  # (walls, N) normal impulse since the start [N s]
+    impulse: Floats  # (walls, N) normal impulse since the start [N s], then (walls, N) the work of walls that move [J]
     dissipated: Floats  # (N,) energy lost since the start [J]; empty if no wall dissipates
     multipliers: Multipliers | None
     contacts: Contacts | None = None

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
-from .contact.laws import Laws, Thermal
+from . import motion as motions
+from .contact.laws import Laws, Moves, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .surfaces import required
-from .surfaces.fold import Chain, chain_of
+from .surfaces.fold import Chain
+from .surfaces.moving import Carried, carried
 from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
@@ -86,9 +88,13 @@ class Scene:
                 "have no point in common; check their `side`, and that solids are smaller than their cavity"
             )
 
-    def chain(self) -> Chain | None:
-        """The surfaces as kernels take them."""
-        return chain_of(self.surfaces)
+    def moves(self) -> bool:
+        """Whether a surface has a motion."""
+        return any(surface.motion is not None for surface in self.surfaces)
+
+    def chain(self, moment: float = 0.0) -> Chain | Carried | None:
+        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
+        return carried(self.surfaces, moment)
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""
@@ -100,8 +106,9 @@ class Scene:
             self._of_walls([surface.restitution for surface in self.surfaces], 1.0),
             self._of_walls([surface.friction for surface in self.surfaces], 0.0),
             self._of_walls([_thermal(surface) for surface in self.surfaces], _NO_HEAT),
+            Moves(0.0) if self.moves() else None,
         )
-        return None if laws == (None, None, None) else laws
+        return None if laws == (None, None, None, None) else laws
 
     def _of_walls(self, values: list[Any], neutral: Any) -> Chain | None:
         """The value of the owner of every wall as a chain, None where all are neutral."""
@@ -129,17 +136,17 @@ class Scene:
         size = self.size()
         return size if math.isfinite(size) else self.extent()
 
-    def gaps(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Signed gap of every surface at points (3, N), shape (surfaces, N); admissible is <= 0 for all."""
+    def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
         rows = checks.array("points", points)
-        return np.array([_side(surface) * surface.phi(rows) for surface in self.surfaces])
+        return np.array([_side(surface) * surface.phi(rows, time) for surface in self.surfaces])
 
-    def distances_outside(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
-        slopes = [np.sqrt((surface.gradient(points) ** 2).sum(axis=0)) for surface in self.surfaces]
+        slopes = [np.sqrt((surface.gradient(points, time) ** 2).sum(axis=0)) for surface in self.surfaces]
         # At the centre of a ball the slope is 0, and a point is as far inside as can be.
         with np.errstate(over="ignore"):
-            return np.asarray(self.gaps(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
+            return np.asarray(self.gaps(points, time) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
     def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
         """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
@@ -157,17 +164,23 @@ class Scene:
         """Whether a particle may fly to infinity."""
         return not np.isfinite(self.bounds()).all()
 
-    def open_faces(self) -> NDArray[np.float64]:
+    def poses(self, time: float) -> list[motions.Pose]:
+        """Where every surface is at a time [s]."""
+        return [motions.pose(surface.motion, time) for surface in self.surfaces]
+
+    def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
         """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
-        faces = [(*n, offset) for surface in self.surfaces for n, offset in surface.open_faces()]
+        faces = [
+            (*n, offset) for surface in self.surfaces for n, offset in _placed(surface, surface.open_faces(), time)
+        ]
         rows = np.array(faces).reshape(-1, 4)
         return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]
 
-    def bounds(self) -> Box:
-        """A box (lower, upper) around the admissible volume; infinite where that is open."""
-        boxes = np.array([surface.bounds() for surface in self.surfaces])
+    def bounds(self, time: float = 0.0) -> Box:
+        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
+        boxes = np.array([_box(surface, time) for surface in self.surfaces])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-        planes = [plane for surface in self.surfaces for plane in surface.half_spaces()]
+        planes = [plane for surface in self.surfaces for plane in _placed(surface, surface.half_spaces(), time)]
         if planes:
             low, high = _polyhedron_bounds(planes, low, high)
         return tuple(low.tolist()), tuple(high.tolist())
@@ -208,6 +221,32 @@ class Scene:
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
         return max(surface.extent() for surface in self.surfaces) or 1.0
+
+
+def _box(surface: Surface, time: float) -> Box:
+    """The bounds of a surface at a time [s]."""
+    low, high = (np.array(corner) for corner in surface.bounds())
+    if surface.motion is not None:
+        found = motions.pose(surface.motion, time)
+        if np.array_equal(found.turn, np.eye(3)):
+            low, high = low + found.shift, high + found.shift
+        elif np.isfinite([low, high]).all():
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            middle, half = found.placed(middle[:, None])[:, 0], np.abs(found.turn) @ half
+            low, high = middle - half, middle + half
+        else:
+            low, high = np.full(3, -math.inf), np.full(3, math.inf)
+    return tuple(low.tolist()), tuple(high.tolist())
+
+
+def _placed(surface: Surface, planes: list[HalfSpace], time: float) -> list[HalfSpace]:
+    """Half-spaces of a surface at a time [s]."""
+    if surface.motion is None or not planes:
+        return planes
+    found = motions.pose(surface.motion, time)
+    normals = found.turned(np.array([normal for normal, _offset in planes]).T)
+    offsets = np.array([offset for _normal, offset in planes]) + (normals * found.position()[:, None]).sum(axis=0)
+    return [(tuple(normal), offset) for normal, offset in zip(normals.T.tolist(), offsets.tolist(), strict=True)]
 
 
 def _thermal(surface: Surface) -> Thermal:

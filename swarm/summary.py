@@ -103,7 +103,10 @@ def _figures(seen: dict[str, Any]) -> dict[str, str]:
     dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
     slid = seen.get("sliding_time", [0.0])[-1]
     sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
-    heats = [f"{heat:.4g} J from surfaces[{i}]" for i, heat in enumerate(seen.get("wall_heat", [[]])[-1]) if heat]
+    heats, works = (
+        [f"{given:.4g} J from surfaces[{i}]" for i, given in enumerate(seen.get(name, [[]])[-1]) if given]
+        for name in ("wall_heat", "wall_work")
+    )
     tied = (
         {"link error": f"{seen['link_error'].max():.1e} of its length"} if np.any(seen.get("link_error", 0.0)) else {}
     )
@@ -117,6 +120,7 @@ def _figures(seen: dict[str, Any]) -> dict[str, str]:
         **tied,
         **dissipated,
         **({"wall heat": ", ".join(heats)} if heats else {}),
+        **({"wall work": ", ".join(works)} if works else {}),
         **escaped,
     }
 

@@ -13,6 +13,7 @@ import msgspec
 from .checks import closest, listed, one_of
 from .errors import SceneError
 from .methods import ALL_METHODS, Method
+from .motion import table_of as motion_table
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
 
@@ -39,6 +40,8 @@ def table_of(described: Surface | Method) -> dict[str, Any]:
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
     table = {keys[name]: value for name, value in dataclasses.asdict(described).items() if value is not None}
+    if table.get("motion") is not None:
+        table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
     return {"kind": kinds[type(described)], **table}
 
 

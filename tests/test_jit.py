@@ -526,11 +526,10 @@ LAYERS = [
     ["observables", "history"],
     ["lanes"],
     ["methods"],
-    ["motion"],
     ["scene", "particles"],
     ["contact"],
     ["surfaces"],
-    ["frames", "kernel"],
+    ["frames", "kernel", "motion"],
     ["checks", "extras"],
     ["status", "errors", "version", "interrupt"],
 ]

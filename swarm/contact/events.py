@@ -8,11 +8,12 @@ from ..kernel.jit import by_type, inlined, outlined
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
+from ..surfaces.moving import Carried, at
 from . import hold, sliding, touching
 from . import laws as wall_laws
 from .hold import One, Two
 from .projection import ALLOWED
-from .reflection import Energy, exact
+from .reflection import Energy, exact, relative, wall_velocity
 
 # What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
 # decided; or it is left to `careful`.
@@ -105,12 +106,12 @@ def _bounce(rules, chain, gravity, wall, p):
 @outlined
 def enter(rules, chain, gravity, wall, p):
     """What becomes of a particle that leaves this wall so slowly that it is back at once."""
-    n = _normal(chain, wall, p.r)
+    n, u = _normal(chain, wall, p.r), wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
-    if dot(v, n) > 0.0:
+    if dot(relative(u, v), n) > 0.0:
         bounce = _bounce(rules, chain, gravity, wall, p)
         v, twice, impulse = bounce.v, bounce.twice_energy, bounce.impulse
-    away = -dot(v, n)
+    away = -dot(relative(u, v), n)
     along = v + away * n
     flies = Next(FLYING, v, 0.0, twice, wall, -1.0, impulse, 0.0)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
@@ -124,7 +125,8 @@ def enter(rules, chain, gravity, wall, p):
     following = flights.first_hit(chain, gravity, p.r, v)
     if 0.0 <= following.wall != wall and following.time < hop:
         at = accelerated(gravity, v, following.time)
-        towards = dot(_normal(chain, following.wall, p.r), at)
+        other = wall_velocity(wall_laws.moving(rules.laws), chain, following.wall, p.r)
+        towards = dot(_normal(chain, following.wall, p.r), relative(other, at))
         if towards <= GRAZING * math.sqrt(speed2):
             edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
             if edge.phase == EDGE:
@@ -136,10 +138,11 @@ def enter(rules, chain, gravity, wall, p):
         return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
     # the particle than to one that slides, which the caller books, and friction as much less.
-    e, speed = wall_laws.restitution_of(rules.laws, wall), norm(along)
+    slip = relative(u, along)
+    e, speed = wall_laws.restitution_of(rules.laws, wall), norm(slip)
     spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
-    faster = along * (1.0 + spared / speed) if speed > spared else along
-    twice += square(faster) - square(along) - away * away
+    faster = along + (spared / speed) * slip if speed > spared else along
+    twice += square(faster) - square(v) if wall_laws.moves(rules.laws) else square(faster) - square(along) - away * away
     return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
 
@@ -152,8 +155,9 @@ def _kept(across, p):
 @outlined
 def _on_edge(rules, chain, gravity, two, p):
     """What becomes of a particle in an edge: it slides there if both walls press on it."""
-    taken = hold.split_at(two, chain, p.r, p.v)
-    across2 = max(square(p.v) - square(taken.along), 0.0)
+    drift = hold.drift(wall_laws.moving(rules.laws), two, chain, p.r)
+    taken = hold.split_at(two, chain, drift, p.r, p.v)
+    across2, kept2 = _across2(drift, p.v, taken)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
     least = weightless(rules, gravity, p)
     if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
@@ -163,7 +167,19 @@ def _on_edge(rules, chain, gravity, two, p):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
         return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second, 0.0, 0.0)
-    return Next(EDGE, taken.along, _kept(math.sqrt(across2), p), p.twice, two.first, two.second, 0.0, 0.0)
+    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second, 0.0, 0.0)
+
+
+@by_type
+def _across2(drift, v, taken):
+    """What a velocity loses of its square where its part across the walls is taken, and the square of that part."""
+    across2 = max(square(v) - square(taken.along), 0.0)
+    return across2, across2
+
+
+@_across2.register(hold.Drift)
+def _(drift, v, taken):
+    return square(v) - square(taken.along), square(v - taken.along)
 
 
 # --- While it slides -------------------------------------------------------------------------------------
@@ -182,9 +198,11 @@ def meet(rules, held, chain, gravity, wall, p):
 def after_meeting(rules, held, chain, gravity, wall, p):
     """The same with the velocity that the other wall has turned; `left` is its impulse."""
     impulse = p.left
-    away = -dot(_normal(chain, wall, p.r), p.v)
+    moving = wall_laws.moving(rules.laws)
+    away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
-    taken = hold.split_at(held, chain, p.r, p.v)
+    drift = hold.drift(moving, held, chain, p.r)
+    taken = hold.split_at(held, chain, drift, p.r, p.v)
     flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
@@ -192,8 +210,8 @@ def after_meeting(rules, held, chain, gravity, wall, p):
         found = _at_rest_there(held, rules, chain, gravity, wall, p)
         if found.phase != FLYING:
             return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse, 0.0)
-    across2 = max(square(p.v) - square(taken.along), 0.0)
-    keep, twice = _kept(math.sqrt(across2), p), p.twice
+    across2, kept2 = _across2(drift, p.v, taken)
+    keep, twice = _kept(math.sqrt(kept2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
     other = hold.second(held)
@@ -207,7 +225,7 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
     if edge.phase == EDGE:
         return edge
     pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
-    away = -dot(n, p.v)
+    away = -dot(n, relative(wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r), p.v))
     along = p.v + away * n
     least = weightless(rules, gravity, p)
     if not _press(chain, wall, p.r, along, pull) > least:
@@ -219,7 +237,7 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
         return edge
     keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
-        keep, twice = 0.0, p.twice - away * away
+        keep, twice = 0.0, p.twice - (square(p.v) - square(along) if wall_laws.moves(rules.laws) else away * away)
     return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
 
 
@@ -252,10 +270,13 @@ def rests(gravity, force):
 
 
 @outlined
-def off_the_wall(chain, wall, r, v):
-    """A velocity along a wall that lets the particle go, leaning away from it by more than round-off."""
+def off_the_wall(chain, wall, r, v, u):
+    """A velocity along a wall that lets the particle go, leaning away from it by more than round-off.
+
+    u is the velocity of the wall, or None.
+    """
     n = _normal(chain, wall, r)
-    b, least = dot(v, n), 4.0 * _EPSILON * norm(v)
+    b, least = dot(relative(u, v), n), 4.0 * _EPSILON * norm(v)
     return v - (b + least) * n if abs(b) <= least else v
 
 
@@ -270,14 +291,14 @@ class Arrival(NamedTuple):
 
 
 @by_type
-def arrival(chain, number, held, path, near):
-    """The first wall that a step goes into."""
+def arrival(chain, number, held, path, near, left):
+    """The first wall that a step goes into, with so much of the frame left at its start [s]."""
     raise NotImplementedError
 
 
 @arrival.register(walls.Chain)
-def _(chain, number, held, path, near):
-    later = arrival(chain.rest, number + 1.0, held, path, near)
+def _(chain, number, held, path, near, left):
+    later = arrival(chain.rest, number + 1.0, held, path, near, left)
     if hold.is_held_by(held, number):
         return later
     time = _deep_after(chain.first, path, near)
@@ -286,7 +307,43 @@ def _(chain, number, held, path, near):
     return later
 
 
-arrival.register(type(None), lambda chain, number, held, path, near: Arrival(math.inf, -1.0))
+arrival.register(type(None), lambda chain, number, held, path, near, left: Arrival(math.inf, -1.0))
+
+
+@arrival.register(Carried)
+def _(chain, number, held, path, near, left):
+    found = Arrival(math.inf, -1.0)
+    for i in range(walls.length(chain)):
+        if not hold.is_held_by(held, float(i)):
+            time = _deep_later(chain, float(i), path, near, left)
+            if time < found.time:
+                found = Arrival(time, float(i))
+    return found
+
+
+@outlined
+def _deep_later(chain, wall, path, near, left):
+    """`_deep_after` of a wall that may move."""
+    start = at(chain, left)
+    towards = path.v0 - walls.velocity(start, wall, path.r0)
+    if walls.distance(start, wall, path.r0) >= -near and dot(walls.unit_normal(start, wall, path.r0), towards) > 0.0:
+        return 0.0
+    low, high = 0.0, math.inf
+    for k in range(1, _PLACES + 1):
+        s = k / _PLACES
+        if walls.distance(at(chain, left - s * path.h), wall, _at(path, s)) > near:
+            high = s
+            break
+        low = s
+    if not high < math.inf:
+        return high
+    for _i in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if walls.distance(at(chain, left - middle * path.h), wall, _at(path, middle)) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 @outlined

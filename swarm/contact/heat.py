@@ -7,6 +7,7 @@ from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.vector import Vec, dot
 from ..surfaces import fold as walls
 from . import laws as wall_laws
+from .reflection import from_relative, given, relative, wall_velocity
 
 
 class Draw(NamedTuple):
@@ -18,20 +19,26 @@ class Draw(NamedTuple):
 
 
 class Left(NamedTuple):
-    """Whether a wall has accommodated a particle, its velocity then, and the normal impulse per mass."""
+    """Whether a wall has accommodated a particle, its velocity then, and the normal impulse per mass.
+
+    `work` is twice what the wall gives by its motion, per mass; the rest of the change of energy is heat.
+    """
 
     happens: bool
     v: Vec
     impulse: float
+    work: float
 
 
 @outlined
-def exchange(thermal, chain, wall, arriving, mass, draw):
+def exchange(laws, chain, wall, arriving, mass, draw):
     """What a thermal wall makes of a particle that is `arriving` with (r, v)."""
-    law = wall_laws.thermal_of(thermal, wall)
+    law = wall_laws.thermal_of(wall_laws.thermal(laws), wall)
     r, v = arriving
     n = walls.unit_normal(chain, wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)
-    w = flux_maxwellian(n, law.energy / mass, u)
-    b = dot(v, n)
-    return Left((b > 0.0) & (u.choice < law.accommodation), w, b - dot(w, n))
+    moving = wall_velocity(wall_laws.moving(laws), chain, wall, r)
+    before, after = relative(moving, v), flux_maxwellian(n, law.energy / mass, u)
+    b, happens = dot(before, n), u.choice < law.accommodation
+    work = given(moving, after - before)
+    return Left((b > 0.0) & happens, from_relative(moving, after), b - dot(after, n), work)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, Vec, cross, dot, square
 from ..surfaces import fold as walls
+from .laws import Moves
 
 _TINY = 2.2250738585072014e-308
 
@@ -31,6 +32,13 @@ class Held(NamedTuple):
     b: float
     m: Vec
     c: float
+
+
+class Drift(NamedTuple):
+    """How fast the walls that hold a particle move."""
+
+    first: Vec
+    second: Vec
 
 
 # --- Which walls -----------------------------------------------------------------------------------------
@@ -69,46 +77,98 @@ def _(held):
     return held.second
 
 
-# --- What they take of a vector --------------------------------------------------------------------------
+# --- How they move: None where no wall of the scene does -------------------------------------------------
 
 
 @by_type
-def split(held, chain, r0, r1, w):
-    """`Held` of a vector, with the normals of a step from r0 to r1."""
+def drift(moving, held, chain, r):
+    """How fast they are at a point."""
+    return
+
+
+@drift.register(Moves)
+def _(moving, held, chain, r):
+    return Drift(walls.velocity(chain, held.first, r), walls.velocity(chain, max(second(held), 0.0), r))
+
+
+@by_type
+def mean_drift(moving, held, chain, r0, r1, h):
+    """How fast they are in the mean of a step from r0 to r1 of length h."""
+    return
+
+
+@mean_drift.register(Moves)
+def _(moving, held, chain, r0, r1, h):
+    other = max(second(held), 0.0)
+    return Drift(walls.mean_velocity(chain, held.first, r0, r1, h), walls.mean_velocity(chain, other, r0, r1, h))
+
+
+@by_type
+def towards(drift, w, n):
+    """The speed of a particle into the first wall, whose normal is n."""
+    return dot(w, n)
+
+
+@by_type
+def towards_second(drift, w, n):
+    """The same of the second wall."""
+    return dot(w, n)
+
+
+towards.register(Drift, lambda drift, w, n: dot(w - drift.first, n))
+towards_second.register(Drift, lambda drift, w, n: dot(w - drift.second, n))
+
+
+@by_type
+def given_by_second(drift, taken):
+    """Twice the work per mass of the second wall in a step that takes so much of w0."""
+    return 0.0
+
+
+# w1 - w0 = -2 (b n + c m), whose work is that times the velocity of the wall.
+given_by_second.register(Drift, lambda drift, taken: -4.0 * taken.c * dot(drift.second, taken.m))
+
+
+# --- What they take of a velocity ------------------------------------------------------------------------
+
+
+@by_type
+def split(held, chain, drift, r0, r1, w):
+    """`Held` of a velocity, with the normals of a step from r0 to r1."""
     n = walls.step_normal(chain, held.first, r0, r1)
-    b = dot(w, n)
+    b = towards(drift, w, n)
     return Held(w - b * n, n, b, ZERO, 0.0)
 
 
 @split.register(Two)
-def _(held, chain, r0, r1, w):
+def _(held, chain, drift, r0, r1, w):
     n, m = walls.step_normal(chain, held.first, r0, r1), walls.step_normal(chain, held.second, r0, r1)
-    return _on_edge(n, m, w)
+    return _on_edge(drift, n, m, w)
 
 
 @by_type
-def along(held, chain, r0, r1, w):
+def along(held, chain, drift, r0, r1, w):
     """The part P of it alone, which needs no lengths of normals."""
-    return split(held, chain, r0, r1, w).along
+    return split(held, chain, drift, r0, r1, w).along
 
 
 @along.register(One)
-def _(held, chain, r0, r1, w):
+def _(held, chain, drift, r0, r1, w):
     g = walls.inner_gradient(chain, held.first, r0, r1)
-    return w - (dot(w, g) / square(g)) * g
+    return w - (towards(drift, w, g) / square(g)) * g
 
 
 @by_type
-def split_at(held, chain, r, w):
-    """`Held` of a vector at a point."""
+def split_at(held, chain, drift, r, w):
+    """`Held` of a velocity at a point."""
     n = walls.unit_normal(chain, held.first, r)
-    b = dot(w, n)
+    b = towards(drift, w, n)
     return Held(w - b * n, n, b, ZERO, 0.0)
 
 
 @split_at.register(Two)
-def _(held, chain, r, w):
-    return _on_edge(walls.unit_normal(chain, held.first, r), walls.unit_normal(chain, held.second, r), w)
+def _(held, chain, drift, r, w):
+    return _on_edge(drift, walls.unit_normal(chain, held.first, r), walls.unit_normal(chain, held.second, r), w)
 
 
 @inlined
@@ -118,12 +178,22 @@ def edge(n, m):
 
 
 @inlined
-def _on_edge(n, m, w):
+def _on_edge(drift, n, m, w):
     # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
-    e, cosine, wn, wm = edge(n, m), dot(n, m), dot(w, n), dot(w, m)
+    e, cosine, wn, wm = edge(n, m), dot(n, m), towards(drift, w, n), towards_second(drift, w, m)
     sine2 = square(e)
     inverse = 1.0 / select(sine2 > _TINY, sine2, _TINY)
-    return Held((dot(w, e) * inverse) * e, n, (wn - cosine * wm) * inverse, m, (wm - cosine * wn) * inverse)
+    b, c = (wn - cosine * wm) * inverse, (wm - cosine * wn) * inverse
+    return Held(_allowed(drift, (dot(w, e) * inverse) * e, w - b * n - c * m), n, b, m, c)
+
+
+@by_type
+def _allowed(drift, on_edge, rest):
+    """What is left of a velocity: along the edge, where the walls are at rest."""
+    return on_edge
+
+
+_allowed.register(Drift, lambda drift, on_edge, rest: rest)
 
 
 @by_type

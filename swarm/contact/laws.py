@@ -12,6 +12,13 @@ class Laws(NamedTuple):
     restitution: Any  # None, or a Chain of one e a wall
     friction: Any  # None, or a Chain of one mu a wall
     thermal: Any  # None, or a Chain of one `Thermal` a wall
+    moving: Any  # None, or `Moves` where a wall moves
+
+
+class Moves(NamedTuple):
+    """Walls that move: they do work, and laws act on the velocity relative to them."""
+
+    some: float
 
 
 class Thermal(NamedTuple):
@@ -77,6 +84,35 @@ def thermal(laws):
     return
 
 
+@by_type
+def moving(laws):
+    """`Moves`, or None."""
+    return
+
+
+@by_type
+def loses(laws):
+    """Whether an impact may turn energy into heat: a constant for the compiler."""
+    return False
+
+
+@by_type
+def moves(laws):
+    """Whether a wall moves: a constant for the compiler."""
+    return False
+
+
+moves.register(Laws, lambda laws: _is_some(laws.moving))
+
+
+@by_type
+def _is_some(moving):
+    return False
+
+
+_is_some.register(Moves, lambda moving: True)
+moving.register(Laws, lambda laws: laws.moving)
+loses.register(Laws, lambda laws: is_given(laws.restitution) or is_given(laws.friction))
 restitution.register(Laws, lambda laws: laws.restitution)
 friction.register(Laws, lambda laws: laws.friction)
 thermal.register(Laws, lambda laws: laws.thermal)

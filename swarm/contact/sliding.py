@@ -16,8 +16,10 @@ from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from ..surfaces import contract
 from ..surfaces import fold as walls
+from ..surfaces.moving import rising, straight_hit
 from . import laws as wall_laws
-from .hold import Two, along, is_held_by, presses, split_at
+from .hold import Two, along, is_held_by, mean_drift, presses, split_at
+from .reflection import relative, wall_velocity
 
 _EPSILON = 2.220446049250313e-16
 # p of Suzuki's composition of fourth order
@@ -88,30 +90,69 @@ class Slowed(NamedTuple):
 
 @by_type
 def slow(friction, held, chain, gravity, r, motion, h):
-    """The velocity after a time h of friction alone; `motion` is (v, the direction in which the particle slides).
+    """The velocity after a time h of friction alone; `motion` is (v, the direction in which the particle slides, u).
 
-    The force of the walls is k s^2 + c at the speed s: the midpoint rule for ds/dt = -(k s^2 + c), with the sum of
-    mu k and mu c of the walls, is a quadratic equation. Back in time gravity may turn a slow particle round between two
-    of these: s is then below 0.
+    u is the velocity of the wall, or None; the direction is relative to it, as the speed is.
+
+    The force of the walls is k s^2 + l s + c at the speed s, where l is of walls that move: the midpoint rule for
+    ds/dt = -(k s^2 + l s + c), with the sum of mu k, mu l and mu c of the walls, is a quadratic equation. Back in time
+    gravity may turn a slow particle round between two of these: s is then below 0.
     """
     return Slowed(motion[0], 0.0)
 
 
 @slow.register(walls.Chain)
 def _(friction, held, chain, gravity, r, motion, h):
-    v, towards = motion
-    speed = math.sqrt(square(v))
+    v, towards, u = motion
+    slip = relative(u, v)
+    speed = math.sqrt(square(slip))
     moving = speed > 0.0
-    sign = select(dot(v, towards) < 0.0, -1.0, 1.0)
-    direction = either(moving, v * (sign / select(moving, speed, 1.0)), towards)
+    sign = select(dot(slip, towards) < 0.0, -1.0, 1.0)
+    direction = either(moving, slip * (sign / select(moving, speed, 1.0)), towards)
     k, k2 = presses(held, chain, r, direction, ZERO)
     c, c2 = presses(held, chain, r, ZERO, accelerated(gravity, ZERO, 1.0))
-    # s1 = 2 s - s0 with s = s0 - h/2 (k s^2 + c)
-    a, b = 0.5 * h * _grip(friction, held, k, k2), sign * speed - 0.5 * h * _grip(friction, held, c, c2)
-    root2 = 1.0 + 4.0 * a * b
-    s0, middle = sign * speed, 2.0 * b / (1.0 + math.sqrt(select(root2 > 0.0, root2, 0.0)))
+    force = _force_of_speed(
+        u,
+        friction,
+        held,
+        chain,
+        gravity,
+        (r, direction, speed),
+        Quadratic(_grip(friction, held, k, k2), 0.0, _grip(friction, held, c, c2)),
+    )
+    # s1 = 2 s - s0 with s = s0 - h/2 (k s^2 + l s + c)
+    a, b = 0.5 * h * force.k, sign * speed - 0.5 * h * force.c
+    one = 1.0 + 0.5 * h * force.l
+    root2 = one * one + 4.0 * a * b
+    s0, middle = sign * speed, 2.0 * b / (one + math.sqrt(select(root2 > 0.0, root2, 0.0)))
     s1 = 2.0 * middle - s0
     return Slowed(v + (s1 - s0) * direction, s0 * s0 - s1 * s1)
+
+
+class Quadratic(NamedTuple):
+    """k s^2 + l s + c"""
+
+    k: float
+    l: float  # noqa: E741
+    c: float
+
+
+@by_type
+def _force_of_speed(u, friction, held, chain, gravity, at, still):
+    """The force of friction as a function of the speed; `at` is (r, direction, speed), `still` for walls at rest."""
+    return still
+
+
+@_force_of_speed.register(Vec)
+def _(u, friction, held, chain, gravity, at, still):
+    r, direction, speed = at
+    pull, step = accelerated(gravity, ZERO, 1.0), select(speed > 0.0, speed, 1.0)
+    none = _grip(friction, held, *presses(held, chain, r, u, pull))
+    ahead = _grip(friction, held, *presses(held, chain, r, u + step * direction, pull))
+    back = _grip(friction, held, *presses(held, chain, r, u - step * direction, pull))
+    # A force that is negative is none: the wall lets go.
+    k, slope = 0.5 * (ahead + back) - none, 0.5 * (ahead - back)
+    return Quadratic(k / (step * step), slope / step, none)
 
 
 @by_type
@@ -132,13 +173,26 @@ def _(friction, v, a):
 
 
 @inlined
-def force(friction, held, chain, gravity, r, v):
+def force(laws, held, chain, gravity, r, v):
     """The `Force` on a particle that slides with this velocity along the walls."""
-    pull = accelerated(gravity, ZERO, 1.0)
+    pull, moving, friction = accelerated(gravity, ZERO, 1.0), wall_laws.moving(laws), wall_laws.friction(laws)
     n, m = presses(held, chain, r, v, pull)
-    taken = split_at(held, chain, r, v)
+    taken = split_at(held, chain, None, r, v)
     a = pull - n * taken.n - m * taken.m
-    return Force(a - _drag(friction, held, n, m, v, a), n, m)
+    slip = relative(wall_velocity(moving, chain, held.first, r), v)
+    drive = relative(wall_acceleration(moving, chain, held.first, r), a)
+    return Force(a - _drag(friction, held, n, m, slip, drive), n, m)
+
+
+@by_type
+def wall_acceleration(moving, chain, wall, r):
+    """The acceleration of a wall at a point of it, or None where no wall moves."""
+    return
+
+
+@wall_acceleration.register(wall_laws.Moves)
+def _(moving, chain, wall, r):
+    return walls.acceleration(chain, wall, r)
 
 
 @by_type
@@ -195,10 +249,10 @@ class Swept(NamedTuple):
 
 
 @inlined
-def sweep(held, chain, h, step, still):
+def sweep(moving, held, chain, h, step, still):
     """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
-    end = r0 + h * along(held, chain, r0, r1, w)
+    end = r0 + h * along(held, chain, mean_drift(moving, held, chain, r0, r1, h), r0, r1, w)
     return Swept(end, not (total(absolute(end - r1)) <= still))
 
 
@@ -206,6 +260,12 @@ def sweep(held, chain, h, step, still):
 def part(k):
     """The length of step k of the composition, in units of its length."""
     return select(k == 2, MIDDLE, OUTER)
+
+
+@inlined
+def before(k):
+    """How much of the composition comes before its step k."""
+    return select(k < 3, OUTER * select(k < 3, 1.0 * k, 0.0), 1.0 - OUTER * (5.0 - k))
 
 
 @inlined
@@ -276,27 +336,30 @@ class Path(NamedTuple):
 
 
 @by_type
-def meets(chain, number, held, path, near):
-    """Whether a step may go deeper than `near` into a wall that does not hold the particle."""
+def meets(chain, ends, number, held, path, near):
+    """Whether a step may go deeper than `near` into a wall that does not hold the particle.
+
+    `ends` are the walls at its end, which are others where they move.
+    """
     raise NotImplementedError
 
 
 @meets.register(walls.Chain)
-def _(chain, number, held, path, near):
-    here = _may_meet(chain.first, path, near) & (not is_held_by(held, number))
-    return here | meets(chain.rest, number + 1.0, held, path, near)
+def _(chain, ends, number, held, path, near):
+    here = _may_meet(chain.first, ends.first, path, near) & (not is_held_by(held, number))
+    return here | meets(chain.rest, ends.rest, number + 1.0, held, path, near)
 
 
-meets.register(type(None), lambda chain, number, held, path, near: False)
+meets.register(type(None), lambda chain, ends, number, held, path, near: False)
 
 
 @inlined
-def _may_meet(surface, path, near):
+def _may_meet(surface, end, path, near):
     level0, rise0, _scale = _level(surface, path.r0, path.v0)
-    level1, rise1, scale = _level(surface, path.r1, path.v1)
+    level1, rise1, scale = _level(end, path.r1, path.v1)
     # The cubic through both ends is below its control points; the start is known to be admissible.
     third, deep = path.h / 3.0, near * scale
-    on_line = _on_line(surface, path.r0, path.r1 - path.r0)
+    on_line = _on_line(surface, end, path.r0, path.r1)
     return (level0 + third * rise0 > deep) | (level1 - third * rise1 > deep) | (level1 > deep) | on_line
 
 
@@ -305,13 +368,13 @@ def _level(surface, r, v):
     """The level of a wall, its rate of change, and the length of its gradient."""
     n = contract.unit_normal(surface, r)
     scale = abs(dot(n, contract.slope(surface, r)))
-    return contract.level_of(surface, contract.inner(surface, r)), scale * dot(n, v), scale
+    return contract.level_of(surface, contract.inner(surface, r)), scale * rising(surface, n, r, v), scale
 
 
 @by_type
-def _on_line(surface, r, d):
+def _on_line(surface, end, r0, r1):
     """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
     if contract.is_quartic(surface) or contract.flat(surface):
         return False
-    time, _found = contract.first_hit(surface, r, d)
+    time, _found = straight_hit(surface, end, r0, r1)
     return time < 1.0

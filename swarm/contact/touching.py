@@ -10,14 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel.gravity import accelerated
+from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
 from ..kernel.vector import ZERO, Vec, absolute, dot, largest, moves, norm, put, square, total
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
+from ..surfaces.moving import at
 from . import laws as wall_laws
 from . import reflection
 from .projection import ALLOWED, along, project
+from .reflection import from_relative, relative
 
 _EPSILON = 2.220446049250313e-16
 # A second wall nearer than this part of the shortest flight is met in the same instant.
@@ -65,6 +67,7 @@ class Touch(NamedTuple):
     normal: Any  # (3, walls): unit normal of the step
     held: Any  # what the wall takes of the velocity
     depth: Any  # signed distance outside
+    frame: Any  # None, or a velocity with which they move along their normals
 
 
 @outlined
@@ -74,25 +77,26 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
     If the next flight would be shorter than the shortest too, the particle slides for that time instead.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
+    carried, chain = chain, at(chain, flight.left)
     given = scratch(walls.length(chain), np.float64)
-    w, now, at = v, energy, wall
+    w, now, met = v, energy, wall
     for _blow in range(_BLOWS):
-        bounce = reflection.exact(method.laws, chain, gravity, at, r, w, now)
+        bounce = reflection.exact(method.laws, chain, gravity, met, r, w, now)
         w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
-        given[int(at)] += bounce.impulse
+        given[int(met)] += bounce.impulse
         following = flights.first_hit(chain, gravity, r, w)
         if following.time >= method.shortest or following.wall < 0.0:
             end = reflection.Stepped(r, w, 0.0, given[int(wall)])
-            if at == wall:
+            if met == wall:
                 end = _stepped(method.contact_step, chain, gravity, wall, flight, now, end)
                 given[int(wall)] = end.impulse
             for i in range(given.size):
                 impulse[i, lane] += given[i]
             return Landing(end.r, end.v, end.used, now.twice)
-        if following.wall == at or following.time > _SAME_INSTANT * method.shortest:
+        if following.wall == met or following.time > _SAME_INSTANT * method.shortest:
             break
-        at = following.wall
-    return _slide(method, chain, gravity, wall, flight, energy, impulse, lane)
+        met = following.wall
+    return _slide(method, carried, gravity, wall, flight, energy, impulse, lane)
 
 
 @by_type_outlined
@@ -109,29 +113,60 @@ def _(contact_step, chain, gravity, wall, flight, energy, reflected):
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
-    laws, r, count = method.laws, flight.r, walls.length(chain)
-    touch = Touch(
-        scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64),
-        scratch(count, np.float64),
-    )  # fmt: skip
-    _depths(chain, 0, r, touch.depth)
+    laws, r, count, moving = method.laws, flight.r, walls.length(chain), wall_laws.moving(method.laws)
+    carried, chain = chain, at(chain, flight.left)
+    touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
+    _depths(chain, 0, r, depth)
     for i in range(count):
-        touch.touched[i] = touch.depth[i] >= -method.touch
-    touch.touched[int(wall)] = True
-    given = scratch(count, np.float64)
-    v, twice_energy = _landed(laws, chain, touch, given, r, flight.v, energy.twice)
-    straight = _goes_straight(chain, gravity, touch, r, v)
+        touched[i] = depth[i] >= -method.touch
+    touched[int(wall)] = True
+    normal, held, given = scratch((3, count), np.float64), scratch(count, np.float64), scratch(count, np.float64)
+    touch = Touch(touched, normal, held, depth, _frame_of(moving, chain, touched, r))
+    v, twice_energy = _landed(laws, chain, touch, given, r, relative(touch.frame, flight.v), energy.twice)
+    straight = not wall_laws.moves(laws) and _goes_straight(chain, gravity, touch, r, v)
     h = flight.left if straight else min(method.shortest, flight.left)
     u, h = _unhindered(chain, gravity, touch, r, v, h, method.touch)
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
+    u = from_relative(touch.frame, u)
     if moves(u):
-        r = _settled(chain, wall, touch, r + h * u)
+        r = _settled(at(carried, flight.left - h), wall, touch, r + h * u)
+    w = from_relative(touch.frame, w)
+    twice_energy = _twice_energy(moving, gravity, r, w, twice_energy)
     speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
     half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
         impulse[i, lane] += given[i] + 2.0 * touch.held[i]
     return Landing(r, w, h, twice_energy)
+
+
+@by_type_outlined
+def _frame_of(moving, chain, touched, r):
+    """A velocity with which all touched walls move along their normals, or None where no wall moves."""
+    return
+
+
+@_frame_of.register(wall_laws.Moves)
+def _(moving, chain, touched, r):
+    u = ZERO
+    # One wall after the other, as in Kaczmarz' method
+    for _sweep in range(_SWEEPS):
+        for i in range(touched.size):
+            if touched[i]:
+                n = walls.unit_normal(chain, float(i), r)
+                u = u + dot(walls.velocity(chain, float(i), r) - u, n) * n
+    return u
+
+
+@by_type
+def _twice_energy(moving, gravity, r, w, kept):
+    """Twice the energy per mass after a step: what is kept, or what there is where walls do work."""
+    return kept
+
+
+@_twice_energy.register(wall_laws.Moves)
+def _(moving, gravity, r, w, kept):
+    return square(w) + 2.0 * potential(gravity, r)
 
 
 @outlined
@@ -146,7 +181,7 @@ def _unhindered(chain, gravity, touch, r, v, h, near):
         following, other = h, -1
         for i in range(touch.touched.size):
             if not touch.touched[i]:
-                time, _found = flights.hit_of(chain, None, float(i), r, u)
+                time, _found = flights.hit_of(chain, None, float(i), r, from_relative(touch.frame, u))
                 if time < following:
                     following, other = time, i
         if other < 0:

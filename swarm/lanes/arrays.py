@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, EVENT
+from ..contact.laws import loses
 from ..contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
 from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined, next_of, outlined, select, spaced
 from ..kernel.vector import column, put
@@ -13,6 +14,7 @@ from ..methods import contract as methods
 from ..particles import Contacts, Multipliers
 from ..surfaces import flights
 from ..surfaces import fold as walls
+from ..surfaces.moving import Carried
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
 LANES = 256
@@ -29,7 +31,7 @@ class Lanes(NamedTuple):
     """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
 
     rows: Array  # (ROWS, stride) position, velocity, time left, the method's constants, impacts
-    impulse: Array  # (walls, stride) normal impulse per mass
+    impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
     wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     unsolved: Array  # bool, whether its solve goes on
@@ -42,7 +44,7 @@ class Lanes(NamedTuple):
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
     some: Array  # int64, those `eights` of which one is marked
     order: Array  # int64, the lanes that are marked
-    left_behind: Array  # (ROWS + walls, stride) what the lanes hold when a halt ends the block
+    left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
 
 
 class Halted(NamedTuple):
@@ -52,7 +54,7 @@ class Halted(NamedTuple):
     """
 
     particle: Array  # int64, in order
-    rows: Array  # (ROWS + walls, particles) the lane's rows, then its impulses
+    rows: Array  # (ROWS + booked, particles) the lane's rows, then its impulses
 
 
 class Draws(NamedTuple):
@@ -82,12 +84,12 @@ class Share(NamedTuple):
     seed: int  # of random numbers
 
 
-def empty(walls: int) -> Lanes:
-    """Lanes for one block."""
+def empty(walls: int, rows: int) -> Lanes:
+    """Lanes for one block, with so many rows of what walls give."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
         rows=table(ROWS),
-        impulse=table(walls),
+        impulse=table(rows),
         wall=table(1)[0],
         kappa=table(1)[0],
         unsolved=np.zeros(STRIDE, np.bool_),
@@ -100,7 +102,7 @@ def empty(walls: int) -> Lanes:
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
-        left_behind=table(ROWS + walls),
+        left_behind=table(ROWS + rows),
     )
 
 
@@ -112,9 +114,9 @@ def table(rows: int) -> NDArray[np.float64]:
     return memory[first : first + size].view(np.float64).reshape(rows, STRIDE)
 
 
-def none_halted(walls: int) -> Halted:
-    """No particle was halted."""
-    return Halted(np.empty(0, np.int64), np.empty((ROWS + walls, 0)))
+def none_halted(rows: int) -> Halted:
+    """No particle was halted; with so many rows of what walls give."""
+    return Halted(np.empty(0, np.int64), np.empty((ROWS + rows, 0)))
 
 
 @inlined
@@ -169,7 +171,7 @@ def load(method, chain, lanes, lane, share, i):
     own = methods.constants(method, state.mass[i], state.energy[i], v)
     rows[OWN, lane], rows[OWN + 1, lane], rows[OWN + 2, lane] = own
     rows[LEFT, lane], rows[HITS, lane] = select(left > 0.0, left, share.span), 0.0
-    for s in range(walls.length(chain)):
+    for s in range(booked(chain)):
         impulse[s, lane] = 0.0
 
 
@@ -212,16 +214,40 @@ def retire(method, chain, lanes, lane, share):
     put(state.position, 0, i, column(rows, R, lane))
     put(state.velocity, 0, i, column(rows, V, lane))
     impacts[i] += np.int64(rows[HITS, lane])
-    for s in range(walls.length(chain)):
+    for s in range(booked(chain)):
         total[s, i] += impulse[s, lane] * state.mass[i]
     if methods.dissipates(method):
         # Each particle knows its energy: what it has lost is accounted for with it.
         now = 0.5 * rows[OWN, lane]
-        state.dissipated[i] += state.mass[i] * (state.energy[i] - now)
+        if loses(methods.laws(method)):
+            state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, impulse, lane))
         state.energy[i] = now
     phase = hand_over(state.contacts, i, rows[LEFT, lane], lanes.wall[lane])
     share.phase[i] = phase
     share.pending[phase] += 1
+
+
+@by_type
+def booked(chain):
+    """How many rows book what the walls give: their impulses, then the work of those that move."""
+    return walls.length(chain)
+
+
+@by_type
+def _work(chain, impulse, lane):
+    """What walls that move have given a lane, per mass."""
+    return 0.0
+
+
+booked.register(Carried, lambda chain: 2 * walls.length(chain))
+
+
+@_work.register(Carried)
+def _(chain, impulse, lane):
+    total = 0.0
+    for s in range(walls.length(chain), 2 * walls.length(chain)):
+        total += impulse[s, lane]
+    return total
 
 
 @inlined
@@ -230,7 +256,7 @@ def move(chain, lanes, source, target):
     rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
     for row in range(ROWS):
         rows[row, target] = rows[row, source]
-    for s in range(walls.length(chain)):
+    for s in range(booked(chain)):
         impulse[s, target] = impulse[s, source]
     particle[target] = particle[source]
 

@@ -16,9 +16,10 @@ from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outl
 from ..kernel.vector import column, put, square
 from ..methods import contract as methods
 from ..status import Status
-from ..surfaces import flights
+from ..surfaces import flights, safe
 from ..surfaces import fold as walls
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
+from ..surfaces.moving import Carried, Marched, at
 from .arrays import (
     EIGHT,
     HITS,
@@ -108,10 +109,30 @@ def _rare(hard, method, chain, gravity, state, lanes, live):
     if not methods.holds(method):
         return _hard_passes(hard, method, chain, gravity, lanes, live)
     for i in range(live):
-        if lanes.rows[HITS, i] > MOST_HITS:
+        if lanes.rows[HITS, i] > _most_hits(chain):
             put(state.position, 0, lanes.particle[i], column(lanes.rows, R, i))
+            _keep_time(chain, state, lanes, i)
             return Status.STALLED.value, i
     return Status.DONE.value, 0
+
+
+@by_type
+def _most_hits(chain):
+    return MOST_HITS
+
+
+# Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
+_most_hits.register(Carried, lambda chain: 0.1 * MOST_HITS)
+
+
+@by_type
+def _keep_time(chain, state, lanes, i):
+    """Keep when a particle is given up that walls have closed on."""
+
+
+@_keep_time.register(Carried)
+def _(chain, state, lanes, i):
+    state.contacts.left[lanes.particle[i]] = lanes.rows[LEFT, i]
 
 
 @inlined
@@ -137,17 +158,31 @@ def _marked(lanes, live):
 @inlined
 def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    _fly(gravity, method, chain, lanes, live)
+    _go(chain, gravity, method, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
-    _exchange_heat(methods.thermal(method), chain, gravity, share, lanes, live)
+    _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
     some_arrived, some_hard = False, False
     for i in range(live):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
-        contact = methods.contact(method, chain, gravity, lane, lanes.wall[i], found)
+        contact = methods.contact(method, at(chain, lane.left), gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
+
+
+@by_type
+def _go(chain, gravity, method, lanes, live):
+    """Every lane to its next contact, or to the end of the frame."""
+    _fly(gravity, method, chain, lanes, live)
+
+
+@_go.register(Marched)
+def _(chain, gravity, method, lanes, live):
+    rows = lanes.rows
+    for i in range(live):
+        hit = safe.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
+        _flight(method, chain, gravity, lanes, i, hit)
 
 
 @by_type
@@ -168,7 +203,8 @@ def _(gravity, method, chain, lanes, live):
     for i in range(live):
         hit = flights.NEVER
         if methods.lands(method):
-            hit = flights.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i))
+            now = at(chain, rows[LEFT, i])
+            hit = flights.first_hit(now, gravity, column(rows, R, i), column(rows, V, i))
         _flight(method, chain, gravity, lanes, i, hit)
 
 
@@ -179,7 +215,7 @@ def _(gravity, method, chain, lanes, live):
     for i in range(live):
         hit = flights.NEVER
         if methods.lands(method):
-            hit = flights.end_fall(chain, lanes.course, 0, i)
+            hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
         _flight(method, chain, gravity, lanes, i, hit)
 
 
@@ -188,17 +224,18 @@ def _fall(chain, gravity, lanes, live):
     """The course of every lane to its first hit, by safe steps."""
     rows, course, marked = lanes.rows, lanes.course, lanes.marked
     for i in range(live):
-        flights.begin_fall(chain, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
+        now = at(chain, rows[LEFT, i])
+        flights.begin_fall(now, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
     for _step in range(SAFE_STEPS):
         for i in range(live):
-            flights.step_fall(chain, course, 0, i)
+            flights.step_fall(at(chain, rows[LEFT, i]), course, 0, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
     for i in range(live):
         marked[i] = _needs_more(chain, lanes, i)
     for k in range(_marked(lanes, live)):
         lane = lanes.order[k]
         for _step in range(MORE_STEPS):
-            flights.step_fall(chain, course, 0, lane)
+            flights.step_fall(at(chain, rows[LEFT, lane]), course, 0, lane)
             if not _needs_more(chain, lanes, lane):
                 break
 
@@ -206,27 +243,29 @@ def _fall(chain, gravity, lanes, live):
 @inlined
 def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
-    hit = flights.end_fall(chain, lanes.course, 0, i)
+    hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
     return (hit.wall < 0.0) & (hit.time < lanes.rows[LEFT, i])
 
 
 @by_type
-def _exchange_heat(thermal, chain, gravity, share, lanes, live):
+def _exchange_heat(thermal, method, chain, gravity, share, lanes, live):
     """The impacts on thermal walls that accommodate their particles."""
 
 
 @_exchange_heat.register(walls.Chain)
-def _(thermal, chain, gravity, share, lanes, live):
+def _(thermal, method, chain, gravity, share, lanes, live):
     rows, state = lanes.rows, share.state
     for i in range(live):
         wall, p = lanes.wall[i], index(lanes.particle[i])
         if wall >= 0.0:
             r, v = column(rows, R, i), column(rows, V, i)
             draw = Draw(share.seed, lanes.particle[i], state.impacts[p] + np.int64(rows[HITS, i]))
-            left = exchange(thermal, chain, wall, (r, v), state.mass[p], draw)
+            now, laws = at(chain, rows[LEFT, i]), methods.laws(method)
+            left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:
                 before, after = rows[OWN, i], square(left.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, int(wall), before, after)
+                book_heat(state, p, int(wall), before, after - left.work)
+                add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
                 put(rows, V, i, left.v)
                 rows[OWN, i] = after
                 rows[HITS, i] += 1.0
@@ -252,7 +291,8 @@ def _end(method, chain, lanes, i, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
     _put(lanes, i, contact)
     _count(method, lanes, i, contact)
-    _add_impulse(chain.rest, chain, lanes.impulse, i, contact.wall, contact.impulse)
+    _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
+    add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
     lanes.wall[i] = contact.wall
     hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
     return contact.lasts | (not (contact.left > 0.0)), hard
@@ -277,17 +317,42 @@ def _count(method, lanes, i, contact):
 
 
 @by_type
-def _add_impulse(rest, chain, impulse, lane, wall, given):
+def _add_impulse(chain, impulse, lane, wall, given):
     """impulse[wall, lane] += given, without a branch; a loop over rows here would not vectorise."""
 
 
-@_add_impulse.register(Nothing)
+@_add_impulse.register(walls.Chain)
+def _(chain, impulse, lane, wall, given):
+    _add_of(chain.rest, chain, impulse, lane, wall, given)
+
+
+@_add_impulse.register(Carried)
+def _(chain, impulse, lane, wall, given):
+    _add_of(chain.walls.rest, chain.walls, impulse, lane, wall, given)
+
+
+@by_type
+def add_work(chain, impulse, lane, wall, given):
+    """The work of walls that move is in the rows after those of the impulses."""
+
+
+@add_work.register(Carried)
+def _(chain, impulse, lane, wall, given):
+    _add_to(chain.walls, impulse, walls.length(chain), lane, wall, given)
+
+
+@by_type
+def _add_of(rest, chain, impulse, lane, wall, given):
+    """The same, by how many walls there are."""
+
+
+@_add_of.register(Nothing)
 def _(rest, chain, impulse, lane, wall, given):
     # One wall: what is given is 0, or it is given by that.
     impulse[0, lane] += given
 
 
-@_add_impulse.register(walls.Chain)
+@_add_of.register(walls.Chain)
 def _(rest, chain, impulse, lane, wall, given):
     _add_to(chain, impulse, 0, lane, wall, given)
 

@@ -8,10 +8,13 @@ import numpy as np
 from ..contact import events, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
+from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import Array, by_type, inlined, select
 from ..kernel.vector import ZERO, column, either, put, square
 from ..methods import contract as methods
+from ..surfaces import fold as walls
+from ..surfaces.moving import at, during
 from .arrays import STRIDE, table
 
 # What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
@@ -21,12 +24,13 @@ R, V, A, PRESS, LEFT, STEP, KEEP, TWICE, SCALE2, WALL, CUT = 0, 3, 6, 9, 11, 12,
 # of friction, by how much it may be off, and by how much the last sweep but one.
 H, R1, V1, PRESS1, IMPULSE, WORK, ALLOWED, STILL = 19, 20, 23, 26, 28, 30, 31, 32
 # The part of the composition under way: w0, the last guess of its end, the direction in which it slides; the changes of
-# velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut.
-W, END, TOWARD, CHANGE, BEFORE, TRIALS, ROWS = 33, 36, 39, 42, 45, 48, 49
+# velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut;
+# twice the work of the second wall, where walls move.
+W, END, TOWARD, CHANGE, BEFORE, TRIALS, GIVEN, ROWS = 33, 36, 39, 42, 45, 48, 49, 50
 # A step of this part of a crossing, or of the size, is the shortest.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
 # Friction has stopped a particle where this part of |v|^2 is left.
-_STOPPED = 1e-24
+SLOWEST = 1e-24
 
 
 class Lanes(NamedTuple):
@@ -34,8 +38,10 @@ class Lanes(NamedTuple):
 
     rows: Array  # (ROWS, stride)
     particle: Array  # int64
-    moving: Array  # bool, whether the sweeps of a step go on
+    unsolved: Array  # bool, whether the sweeps of a step go on; at its end, whether it is taken
     event: Array  # int64, what the step of this pass may end with
+    gained: Array  # twice what walls that move give in the step of this pass, per mass
+    after: Array  # twice the energy per mass at its end
 
 
 # What a step may end with.
@@ -44,71 +50,102 @@ LIFTED, MET, FAILED, STOPPED, STUCK = 1, 2, 4, 8, 16
 
 def empty() -> Lanes:
     """Lanes for one block."""
-    return Lanes(table(ROWS), np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64))
+    return Lanes(
+        table(ROWS),
+        np.zeros(STRIDE, np.int64),
+        np.zeros(STRIDE, np.bool_),
+        np.zeros(STRIDE, np.int64),
+        table(1)[0],
+        table(1)[0],
+    )
 
 
 # --- One composed step of every lane ---------------------------------------------------------------------
 
 
 @inlined
-def _start(method, gravity, lanes, live):
+def _start(method, chain, gravity, lanes, live):
     """How long the step of every live lane is, by how much it may be off, and from where it goes."""
     rows, friction, tolerance = lanes.rows, methods.friction(method), methods.sliding_tolerance(method)
+    moving = wall_laws.moving(methods.laws(method))
     for i in range(live):
         v, a = column(rows, V, i), column(rows, A, i)
         h = select(rows[STEP, i] < rows[LEFT, i], rows[STEP, i], rows[LEFT, i])
         h = select(rows[CUT, i] < h, rows[CUT, i], h)
-        stop = slides.longest(friction, v, a)
+        r = column(rows, R, i)
+        stop = _longest(moving, friction, at(chain, rows[LEFT, i]), rows[WALL, i], (r, v, a))
         h = select(stop < h, stop, h)
         # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
         speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
         rows[H, i], rows[ALLOWED, i] = h, tolerance * speed * h
-        r, taken = column(rows, R, i), accelerated(gravity, ZERO, 1.0) - a
+        taken = accelerated(gravity, ZERO, 1.0) - a
         rows[STILL, i] = slides.still(r, v, h * taken, rows[ALLOWED, i])
         put(rows, R1, i, r)
         put(rows, V1, i, v)
         put(rows, CHANGE, i, h * a)
         put(rows, BEFORE, i, h * a)
-        rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i] = 0.0, 0.0, 0.0
+        rows[IMPULSE, i], rows[IMPULSE + 1, i], rows[WORK, i], rows[GIVEN, i] = 0.0, 0.0, 0.0, 0.0
         lanes.event[i] = 0
+
+
+@by_type
+def _longest(moving, friction, chain, wall, motion):
+    """A time within which a particle that slides with friction surely does not stop on its first wall."""
+    _r, v, a = motion
+    return slides.longest(friction, v, a)
+
+
+@_longest.register(wall_laws.Moves)
+def _(moving, friction, chain, wall, motion):
+    r, v, a = motion
+    return slides.longest(friction, v - walls.velocity(chain, wall, r), a - walls.acceleration(chain, wall, r))
 
 
 @inlined
 def compose(kind, method, chain, gravity, lanes, live):
     """One composed step of every live lane, from its R, V and A to its R1 and V1."""
-    rows, moving, friction = lanes.rows, lanes.moving, methods.friction(method)
-    rubs = wall_laws.is_given(friction)
-    _start(method, gravity, lanes, live)
+    rows, unsolved, friction = lanes.rows, lanes.unsolved, methods.friction(method)
+    rubs, moving = wall_laws.is_given(friction), wall_laws.moving(methods.laws(method))
+    _start(method, chain, gravity, lanes, live)
     for k in range(slides.PARTS):
         for i in range(live):
             r, v, h = column(rows, R1, i), column(rows, V1, i), slides.part(k) * rows[H, i]
+            now = at(chain, rows[LEFT, i] - slides.before(k) * rows[H, i])
             last = column(rows, CHANGE, i)
             change = last + slides.lead(k) * (last - column(rows, BEFORE, i))
             put(rows, BEFORE, i, last)
             put(rows, END, i, r + h * (v + (0.5 * slides.part(k)) * change))
             if rubs:
-                toward = slides.direction(friction, v, last)
+                u = wall_velocity(moving, now, rows[WALL, i], r)
+                toward = slides.direction(
+                    friction, relative(u, v), _drive(moving, now, rows[WALL, i], r, last, rows[H, i])
+                )
                 held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-                slowed = slides.slow(friction, held, chain, gravity, r, (v, toward), 0.5 * h)
+                slowed = slides.slow(friction, held, now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
                 rows[WORK, i] += slowed.lost
                 put(rows, TOWARD, i, toward)
             put(rows, W, i, accelerated(gravity, v, 0.5 * h))
-            moving[i] = True
+            unsolved[i] = True
         for _sweep in range(slides.SWEEPS):
             some = False
             for i in range(live):
-                some = _sweep_lane(kind, chain, lanes, i, slides.part(k)) | some
+                some = _sweep_lane(kind, moving, chain, lanes, i, k) | some
             if not some:
                 break
         for i in range(live):
             h, w, v0, r0 = slides.part(k) * rows[H, i], column(rows, W, i), column(rows, V1, i), column(rows, R1, i)
             held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+            left, after = _when(lanes, i, k)
+            step, end = during(chain, left, after), column(rows, END, i)
             # The last sweep
-            taken = hold.split(held, chain, r0, column(rows, END, i), w)
+            drift = hold.mean_drift(moving, held, step, r0, end, h)
+            taken = hold.split(held, step, drift, r0, end, w)
             r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
             if rubs:
-                slowed = slides.slow(friction, held, chain, gravity, r, (v1, column(rows, TOWARD, i)), 0.5 * h)
+                now = at(chain, after)
+                u = wall_velocity(moving, now, rows[WALL, i], r)
+                slowed = slides.slow(friction, held, now, gravity, r, (v1, column(rows, TOWARD, i), u), 0.5 * h)
                 v1 = slowed.v
                 rows[WORK, i] += slowed.lost
             put(rows, R1, i, r)
@@ -116,20 +153,41 @@ def compose(kind, method, chain, gravity, lanes, live):
             put(rows, CHANGE, i, slides.inverse_part(k) * (v1 - v0))
             rows[IMPULSE, i] += 2.0 * taken.b
             rows[IMPULSE + 1, i] += 2.0 * taken.c
-            lanes.event[i] |= select(moving[i], FAILED, 0)
+            rows[GIVEN, i] += hold.given_by_second(drift, taken)
+            lanes.event[i] |= select(unsolved[i], FAILED, 0)
 
 
 @inlined
-def _sweep_lane(kind, chain, lanes, i, part):
+def _when(lanes, i, k):
+    """How much of the frame is left at the start and at the end of part k."""
+    left, h = lanes.rows[LEFT, i], lanes.rows[H, i]
+    return left - slides.before(k) * h, left - (slides.before(k) + slides.part(k)) * h
+
+
+@by_type
+def _drive(moving, chain, wall, r, change, h):
+    """What sets a particle in motion that is at rest on its first wall."""
+    return change
+
+
+@_drive.register(wall_laws.Moves)
+def _(moving, chain, wall, r, change, h):
+    return change - h * walls.acceleration(chain, wall, r)
+
+
+@inlined
+def _sweep_lane(kind, moving, chain, lanes, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
-    rows, moving = lanes.rows, lanes.moving
+    rows, unsolved = lanes.rows, lanes.unsolved
     held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r0, end, w = column(rows, R1, i), column(rows, END, i), column(rows, W, i)
-    swept = slides.sweep(held, chain, part * rows[H, i], (r0, end, w), rows[STILL, i])
-    on = moving[i]
+    left, after = _when(lanes, i, k)
+    step = during(chain, left, after)
+    swept = slides.sweep(moving, held, step, slides.part(k) * rows[H, i], (r0, end, w), rows[STILL, i])
+    on = unsolved[i]
     put(rows, END, i, either(on, swept.r, end))
     more = on & swept.moves
-    moving[i] = more
+    unsolved[i] = more
     return more
 
 
@@ -139,31 +197,35 @@ def _sweep_lane(kind, chain, lanes, i, part):
 @inlined
 def end_steps(kind, method, chain, gravity, lanes, live):
     """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
-    rows, friction = lanes.rows, methods.friction(method)
+    rows, laws = lanes.rows, methods.laws(method)
+    friction, moving = wall_laws.friction(laws), wall_laws.moving(laws)
     for i in range(live):
         held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+        start, now = at(chain, rows[LEFT, i]), at(chain, rows[LEFT, i] - rows[H, i])
         h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
         r0, v0, a0 = column(rows, R, i), column(rows, V, i), column(rows, A, i)
-        r1 = hold.settle(held, chain, column(rows, R1, i))
-        twice = rows[TWICE, i] - rows[WORK, i]
-        v1 = hold.split_at(held, chain, r1, column(rows, V1, i)).along
-        v1 = slides.restored(v1, twice - 2.0 * potential(gravity, r1) - keep * keep, scale2)
-        force = slides.force(friction, held, chain, gravity, r1, v1)
+        r1 = hold.settle(held, now, column(rows, R1, i))
+        v1 = hold.split_at(held, now, hold.drift(moving, held, now, r1), r1, column(rows, V1, i)).along
+        rest = 2.0 * potential(gravity, r1) + keep * keep
+        twice = twice_after(moving, rows[TWICE, i] - rows[WORK, i], square(v1) + rest)
+        v1 = _restored(moving, v1, twice - rest, scale2)
+        force = slides.force(laws, held, now, gravity, r1, v1)
         ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), rows[ALLOWED, i])
         path = slides.Path(r0, v0, r1, v1, h)
         lifted = hold.lets_go(held, force.n, force.m)
-        met = slides.meets(chain, 0.0, held, path, events.near(method, r1))
+        met = slides.meets(start, now, 0.0, held, path, events.near(method, r1))
         good = (ratio <= 1.0) & (lanes.event[i] == 0)
         fine = good & (not lifted) & (not met)
         happened = select(lifted, LIFTED, 0) | select(met, MET, 0)
         lanes.event[i] |= select(good, happened, 0)
-        lanes.moving[i] = fine
+        lanes.unsolved[i] = fine
         # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
         # found so again after a halt.
         whole = (fine & (h == rows[STEP, i])) | (not (ratio <= 1.0))
         rows[STEP, i] = select(whole, slides.next_step(h, ratio), rows[STEP, i])
         rows[CUT, i] = select(fine, np.inf, rows[CUT, i])
         rows[LEFT, i] -= select(fine, h, 0.0)
+        lanes.gained[i], lanes.after[i] = twice + rows[WORK, i] - rows[TWICE, i], twice
         rows[TWICE, i] = select(fine, twice, rows[TWICE, i])
         put(rows, R1, i, r1)
         put(rows, V1, i, v1)
@@ -173,7 +235,7 @@ def end_steps(kind, method, chain, gravity, lanes, live):
         put(rows, A, i, either(fine, force.acceleration, a0))
         rows[PRESS, i] = select(fine, force.n, rows[PRESS, i])
         rows[PRESS + 1, i] = select(fine, force.m, rows[PRESS + 1, i])
-        lanes.event[i] |= _stop(friction, fine, v1, scale2)
+        lanes.event[i] |= _stop(friction, fine, relative(wall_velocity(moving, now, rows[WALL, i], r1), v1), scale2)
         # Near an apex steps become shorter without end, in time or, of a slow particle, in length.
         step = rows[STEP, i]
         way2 = step * step * (square(v1) + step * step * square(accelerated(gravity, ZERO, 1.0)))
@@ -182,9 +244,31 @@ def end_steps(kind, method, chain, gravity, lanes, live):
 
 
 @by_type
+def twice_after(moving, kept, now):
+    """Twice the energy per mass after a step: that of before, or what there is where walls do work."""
+    return kept
+
+
+@twice_after.register(wall_laws.Moves)
+def _(moving, kept, now):
+    return now
+
+
+@by_type
+def _restored(moving, v, speed2, scale2):
+    """A velocity with that of its square which the energy says, where walls at rest hold the particle."""
+    return slides.restored(v, speed2, scale2)
+
+
+@_restored.register(wall_laws.Moves)
+def _(moving, v, speed2, scale2):
+    return v
+
+
+@by_type
 def _stop(friction, fine, v, scale2):
     """Whether friction has stopped a particle."""
-    return select(fine & (square(v) <= _STOPPED * scale2), STOPPED, 0)
+    return select(fine & (square(v) <= SLOWEST * scale2), STOPPED, 0)
 
 
 @_stop.register(type(None))
@@ -199,13 +283,14 @@ def _(friction, fine, v, scale2):
 def account(method, state, lanes, i):
     """What a step that is taken gives to the state."""
     rows, p = lanes.rows, lanes.particle[i]
-    if not lanes.moving[i]:
+    if not lanes.unsolved[i]:
         return
     state.contacts.sliding[p] += rows[H, i]
     push(state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
     rows[TRIALS, i] = 0.0
     if wall_laws.is_given(methods.friction(method)):
         lose(state, lanes, i, rows[WORK, i])
+    work(wall_laws.moving(methods.laws(method)), state, lanes, i, lanes.gained[i], rows[GIVEN, i])
 
 
 @inlined
@@ -215,6 +300,21 @@ def push(state, lanes, i, first, second):
     state.impulse[int(rows[WALL, i]), p] += first * state.mass[p]
     if rows[WALL + 1, i] >= 0.0:
         state.impulse[int(rows[WALL + 1, i]), p] += second * state.mass[p]
+
+
+@by_type
+def work(moving, state, lanes, i, twice, second):
+    """Book twice the work per mass of walls that move, and of it that of the second wall."""
+
+
+@work.register(wall_laws.Moves)
+def _(moving, state, lanes, i, twice, second):
+    rows, p = lanes.rows, lanes.particle[i]
+    behind = state.impulse.shape[0] // 2
+    state.energy[p] = 0.5 * rows[TWICE, i]
+    state.impulse[behind + int(rows[WALL, i]), p] += 0.5 * (twice - second) * state.mass[p]
+    if rows[WALL + 1, i] >= 0.0:
+        state.impulse[behind + int(rows[WALL + 1, i]), p] += 0.5 * second * state.mass[p]
 
 
 @inlined

@@ -3,16 +3,18 @@
 import numpy as np
 
 from ..contact import events, touching
+from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
-from ..contact.hold import One, Two, split_at
-from ..contact.reflection import loses_energy
+from ..contact.hold import One, Two, drift, split_at
+from ..contact.reflection import given, loses_energy, wall_velocity
 from ..kernel.gravity import potential
-from ..kernel.jit import by_type_outlined, inlined, kernel, outlined, scratch
+from ..kernel.jit import by_type, by_type_outlined, inlined, kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
+from ..surfaces.moving import Carried, at
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
 
@@ -42,15 +44,18 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    carried, chain = chain, at(chain, left)
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    if first >= 0.0 and _exchange_heat(methods.thermal(method), chain, gravity, share, i):
+    if first >= 0.0 and _exchange_heat(methods.thermal(method), method, carried, gravity, share, i):
         return True
     held = scratch((2, walls.length(chain)), np.float64)
-    if again > _OFTEN or events.settles(method, chain, gravity, p, held):
+    # Where walls move, several of them carry nobody for longer than a step.
+    settles = not wall_laws.moves(method.laws) and events.settles(method, chain, gravity, p, held)
+    if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
         found = events.enter(method, chain, gravity, wall, p)
@@ -62,12 +67,13 @@ def _decide(method, chain, gravity, share, i):
     if found.impulse > 0.0:
         state.impacts[i] += 1
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
-        _spare(chain, state, i, found, wall)
-    _lose(state, i, p.twice, found.twice)
+        _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
+    u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
+    _book(carried, state, i, wall, p.twice, found.twice, given(u, found.v - v), wall_laws.loses(method.laws))
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
     if phase == FLYING:
-        v = events.off_the_wall(chain, wall, r, v)
+        v = events.off_the_wall(chain, wall, r, v, u)
     slides = phase != FLYING
     put(state.velocity, 0, i, v)
     contacts.keep[i] = found.keep
@@ -83,19 +89,23 @@ def _decide(method, chain, gravity, share, i):
 
 
 @by_type_outlined
-def _exchange_heat(thermal, chain, gravity, share, i):
+def _exchange_heat(thermal, method, chain, gravity, share, i):
     """Whether a thermal wall accommodates a sliding particle: then it flies."""
     return False
 
 
 @_exchange_heat.register(walls.Chain)
-def _(thermal, chain, gravity, share, i):
+def _(thermal, method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
-    left = exchange(thermal, chain, wall, (r, v), state.mass[i], Draw(share.seed, i, state.impacts[i]))
+    now = at(chain, contacts.left[i])
+    left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, i, state.impacts[i]))
     if not left.happens:
         return False
-    book_heat(state, i, int(wall), 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r))
+    before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
+    book_heat(state, i, int(wall), before, after - left.work)
+    _book_work(chain, state, i, wall, left.work)
+    state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     state.impulse[int(wall), i] += left.impulse * state.mass[i]
@@ -106,14 +116,16 @@ def _(thermal, chain, gravity, share, i):
 
 
 @outlined
-def _spare(chain, state, i, found, wall):
+def _spare(moving, chain, state, i, found, wall):
     """What its walls give less to particle i, which chatters, than to one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
     turned = v - found.impulse * walls.unit_normal(chain, wall, r)
     if found.phase == HELD:
-        taken = split_at(One(found.wall), chain, r, turned)
+        held = One(found.wall)
+        taken = split_at(held, chain, drift(moving, held, chain, r), r, turned)
     else:
-        taken = split_at(Two(found.wall, found.other), chain, r, turned)
+        edge = Two(found.wall, found.other)
+        taken = split_at(edge, chain, drift(moving, edge, chain, r), r, turned)
         state.impulse[int(found.other), i] += taken.c * state.mass[i]
     state.impulse[int(found.wall), i] += taken.b * state.mass[i]
 
@@ -124,6 +136,31 @@ def _lose(state, i, before, after):
     if before != after:
         state.energy[i] = 0.5 * after
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
+
+
+@by_type
+def _book(chain, state, i, wall, before, after, given, loses):
+    """Book the change of twice the energy per mass at a wall; `given` is what it gives by its motion, if it moves."""
+    _lose(state, i, before, after)
+
+
+@_book.register(Carried)
+def _(chain, state, i, wall, before, after, given, loses):
+    # Where nothing is lost all of it is work, to the last digit.
+    given = given if loses else after - before
+    state.energy[i] = 0.5 * after
+    state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
+    _book_work(chain, state, i, wall, given)
+
+
+@by_type
+def _book_work(chain, state, i, wall, given):
+    """Book twice the work per mass of a wall that moves."""
+
+
+@_book_work.register(Carried)
+def _(chain, state, i, wall, given):
+    state.impulse[walls.length(chain) + int(wall), i] += 0.5 * given * state.mass[i]
 
 
 @kernel
@@ -165,20 +202,22 @@ def _rest(method, chain, gravity, share, i, p, held):
 @outlined
 def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
-    given = scratch((walls.length(chain), 1), np.float64)
+    impulses = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
-    if events.settles(method, chain, gravity, p, held):
+    if not wall_laws.moves(method.laws) and events.settles(method, chain, gravity, p, held):
         _rest(method, chain, gravity, share, i, p, held)
         return
     contacts.short_steps[i] += 1.0
-    end = events.careful(method, chain, gravity, contacts.met[i], p, given)
-    for s in range(given.shape[0]):
-        state.impulse[s, i] += given[s, 0] * state.mass[i]
+    end = events.careful(method, chain, gravity, contacts.met[i], p, impulses)
+    for s in range(impulses.shape[0]):
+        state.impulse[s, i] += impulses[s, 0] * state.mass[i]
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
-    _lose(state, i, p.twice, end.twice_energy)
+    u = wall_velocity(wall_laws.moving(method.laws), at(chain, left), contacts.met[i], r)
+    given_work = given(u, end.v - v)
+    _book(chain, state, i, contacts.met[i], p.twice, end.twice_energy, given_work, wall_laws.loses(method.laws))
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED

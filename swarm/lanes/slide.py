@@ -10,14 +10,18 @@ import math
 import numpy as np
 
 from ..contact import events, hold
+from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
-from ..kernel.gravity import potential
-from ..kernel.jit import by_type, index, inlined, kernel, outlined
-from ..kernel.vector import ZERO, column, put, square
+from ..contact.projection import ALLOWED
+from ..contact.reflection import wall_velocity
+from ..kernel.gravity import accelerated, potential
+from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined
+from ..kernel.vector import ZERO, column, norm, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
+from ..surfaces.moving import at, during
 from .arrays import LANES, following_particle, speed2_scale, with_distances
 from .compose import (
     CUT,
@@ -31,6 +35,7 @@ from .compose import (
     R1,
     SCALE2,
     SHORTEST,
+    SLOWEST,
     STEP,
     STOPPED,
     STUCK,
@@ -48,6 +53,8 @@ from .compose import (
     end_steps,
     lose,
     push,
+    twice_after,
+    work,
 )  # fmt: skip
 
 # Times that a step is cut before the lane is given up: it takes four or so.
@@ -56,6 +63,8 @@ _MOST_TRIALS = 100
 _FIRST = 1e-3
 # A step that is tried again is so much shorter.
 _RETRY = 0.25
+# Halvings of the interval in which a wall lets a particle go that rests on it.
+_HALVINGS = 60
 
 
 @by_type
@@ -81,9 +90,10 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         if not loaded:
             break
         live += 1
+    moving = wall_laws.moving(methods.laws(method))
     while live > 0:
         if passes >= share.halt[0]:
-            _leave(kind, chain, share, lanes, live)
+            _leave(kind, moving, chain, share, lanes, live)
             return Status.INTERRUPTED.value, 0, drawn
         passes += 1
         compose(kind, method, chain, gravity, lanes, live)
@@ -94,7 +104,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
             if phase != _phase(kind):
-                _retire(kind, chain, share, lanes, i, phase)
+                _retire(kind, moving, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
                     kind, method, chain, gravity, share, lanes, i, (following, stop, drawn)
                 )
@@ -105,10 +115,10 @@ def slide_block(kind, method, chain, gravity, share, lanes):
 
 
 @outlined
-def _leave(kind, chain, share, lanes, live):
+def _leave(kind, moving, chain, share, lanes, live):
     """The live lanes back into their particles, which go on when the frame does."""
     for i in range(live):
-        _retire(kind, chain, share, lanes, i, _phase(kind))
+        _retire(kind, moving, chain, share, lanes, i, _phase(kind))
 
 
 @outlined
@@ -150,14 +160,14 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
     rows[WALL, lane], rows[WALL + 1, lane] = contacts.walls[0, i], contacts.walls[1, i]
     rows[STEP, lane], rows[KEEP, lane], rows[TWICE, lane] = contacts.step[i], contacts.keep[i], twice
     if begins:
-        held = hold.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane])
+        held, now = hold.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane]), at(chain, left)
         # Frames show the speed that is kept across the walls too.
-        v = hold.split_at(held, chain, r, v).along
+        v = hold.split_at(held, now, hold.drift(wall_laws.moving(methods.laws(method)), held, now, r), r, v).along
     put(rows, R, lane, r)
     put(rows, V, lane, v)
     phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
     if phase != _phase(kind):
-        _retire(kind, chain, share, lanes, lane, phase)
+        _retire(kind, wall_laws.moving(methods.laws(method)), chain, share, lanes, lane, phase)
         return False
     return True
 
@@ -165,14 +175,17 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
 @outlined
 def _set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; what it does next, which may be to rest."""
-    rows, friction = lanes.rows, methods.friction(method)
+    rows, laws = lanes.rows, methods.laws(method)
     held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
-    force = slides.force(friction, held, chain, gravity, r, v)
+    now = at(chain, left)
+    force = slides.force(laws, held, now, gravity, r, v)
     put(rows, A, i, force.acceleration)
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
     if not rows[STEP, i] > 0.0:
         rows[STEP, i] = _FIRST * method.size / np.sqrt(rows[SCALE2, i])
+    if wall_laws.moves(laws):
+        return _stay(wall_laws.moving(laws), kind, method, chain, gravity, state, lanes, i)
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
         contacts.sliding[p] += left
@@ -186,17 +199,18 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
 
 
 @outlined
-def _retire(kind, chain, share, lanes, i, phase):
+def _retire(kind, moving, chain, share, lanes, i, phase):
     """A lane back into its particle, for what it does next."""
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
     v, keep = column(rows, V, i), rows[KEEP, i]
     slid = phase != FLYING and phase != CAREFUL
     if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
         held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-        taken = hold.split_at(held, chain, column(rows, R, i), v)
+        taken = hold.split_at(held, at(chain, rows[LEFT, i]), None, column(rows, R, i), v)
         v = v + keep * hold.inward(held, taken.n, taken.m)
     if phase == FLYING:
-        v = events.off_the_wall(chain, rows[WALL, i], column(rows, R, i), v)
+        now, r = at(chain, rows[LEFT, i]), column(rows, R, i)
+        v = events.off_the_wall(now, rows[WALL, i], r, v, wall_velocity(moving, now, rows[WALL, i], r))
     put(share.state.position, 0, p, column(rows, R, i))
     put(share.state.velocity, 0, p, v)
     contacts.walls[0, p] = rows[WALL, i] if slid else -1.0
@@ -232,12 +246,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     """
     rows, event, h = lanes.rows, lanes.event[i], lanes.rows[H, i]
     if event & STOPPED:
-        # All that is above the potential energy, down to what round-off has added to the kinetic one.
-        lost = rows[TWICE, i] - 2.0 * potential(gravity, column(rows, R, i))
-        rows[TWICE, i] -= lost
-        lose(state, lanes, i, lost)
-        rows[KEEP, i] = 0.0
-        put(rows, V, i, ZERO)
+        _stop(wall_laws.moving(methods.laws(method)), chain, gravity, state, lanes, i)
         return _set_going(kind, method, chain, gravity, state, lanes, i)
     if event & STUCK:
         return _give_up(state, lanes, i)
@@ -253,10 +262,10 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
             return phase
     if event & MET:
         path = slides.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
-        met = events.arrival(chain, 0.0, held, path, events.near(method, r))
+        met = events.arrival(chain, 0.0, held, path, events.near(method, r), rows[LEFT, i])
         if met.time == 0.0:
             state.contacts.met[lanes.particle[i]] = met.wall
-            put(rows, R, i, walls.settle(chain, met.wall, r))
+            put(rows, R, i, walls.settle(at(chain, rows[LEFT, i]), met.wall, r))
             return EVENT
         cut = min(cut, met.time)
     if not cut < 1.0:
@@ -267,6 +276,136 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
 
 
+@by_type
+def _stop(moving, chain, gravity, state, lanes, i):
+    """Friction has stopped a lane."""
+    rows = lanes.rows
+    # All that is above the potential energy, down to what round-off has added to the kinetic one.
+    lost = rows[TWICE, i] - 2.0 * potential(gravity, column(rows, R, i))
+    rows[TWICE, i] -= lost
+    lose(state, lanes, i, lost)
+    rows[KEEP, i] = 0.0
+    put(rows, V, i, ZERO)
+
+
+@_stop.register(wall_laws.Moves)
+def _(moving, chain, gravity, state, lanes, i):
+    rows, r, v = lanes.rows, column(lanes.rows, R, i), column(lanes.rows, V, i)
+    u = walls.velocity(at(chain, rows[LEFT, i]), rows[WALL, i], r)
+    lost, twice = square(v - u) + rows[KEEP, i] * rows[KEEP, i], square(u) + 2.0 * potential(gravity, r)
+    given = twice - rows[TWICE, i] + lost
+    rows[TWICE, i], rows[KEEP, i] = twice, 0.0
+    lose(state, lanes, i, lost)
+    work(moving, state, lanes, i, given, 0.0)
+    put(rows, V, i, u)
+
+
+@by_type_outlined
+def _stay(moving, kind, method, chain, gravity, state, lanes, i):
+    """What a lane does that moves with its walls as long as friction, or a balance of forces, holds it there."""
+    return _phase(kind)
+
+
+@_stay.register(wall_laws.Moves)
+def _(moving, kind, method, chain, gravity, state, lanes, i):
+    rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
+    r, v = column(rows, R, i), column(rows, V, i)
+    now = at(chain, left)
+    u = walls.velocity(now, first, r)
+    if square(v - u) > SLOWEST * rows[SCALE2, i] or not _rests(kind, method, now, gravity, lanes, i, r):
+        return _phase(kind)
+    pace, low, high = walls.pace(now, first), 0.0, 0.0
+    pressed, pressed_second = 0.0, 0.0
+    while low < left:
+        step = min(pace, left - low)
+        high = left if low + step >= left else low + step
+        middle = 0.5 * (low + high)
+        if not (
+            _rests_later(kind, method, chain, gravity, lanes, i, middle)
+            and _rests_later(kind, method, chain, gravity, lanes, i, high)
+        ):
+            break
+        # Simpson's rule for what presses
+        one, two, three = (
+            _press_later(kind, method, chain, gravity, lanes, i, low),
+            _press_later(kind, method, chain, gravity, lanes, i, middle),
+            _press_later(kind, method, chain, gravity, lanes, i, high),
+        )
+        pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
+        pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
+        low = high
+    end = low
+    if low < left:
+        start = low
+        for _k in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if _rests_later(kind, method, chain, gravity, lanes, i, middle):
+                low = middle
+            else:
+                high = middle
+        end = high
+        one, two = (
+            _press_later(kind, method, chain, gravity, lanes, i, start),
+            _press_later(kind, method, chain, gravity, lanes, i, low),
+        )
+        pressed += 0.5 * (one.n + two.n) * (end - start)
+        pressed_second += 0.5 * (one.m + two.m) * (end - start)
+    after = left - end
+    r1 = walls.carry(during(chain, left, after), first, r)
+    then = at(chain, after)
+    v1 = walls.velocity(then, first, r1)
+    twice = square(v1) + 2.0 * potential(gravity, r1)
+    given = twice - rows[TWICE, i]
+    rows[TWICE, i], rows[LEFT, i], rows[KEEP, i] = twice, after, 0.0
+    put(rows, R, i, r1)
+    put(rows, V, i, v1)
+    push(state, lanes, i, pressed, pressed_second)
+    work(moving, state, lanes, i, given, 0.0)
+    state.contacts.sliding[lanes.particle[i]] += end
+    if not after > 0.0:
+        return ARRIVED
+    held = hold.of_lane(kind, first, rows[WALL + 1, i])
+    force = slides.force(methods.laws(method), held, then, gravity, r1, v1)
+    put(rows, A, i, force.acceleration)
+    rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
+    return _phase(kind)
+
+
+@outlined
+def _rests(kind, method, now, gravity, lanes, i, r):
+    """Whether a lane that moves with its first wall goes on to do so from here."""
+    force, acceleration = _force_at_rest(kind, method, now, gravity, lanes, i, r)
+    pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
+    pressed = not hold.lets_go(kind, force.n, force.m)
+    return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
+
+
+@outlined
+def _force_at_rest(kind, method, now, gravity, lanes, i, r):
+    """The force on a lane at r that moves with its first wall, and the acceleration of that."""
+    first = lanes.rows[WALL, i]
+    held = hold.of_lane(kind, first, lanes.rows[WALL + 1, i])
+    u = walls.velocity(now, first, r)
+    return slides.force(methods.laws(method), held, now, gravity, r, u), walls.acceleration(now, first, r)
+
+
+@outlined
+def _rests_later(kind, method, chain, gravity, lanes, i, t):
+    rows = lanes.rows
+    left, r = rows[LEFT, i], column(rows, R, i)
+    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
+    return _rests(kind, method, at(chain, left - t), gravity, lanes, i, r1)
+
+
+@outlined
+def _press_later(kind, method, chain, gravity, lanes, i, t):
+    rows = lanes.rows
+    left, r = rows[LEFT, i], column(rows, R, i)
+    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
+    force, _acceleration = _force_at_rest(kind, method, at(chain, left - t), gravity, lanes, i, r1)
+    return force
+
+
 @outlined
 def _take(kind, method, chain, gravity, state, lanes, i):
     """Take a step after all."""
@@ -274,8 +413,8 @@ def _take(kind, method, chain, gravity, state, lanes, i):
     put(rows, R, i, column(rows, R1, i))
     put(rows, V, i, column(rows, V1, i))
     rows[LEFT, i], rows[CUT, i] = rows[LEFT, i] - rows[H, i], np.inf
-    rows[TWICE, i] -= rows[WORK, i]
-    lanes.moving[i] = True
+    rows[TWICE, i] = twice_after(wall_laws.moving(methods.laws(method)), rows[TWICE, i] - rows[WORK, i], lanes.after[i])
+    lanes.unsolved[i] = True
     account(method, state, lanes, i)
     return _set_going(kind, method, chain, gravity, state, lanes, i)
 
@@ -295,7 +434,7 @@ def _shorten(kind, method, chain, state, lanes, i):
     if h > SHORTEST * method.size / math.sqrt(rows[SCALE2, i]):
         return _phase(kind)
     end = column(rows, R, i) + h * column(rows, V, i)
-    if walls.outside(chain, -1.0, end) or not h > 0.0:
+    if walls.outside(at(chain, rows[LEFT, i] - h), -1.0, end) or not h > 0.0:
         return _give_up(state, lanes, i)
     put(rows, R, i, end)
     rows[LEFT, i] -= h

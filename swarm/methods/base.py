@@ -13,7 +13,7 @@ from ..surfaces import required
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 # The laws of a surface, and their values where there is none.
-_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None}
+_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "motion": None}
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,10 @@ def check_laws(name: str, scene: Scene) -> None:
         for law, without in _WITHOUT_LAWS.items():
             value = getattr(surface, law)
             if value != without:
+                came = f"{value:g}" if isinstance(value, float) else f"{value}"
                 raise SceneError(
-                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls only, got "
-                    f"{value:g}; use Impact"
+                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls at rest only, got "
+                    f"{came}; use Impact"
                 )
 
 

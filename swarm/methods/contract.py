@@ -17,6 +17,7 @@ and one with a multiplier the three functions of Uzawa's loop. examples/own_meth
 from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
+from ..contact.laws import Moves
 from ..contact.reflection import Turned
 from ..kernel.jit import by_type, by_type_outlined
 from ..kernel.vector import ZERO, Vec
@@ -78,6 +79,41 @@ class Contact(NamedTuple):
     hits: float
     twice_energy: float
     lasts: Any
+
+
+class Worked(NamedTuple):
+    """The same where walls move, with what the wall gave by its motion, per mass."""
+
+    r: Vec
+    v: Vec
+    left: float
+    wall: float
+    impulse: float
+    hits: float
+    twice_energy: float
+    lasts: Any
+    work: float
+
+
+@by_type
+def worked(moving, contact, work):
+    """A contact, with its work where walls move."""
+    return contact
+
+
+@worked.register(Moves)
+def _(moving, contact, work):
+    c = contact
+    return Worked(c.r, c.v, c.left, c.wall, c.impulse, c.hits, c.twice_energy, c.lasts, work)
+
+
+@by_type
+def work_of(contact):
+    """What the wall gave by its motion, per mass."""
+    return 0.0
+
+
+work_of.register(Worked, lambda contact: contact.work)
 
 
 # --- What a lane keeps -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from ..kernel.jit import kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import flights
+from ..surfaces import flights, safe
 from . import base, contract
 from .chord import Chord
 
@@ -84,9 +84,16 @@ class Impact(base.Method):
         base.check_crossing("shortest_flight", self.shortest_flight, scene, particles)
         if self.contact_step > 0.0 and scene.laws() is not None:
             raise SceneError(
-                f"contact_step must be 0 where a surface has a restitution below 1, friction or a temperature, got "
-                f"{self.contact_step:g}: the contact step conserves the energy"
+                f"contact_step must be 0 where a surface has a restitution below 1, friction, a temperature or a "
+                f"motion, got {self.contact_step:g}: the contact step conserves the energy"
             )
+        for i, surface in enumerate(scene.surfaces):
+            if safe.lacks_bend(surface):
+                raise SceneError(
+                    f"surfaces[{i}] ({type(surface).__name__}) must give contract.bend to move as "
+                    f"{surface.motion} does: hits of such walls are found by safe steps; register it, or use a "
+                    "Translation alone"
+                )
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
@@ -192,7 +199,7 @@ def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
     impulse = select(hit, bounce.impulse, 0.0)
-    return contract.Contact(
+    contact = contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
@@ -202,3 +209,4 @@ def _(method, chain, gravity, lane, wall, solution):
         select(hit, bounce.twice_energy, lane.own.energy.twice),
         hit & (bounce.twice_away <= lane.own.slow),
     )
+    return contract.worked(wall_laws.moving(method.laws), contact, select(hit, 0.5 * bounce.work, 0.0))

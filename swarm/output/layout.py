@@ -52,7 +52,7 @@ def frames(file: Any, path: Path) -> int:
     if "observables" in file:
         for name in file["observables"]:
             value = _dataset(file, f"observables/{name}/value", _NUMBER)
-            if value.ndim not in (1, 2) or value.shape[0] < n:
+            if value.ndim not in (1, 2, 3) or value.shape[0] < n:
                 raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
             _require_fits(value, n, path)
     if "particles/all" in file:
@@ -117,6 +117,7 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
     n = len(seen["time"])
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
     later: dict[str, tuple[int, ...]] = {**dict.fromkeys(_LATER, (n,)), "wall_heat": (n, surfaces)}
+    later |= {"wall_work": (n, surfaces), "wall_position": (n, surfaces, 3), "wall_orientation": (n, surfaces, 4)}
     shapes |= {name: shape for name, shape in later.items() if name in seen}
     for name, shape in shapes.items():
         if name not in seen or seen[name].shape != shape:

@@ -24,6 +24,7 @@ _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 _NOUN = "noun"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
+_WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
 _TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
 
 
@@ -64,6 +65,8 @@ class Playback:
         self.series: dict[str, tuple[Floats, Floats]] = {}
         self.names: dict[str, str] = {}
         self.wires: list[tuple[bool, list[Floats]]] = []
+        self._walls: list[str] = []  # the entity of each
+        self._poses: dict[str, dict[int, tuple[Floats, Floats]]] = {}
         self.about: dict[str, Any] = {_NOUN: "particles"}
         self._triangles = np.zeros((0, 3), np.int64)
         # Of each column, where the row of a frame is.
@@ -82,6 +85,12 @@ class Playback:
             if _SCALARS in names:
                 values = batch.column(_SCALARS).flatten().to_numpy(zero_copy_only=False)
                 rows.setdefault(entity, []).append((batch.column("frame").to_numpy(), values))
+            if _TURNS in names and "frame" in names:
+                ways, turns = (_numbers(batch, name) for name in (_WAYS, _TURNS))
+                # Rerun keeps matrices column by column.
+                both = zip(ways, turns.reshape(-1, 3, 3).transpose(0, 2, 1), strict=True)
+                found = dict(zip(batch.column("frame").to_pylist(), both, strict=True))
+                self._poses.setdefault(entity, {}).update(found)
             self._static(entity, batch, names)
         if not self._rows[_POSITIONS] or "/time" not in rows:
             raise ValueError("it is not a recording of swarm, or holds no frame")
@@ -108,6 +117,16 @@ class Playback:
         if _STRIPS in names and not entity.startswith(_BODIES):
             strips = batch.column(_STRIPS)[0].as_py()
             self.wires.append((entity.startswith("/scene/solids/"), [np.array(strip) for strip in strips]))
+            self._walls.append(entity.rpartition("/")[0])
+
+    def wires_at(self, number: int) -> list[tuple[bool, list[Floats]]]:
+        """The curves of each surface at the frame of this number: surfaces may move."""
+        found = []
+        for (solid, curves), entity in zip(self.wires, self._walls, strict=True):
+            pose = self._poses.get(entity, {}).get(number)
+            moved = curves if pose is None else [curve @ pose[1].T + pose[0] for curve in curves]
+            found.append((solid, moved))
+        return found
 
     def frame(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
@@ -128,6 +147,12 @@ class Playback:
         if batch is None:
             return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint32)
         return _points(batch, _CORNERS, row)[self._triangles], _colours(batch, _PAINT, row)[self._triangles]
+
+
+def _numbers(batch: Any, name: str) -> Floats:
+    """A column of vectors or matrices, one row a frame."""
+    rows = batch.column(name)
+    return np.array([np.ravel(row.as_py()[0]) for row in rows])
 
 
 def _points(batch: Any, name: str, row: int) -> NDArray[np.float32]:

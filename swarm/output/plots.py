@@ -26,7 +26,7 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     trajectory.require_frames()
     scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observed()
     end = trajectory.frame(-1)
-    shapes = shapes_of(scene, end.position)
+    shapes = shapes_of(scene, end.position, float(times[-1]))
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
     left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
 

@@ -2,7 +2,8 @@
 
 /scene/particles              Points3D, a frame's; coloured; of bodies, their points
 /scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
-/scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise
+/scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise; of one that moves
+                              also Transform3D, a frame's, from where it is at the start
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values; static
@@ -25,11 +26,12 @@ from .. import checks
 from ..bodies.body import Body
 from ..errors import FileError, SceneError
 from ..methods import Method
+from ..motion import pose
 from ..particles import Particles
 from ..scene import Scene
 from . import colours, paths, series, viewer
 from .drawn import Drawn
-from .shapes import shapes_of
+from .shapes import Shape, shapes_of
 from .trajectory import Trajectory
 from .writer import WriteFrames, Written, rows
 
@@ -157,7 +159,7 @@ class RecordingWriter:
         elif len(drawn.lines):
             log(_LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
         for shape in self._shapes:
-            path = f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
+            path = _path(shape)
             face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
             if len(shape.vertices):
                 mesh = rr.Mesh3D(
@@ -203,6 +205,7 @@ class RecordingWriter:
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
+            self._send_walls(numbers, times)
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
             # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
@@ -230,6 +233,18 @@ class RecordingWriter:
             columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
             self._send(_MESH, numbers, times, columns.partition([n] * frames))
 
+    def _send_walls(self, numbers: Any, times: Any) -> None:
+        """Send where the walls that move are, from where they were drawn: at the start."""
+        for shape, surface in zip(self._shapes, self._scene.surfaces, strict=True):
+            if surface.motion is not None:
+                first = pose(surface.motion, 0.0)
+                found = [pose(surface.motion, moment) for moment in times]
+                # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
+                turns = [one.turn @ first.turn.T for one in found]
+                ways = [one.position() - turn @ first.position() for one, turn in zip(found, turns, strict=True)]
+                columns = rr.Transform3D.columns(translation=np.array(ways), mat3x3=np.array(turns))
+                self._send(_path(shape), numbers, times, columns)
+
     def sync(self) -> None:
         """Do nothing: no checkpoint refers to a recording."""
 
@@ -247,6 +262,10 @@ class RecordingWriter:
     def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
         indexes = [rr.TimeColumn("frame", sequence=numbers), rr.TimeColumn("sim_time", duration=times)]
         self._stream.send_columns(path, indexes, columns)
+
+
+def _path(shape: Shape) -> str:
+    return f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
 
 
 # --- Looks ------------------------------------------------------------------------------------------------

@@ -78,6 +78,8 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
     for i, shape in enumerate(shapes):
         if scene.surfaces[i].temperature is not None:
             lines.append(Line(f"/heat/{shape.name}", shape.name, _rate("wall_heat", 1.0, i)))
+        if scene.surfaces[i].motion is not None:
+            lines.append(Line(f"/energy/work_{shape.name}", f"work of {shape.name}", _of_surface("wall_work", i)))
     return lines
 
 
@@ -97,6 +99,10 @@ def row_of(lines: list[Line], moment: float, seen: dict[str, Any], before: Seen)
 def _of(name: str) -> Callable[..., float]:
     # Files of older versions have no "sliding", and runs of particles no "work".
     return lambda _moment, seen, _before: float(seen.get(name, 0.0))
+
+
+def _of_surface(name: str, i: int) -> Callable[..., float]:
+    return lambda _moment, seen, _before: float(seen[name][i])
 
 
 def _logarithm_of(name: str) -> Callable[..., float]:

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import contourpy
 import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from ..motion import Pose
 from ..particles import Floats
 from ..scene import Scene
 
@@ -50,25 +51,33 @@ class Shape:
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
 
-def shapes_of(scene: Scene, positions: Floats) -> list[Shape]:
-    """A shape for every surface; where the volume is open, as far as the surfaces and the particles (3, N) go."""
-    box = _box(scene, positions)
-    coarse = _triangles(scene, box)
+class Still(NamedTuple):
+    """A scene at one time [s]."""
+
+    scene: Scene
+    time: float
+
+
+def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]:
+    """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go."""
+    still = Still(scene, time)
+    box = _box(still, positions)
+    coarse = _triangles(still, box)
     shapes = []
     for i, surface in enumerate(scene.surfaces):
         name = f"{i}_{type(surface).__name__.lower()}"
-        own = _of_surface(scene, i, *coarse)
-        around = _around(own[0], box) if len(own[0]) else _near(surface, box)
+        own = _of_surface(still, i, *coarse)
+        around = _around(own[0], box) if len(own[0]) else _near(surface, scene.poses(time)[i], box)
         # Again, on a grid around this surface only.
-        vertices, triangles, normals = _of_surface(scene, i, *_triangles(scene, around))
-        wires = _wires(scene, i, vertices, box) if len(vertices) else []
+        vertices, triangles, normals = _of_surface(still, i, *_triangles(still, around))
+        wires = _wires(still, i, vertices, box) if len(vertices) else []
         shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
     return shapes
 
 
-def _box(scene: Scene, positions: Floats) -> Corners:
-    low, high = (np.array(corner) for corner in scene.bounds())
-    reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
+def _box(scene: Still, positions: Floats) -> Corners:
+    low, high = (np.array(corner) for corner in scene.scene.bounds(scene.time))
+    reach = _BEYOND * max(scene.scene.extent(), float(np.abs(positions).max()))
     low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
     margin = _MARGIN * (high - low) / (_POINTS - 1.0)
     return low - margin, high + margin
@@ -81,23 +90,23 @@ def _around(points: Floats, box: Corners) -> Corners:
     return np.maximum(low - margin, box[0]), np.minimum(high + margin, box[1])
 
 
-def _near(surface: Any, box: Corners) -> Corners:
+def _near(surface: Any, pose: Pose, box: Corners) -> Corners:
     """Where to look for a surface that is smaller than the cells of the coarse grid."""
     size = surface.size()
     if not math.isfinite(size) or not hasattr(surface, "center"):
         return box
-    center, half = np.array(surface.center), 4.0 * size
+    center, half = pose.placed(np.array(surface.center)[:, None])[:, 0], 4.0 * size
     return np.maximum(center - half, box[0]), np.minimum(center + half, box[1])
 
 
-def _gap(scene: Scene, points: Floats) -> Floats:
+def _gap(scene: Still, points: Floats) -> Floats:
     """The largest gap of all surfaces at points (3, N): 0 on every wall. No particle is where phi is not a number."""
     with np.errstate(all="ignore"):
-        gap = scene.gaps(points).max(axis=0)
+        gap = scene.scene.gaps(points, scene.time).max(axis=0)
     return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
 
 
-def _triangles(scene: Scene, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats]:
+def _triangles(scene: Still, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Vertices, triangles and normals of all walls in a box."""
     low, high = box
     axes = [np.linspace(a, b, _POINTS) for a, b in zip(low, high, strict=True)]
@@ -111,7 +120,7 @@ def _triangles(scene: Scene, box: Corners) -> tuple[Floats, NDArray[np.int64], F
 
 
 def _of_surface(
-    scene: Scene, i: int, vertices: Floats, triangles: NDArray[np.int64], normals: Floats
+    scene: Still, i: int, vertices: Floats, triangles: NDArray[np.int64], normals: Floats
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Those triangles that lie on surface i, with their vertices only."""
     if not len(triangles):
@@ -121,13 +130,13 @@ def _of_surface(
     return vertices[kept], places.reshape(-1, 3), normals[kept]
 
 
-def _owner(scene: Scene, points: Floats) -> NDArray[np.int64]:
+def _owner(scene: Still, points: Floats) -> NDArray[np.int64]:
     """The surface that each of the points (3, N) near a wall lies on."""
     with np.errstate(all="ignore"):
-        return np.asarray(np.nan_to_num(scene.gaps(points), nan=-np.inf).argmax(axis=0))
+        return np.asarray(np.nan_to_num(scene.scene.gaps(points, scene.time), nan=-np.inf).argmax(axis=0))
 
 
-def _wires(scene: Scene, i: int, vertices: Floats, box: Corners) -> list[Floats]:
+def _wires(scene: Still, i: int, vertices: Floats, box: Corners) -> list[Floats]:
     """Where planes across the three axes cut surface i, from end to end."""
     first, last = vertices.min(axis=0), vertices.max(axis=0)
     low, high = _around(vertices, box)

@@ -100,7 +100,7 @@ def _places(axes: Any, playback: Playback, number: int) -> None:
     positions, packed = playback.frame(number)
     lines, faces = playback.lines(number), playback.faces(number)
     size = 0.0 if len(faces[0]) else 1.0
-    drawing.particles(axes, positions, drawing.red_green_blue(packed), playback.wires, size)
+    drawing.particles(axes, positions, drawing.red_green_blue(packed), playback.wires_at(number), size)
     if len(lines[0]):
         drawing.bonds(axes, *lines)
     if len(faces[0]):

@@ -7,7 +7,7 @@ from ..errors import SceneError
 from ..methods import AugmentedLagrangian, Impact, Penalty
 from ..methods.base import Method, check_laws, check_surfaces
 from ..methods.fixed_step import check_solids
-from ..motion import led
+from ..motion import Path, led, parts_of
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
@@ -44,6 +44,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     assert times.every is not None
     method.span("until", times.until)
     method.span("every", times.every)
+    _require_paths(scene, times.until)
     _require_inside(scene, particles)
     workload.check(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
@@ -55,6 +56,11 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     for i, surface in enumerate(scene.surfaces):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
+        if surface.motion is not None:
+            raise SceneError(
+                f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
+                "anchors, in the frame of the wall"
+            )
     if options.frames not in ("all", "none"):
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
@@ -117,6 +123,17 @@ def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLa
     for k, (surface, _carrier, _point) in enumerate(bodies.body.cavities):
         if surface.restitution != 1.0 or surface.friction != 0.0:
             raise SceneError(f"cavities[{k}] must be elastic with {name}, got {surface}; use Impact(dt=...)")
+
+
+def _require_paths(scene: Scene, until: float) -> None:
+    """Raise a `SceneError` where the path of a wall does not last for the whole run."""
+    for i, surface in enumerate(scene.surfaces):
+        for one in parts_of(surface.motion):
+            if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
+                raise SceneError(
+                    f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
+                    f"{one.times[-1]:g}"
+                )
 
 
 def _lead(bodies: Bodies) -> None:

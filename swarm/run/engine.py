@@ -16,6 +16,7 @@ from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import compose, meet, slide
+from ..lanes.arrays import booked
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
@@ -53,6 +54,7 @@ class Run:
         compile: str = "always", seed: int = 0,
     ) -> None:  # fmt: skip
         n, self._owners, laws = len(particles), scene.owners(), scene.laws()
+        self._booked = booked(scene.chain())
         self.state = State(
             particles.position,
             particles.velocity,
@@ -60,7 +62,7 @@ class Run:
             np.empty(n),
             np.empty(n),
             np.zeros(n, np.int64),
-            np.zeros((len(self._owners), n)),
+            np.zeros((self._booked, n)),
             np.zeros(0 if laws is None else n),
             _no_sweeps(n) if method.has_multipliers() else None,
             _no_contacts(len(self._owners), n) if method.may_slide() else None,
@@ -70,6 +72,7 @@ class Run:
         self._numbers, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
         observables.start_energies(scene, self._law, self.state)
+        self._moment = 0.0
         self._far = _FAR * scene.extent() if scene.is_open() else math.inf
         self._escaping = self._chain, self._gravity, self._far, scene.open_faces(), self.state
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
@@ -84,7 +87,7 @@ class Run:
         self._seed = seed - 2**64 if seed >= 2**63 else seed
         self._order = np.arange(self._draws)
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
-        self._halted = lanes.none_halted(len(self._owners))
+        self._halted = lanes.none_halted(self._booked)
         self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
         self._cut_short = False
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
@@ -116,6 +119,7 @@ class Run:
         is used up. The next call then continues the frame, with the same bits as without the halt. `writing` is the
         time to write a frame [s].
         """
+        self._move_walls(moment)
         if not self._cut_short:
             self._begin(span)
         if self._tier.is_plain:
@@ -146,7 +150,7 @@ class Run:
         elif status != Status.DONE:
             raise RunError(failures.of_frame(self._scene, self._method, self.state, (Status(status), particle), moment))
         elif span > 0.0:
-            self._halted = lanes.none_halted(len(self._owners))
+            self._halted = lanes.none_halted(self._booked)
             self._pace = seconds * (others + helps) / span
         return not self._cut_short
 
@@ -157,7 +161,7 @@ class Run:
         try:
             mine = self._lanes.pop()
         except IndexError:
-            mine = lanes.empty(len(self._owners))
+            mine = lanes.empty(len(self._owners), self._booked)
         if not self._kinds:
             end = self._part(span, draws, mine)
         else:
@@ -210,9 +214,18 @@ class Run:
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
+        self._move_walls(0.0)
         self._phase.fill(ARRIVED)
         self._ticket[0] = 0
         self._share(0.0)
+
+    def _move_walls(self, moment: float) -> None:
+        """The walls of the frame that ends at a moment [s]."""
+        self._moment = moment
+        if self._scene.moves():
+            self._chain = self._scene.chain(moment)
+            faces = self._scene.open_faces(moment)
+            self._escaping = self._chain, self._gravity, self._far, faces, self.state
 
     def _begin(self, span: float) -> None:
         """Whether each particle begins a frame in flight, along its walls or at rest."""
@@ -225,7 +238,7 @@ class Run:
             rests = contacts.phase == ARRIVED
             if rests.any():
                 # What is at rest costs this much.
-                self.state.impulse[:] += contacts.load * (span * self.state.mass)
+                self.state.impulse[: len(contacts.load)] += contacts.load * (span * self.state.mass)
                 contacts.sliding[:] += span * rests
 
     def share_done(self, span: float) -> float:
@@ -274,7 +287,7 @@ class Run:
 
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
-        draws, mine = self._drawing(), lanes.empty(len(self._owners))
+        draws, mine = self._drawing(), lanes.empty(len(self._owners), self._booked)
         share = self._shared(0.0, draws)
         yield blocks.advance_block, self._flying(share, mine)
         for phase in self._kinds:
@@ -320,7 +333,17 @@ class Run:
         seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
         is_open = self._far < math.inf
         escaped = self._tier.kernel(observables.count_escaped)(*self._escaping) if is_open else 0
-        return {**seen, "escaped": int(escaped)}
+        return {**seen, **self._poses(), "escaped": int(escaped)}
+
+    def _poses(self) -> dict[str, NDArray[Any]]:
+        """Where the surfaces are, if any moves."""
+        if not self._scene.moves():
+            return {}
+        poses = self._scene.poses(self._moment)
+        return {
+            "wall_position": np.array([pose.position() for pose in poses]),
+            "wall_orientation": np.array([pose.quaternion for pose in poses]),
+        }
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""

@@ -18,8 +18,12 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
     sentence = f"{_failed(moment)} {particle}: {status.sentence}"
     if status == Status.STALLED:
         place = state.position[:, particle]
-        wall = int(np.argmax(scene.distances_outside(place[:, None])[:, 0]))
+        wall = int(np.argmax(scene.distances_outside(place[:, None], moment)[:, 0]))
         sentence += f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
+        if scene.moves():
+            # The kernel leaves there when it was.
+            assert state.contacts is not None
+            sentence += f" at {moment - state.contacts.left[particle]:.9g} s: walls that move have closed on it"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
     multipliers = state.multipliers
@@ -38,7 +42,7 @@ def require_admissible(scene: Scene, state: State, seen: dict[str, Any], deepest
         raise RunError(f"{_failed(moment)} {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
     if seen["max_penetration"] <= deepest:
         return
-    distances = scene.distances_outside(position)
+    distances = scene.distances_outside(position, moment)
     # Far out in an open scene the round-off of a position is that of its own size.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
     if outside.any():

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections import Counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
 from ..surfaces import fold as walls
-from ..surfaces.fold import Chain
 
 _LOG = logging.getLogger("swarm")
 # At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
@@ -40,7 +39,7 @@ class Flights(NamedTuple):
 def check(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
     """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
     impact = method.time_of_impact()
-    # Where energy is lost or given, the first flights say nothing of the later ones.
+    # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.
     if impact is None or scene.laws() is not None:
         return
     with np.errstate(all="ignore"):
@@ -126,7 +125,7 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
     return _typical(seen)
 
 
-def _chord(chain: Chain | None, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
+def _chord(chain: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
     """The chord through a point, in units of the vector along it: its length, the part ahead, and the wall there."""
     (ahead, wall), (behind, _wall) = _hit(chain, None, point, way), _hit(chain, None, point, -way)
     return ahead + behind, ahead, wall
@@ -137,7 +136,7 @@ def _chosen(particles: Particles) -> list[int]:
 
 
 def _hit(
-    chain: Chain | None, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
+    chain: Any, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> tuple[float, int]:
     """The time to the first hit and its wall, infinite if it is not found in a few parts."""
     total = 0.0

@@ -22,7 +22,7 @@ surface whose inner function is not phi registers `inner`, `slope`, `gap_of`, `l
 import math
 
 from ..kernel.jit import by_type, select
-from ..kernel.vector import absolute, dot, norm, square, times, total
+from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
 from .course import Quartic, first_rise, safe_rise_time
 
 # Newton steps of the chord.
@@ -137,6 +137,42 @@ def settle(surface, r):
 def flat(surface):
     """Whether the normal is the same everywhere on a wall: a constant for the compiler."""
     return False
+
+
+# --- Motion: of walls that move; see moving.py -----------------------------------------------------------
+
+
+@by_type
+def velocity(surface, r):
+    """The velocity of the wall at a point of it."""
+    return ZERO
+
+
+@by_type
+def acceleration(surface, r):
+    """The acceleration of the wall at a point of it."""
+    return ZERO
+
+
+@by_type
+def carry(surface, r):
+    """Where what is at a point of the wall at the start of a step is at its end."""
+    return r
+
+
+@by_type
+def pace(surface):
+    """A time in which the motion of the wall changes little [s]; infinite where it does not change."""
+    return math.inf
+
+
+@by_type
+def mean_velocity(surface, r0, r1, h):
+    """How fast what the wall is made of moves in the mean of a step of length h from r0 to r1, both on it.
+
+    As far as the surface changes with it: a rotation that leaves the surface as it is does not count.
+    """
+    return ZERO
 
 
 # --- Flight ----------------------------------------------------------------------------------------------

@@ -55,14 +55,14 @@ def first_hit(chain, gravity, r, v):
 @first_hit.register(Chain)
 def _(chain, gravity, r, v):
     time, found = hit(gravity, chain.first, r, v)
-    return _sooner(time, found, first_hit(chain.rest, gravity, r, v))
+    return sooner(time, found, first_hit(chain.rest, gravity, r, v))
 
 
 first_hit.register(Nothing, lambda chain, gravity, r, v: NEVER)
 
 
 @inlined
-def _sooner(time, found, later):
+def sooner(time, found, later):
     """The sooner one of the hit of the first wall and that of the rest."""
     sooner = later.time < time
     wall = select(later.wall < 0.0, -1.0, later.wall + 1.0)
@@ -123,7 +123,7 @@ def end_fall(chain, course, row, lane):
 @end_fall.register(Chain)
 def _(chain, course, row, lane):
     found = arrived(course[row + _LAST, lane])
-    return _sooner(course[row + _TIME, lane], found, end_fall(chain.rest, course, row + COURSE, lane))
+    return sooner(course[row + _TIME, lane], found, end_fall(chain.rest, course, row + COURSE, lane))
 
 
 end_fall.register(Nothing, lambda chain, course, row, lane: NEVER)

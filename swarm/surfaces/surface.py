@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import motion as motions
 from ..checks import Vector, array, magnitude, number, one_of, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
@@ -34,6 +35,8 @@ class Surface:
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
         accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
             temperature (diffusely), instead of specularly.
+        motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
+            the wall is before it moves. Its laws act on the velocity relative to the wall.
     """
 
     rotation: Any = field(default=None, kw_only=True)
@@ -41,6 +44,7 @@ class Surface:
     friction: float = field(default=0.0, kw_only=True)
     temperature: float | None = field(default=None, kw_only=True)
     accommodation: float = field(default=1.0, kw_only=True)
+    motion: Any = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
@@ -57,6 +61,7 @@ class Surface:
         if hasattr(self, "center"):
             object.__setattr__(self, "center", vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))
+        object.__setattr__(self, "motion", motions.parts_of_wall(self.motion))
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
@@ -100,20 +105,47 @@ class Surface:
         """Distance from the origin within which the surface, or what is particular about it, lies [m]."""
         raise NotImplementedError
 
-    def phi(self, points: ArrayLike) -> NDArray[np.float64]:
-        """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,)."""
-        rows = _rows(points)
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        """Whether a rotation about the unit vector `axis` through a point leaves the surface where it is."""
+        return False
+
+    def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,).
+
+        Where the surface moves, it is that of a time [s].
+        """
+        rows = self._own_rows(points, time)
         # Where a formula has no value it is NaN, which is outside.
         with np.errstate(all="ignore"):
             return np.asarray(np.maximum.reduce([contract.phi(wall, rows) for wall in self.walls()]))
 
-    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
-        rows = _rows(points)
+        rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
             parts = [np.array(np.broadcast_arrays(*contract.gradient(wall, rows), rows.x)[:3]) for wall in self.walls()]
             largest = np.argmax([contract.phi(wall, rows) for wall in self.walls()], axis=0)
-        return np.asarray(np.choose(largest, parts))
+        found = np.asarray(np.choose(largest, parts))
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+
+    def _own_rows(self, points: ArrayLike, time: float) -> Vec:
+        """Points of the scene in the frame in which the surface is given."""
+        rows = _rows(points)
+        if self.motion is None:
+            return rows
+        flat = np.array(rows).reshape(3, -1)
+        return vec(motions.pose(self.motion, time).given(flat).reshape(np.shape(rows)))
+
+
+def is_on_axis(point: Vector, axis: Vector, center: Vector) -> bool:
+    """Whether a point is on the axis, a unit vector through the centre."""
+    arm = np.array(point) - center
+    return bool(np.abs(np.cross(arm, axis)).max() <= TILT * max(1e-300, np.abs(arm).max()))
+
+
+def is_along(direction: Vector, axis: Vector) -> bool:
+    """Whether a unit vector is along the axis, another one, or against it."""
+    return bool(np.abs(np.cross(direction, axis)).max() <= TILT)
 
 
 def _part(name: str, value: Any) -> float:

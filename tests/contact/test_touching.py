@@ -94,7 +94,7 @@ def test_a_sliding_step_keeps_the_energy(name):
             plane = swarm.Plane(normal, float(normal @ point) / float(np.linalg.norm(normal)))
             chain = chain_of([surface, plane][:count])
             w = random.standard_normal(3)
-            touch = touching.Touch(np.ones(count, bool), np.zeros((3, count)), np.zeros(count), np.zeros(count))
+            touch = touching.Touch(np.ones(count, bool), np.zeros((3, count)), np.zeros(count), np.zeros(count), None)
             u = np.array(call(touching.velocity_along, chain, touch, point, w, h))
             assert np.linalg.norm(2.0 * u - w) == pytest.approx(np.linalg.norm(w), rel=16 * EPSILON)
             assert (touch.held >= 0.0).all()

@@ -10,7 +10,7 @@ from ...kernel.vector import Vec, dot, vec
 from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
-from ..surface import UNBOUNDED, Box, HalfSpace, Surface
+from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
 from .common import exact_chord
 
 
@@ -52,6 +52,9 @@ class Plane(Surface):
 
     def half_spaces(self) -> list[HalfSpace]:
         return [(turned(self.rotation, self.normal), self.offset)]
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return is_along(turned(self.rotation, self.normal), axis)
 
     def extent(self) -> float:
         return abs(self.offset)

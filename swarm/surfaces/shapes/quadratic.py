@@ -10,7 +10,7 @@ import numpy as np
 
 from ...checks import Vector
 from ...kernel.jit import by_type, inlined, select
-from ...kernel.vector import Vec, absolute, cross, dot, square, times, total, vec
+from ...kernel.vector import Vec, absolute, cross, dot, largest, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
 from ..rotation import by_right_angles
@@ -272,3 +272,10 @@ contract.chord_sweeps.register(QuadricNumbers, lambda surface: _CHORD_SWEEPS)
 def _(surface, r, p, kappa):
     n, _moved, _widths = _step(surface, r, p, kappa)
     return _unit(surface, n)
+
+
+@contract.bend.register(QuadricNumbers)
+def _(surface, r):
+    # For walls that move other than uniformly
+    a, side = surface.a, surface.side
+    return max(side * a.x, side * a.y, side * a.z), largest(a), math.inf

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...checks import Vector
 from .. import rotation as rotations
-from ..surface import HalfSpace, Surface
+from ..surface import HalfSpace, Surface, is_along, is_on_axis
 
 # Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
 _TANGENTS = 8
@@ -33,6 +33,9 @@ class Revolved(Surface):
 
     def own_center(self) -> Vector:
         return rotations.turned_back(self.turn(), self.center)
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return is_along(self.direction(), axis) and is_on_axis(self.center, axis, center)
 
     def walls(self) -> tuple[Any, ...]:
         return (rotations.rotated(self.turn(), self.numbers()),)

@@ -13,7 +13,7 @@ from ...kernel.vector import Vec, dot, vec
 from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
-from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, side_sign
+from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
 from .common import exact_chord, root_gap
 
 
@@ -66,6 +66,9 @@ class Slab(Surface):
         x, y, z = turned(self.rotation, self.normal)
         middle = x * self.center[0] + y * self.center[1] + z * self.center[2]
         return [((x, y, z), self.half_width + middle), ((-x, -y, -z), self.half_width - middle)]
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return is_along(turned(self.rotation, self.normal), axis)
 
     def extent(self) -> float:
         return farthest(self.center) + self.half_width
@@ -261,3 +264,7 @@ contract.chord_guess.register(SlabNumbers, lambda surface, r, p: 0.5 * along(sur
 def _(surface, r, p, kappa):
     d = 2.0 * _off(surface, r) + along(surface.normal, p)
     return scaled(surface.normal, math.copysign(1.0, surface.side * d))
+
+
+# H = n n^T: for walls that move other than uniformly
+contract.bend.register(SlabNumbers, lambda surface, r: (select(surface.side > 0.0, 1.0, 0.0), 1.0, math.inf))

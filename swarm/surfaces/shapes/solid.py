@@ -155,7 +155,7 @@ def _(parts, gravity, extent, r, v):
     time, found = _last_entry(parts.rest, gravity, extent, r, v)
     # On the face of a part, which is left or entered now, the sign of the approach decides.
     depth = contract.gap_of(parts.first, contract.inner(parts.first, r))
-    if depth > _noise(parts.first, extent, r):
+    if depth > noise(parts.first, extent, r):
         return time, found
     here, found_here = hit(gravity, parts.first, r, v)
     if here > time:
@@ -167,7 +167,7 @@ _last_entry.register(Nothing, lambda parts, gravity, extent, r, v: (0.0, True))
 
 
 @inlined
-def _noise(part, extent, r):
+def noise(part, extent, r):
     """The round-off of the gap of a part."""
     gradient = total(absolute(contract.gradient(part, r)))
     terms = contract.gap_scale(part, r) + extent * gradient + abs(contract.gap_of(part, 0.0))

@@ -1,5 +1,6 @@
 """Sphere: phi = |r - c| - R, the distance; inner function q = |r - c|^2."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,7 +9,7 @@ from ...kernel.jit import inlined, select
 from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
 from .. import contract
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
-from ..surface import Box, Surface, box_around, farthest, side_sign
+from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from .common import exact_chord, root_gap
 
 
@@ -49,6 +50,9 @@ class Sphere(Surface):
 
     def bounds(self) -> Box:
         return box_around(self.center, (self.radius,) * 3, self.side)
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return is_on_axis(self.center, axis, center)
 
     def extent(self) -> float:
         return farthest(self.center) + self.radius
@@ -176,3 +180,7 @@ def _(surface, r, p, kappa):
     # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
     n = 2.0 * (r - surface.center) + p
     return n * (surface.side / norm(n))
+
+
+# H = 1: for walls that move other than uniformly
+contract.bend.register(SphereNumbers, lambda surface, r: (surface.side, 1.0, math.inf))

@@ -10,7 +10,8 @@ from ...errors import SceneError
 from ...kernel.jit import inlined, select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract
-from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
+from ..rotation import turned
+from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from .common import root_gap
 
 
@@ -56,6 +57,9 @@ class Torus(Surface):
         wide = self.major_radius + self.minor_radius
         box = box_around(self.center, (wide, wide, self.minor_radius), self.side)
         return rotated_box(self.rotation, box, self.center)
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return is_along(turned(self.rotation, (0.0, 0.0, 1.0)), axis) and is_on_axis(self.center, axis, center)
 
     def extent(self) -> float:
         return farthest(self.center) + self.major_radius + self.minor_radius

@@ -1,0 +1,75 @@
+"""Fermi's accelerator: a particle between a wall at rest and one that swings gains no energy beyond a bound.
+
+    python -m examples.fermi
+
+Fermi asked whether such a particle is accelerated without end. Ulam computed that it is not: fast particles stay on
+curves of their phase space, which the slow ones cannot cross. The picture has a dot for each particle and period.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import swarm
+
+# Amplitude of the wall [m], its distance [m], and its frequency, so that it moves as sin(t).
+AMPLITUDE, LENGTH, FREQUENCY = 0.02, 1.0, 0.5 / np.pi
+PERIOD = 1.0 / FREQUENCY
+
+
+def accelerator() -> swarm.Scene:
+    """A wall at x = 0, and one that swings about x = LENGTH."""
+    swing = swarm.Oscillation((AMPLITUDE, 0.0, 0.0), FREQUENCY)
+    return swarm.Scene([swarm.Plane((-1.0, 0.0, 0.0), 0.0), swarm.Plane((1.0, 0.0, 0.0), LENGTH, motion=swing)])
+
+
+def run(speeds: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places and velocities (periods + 1, N) at the start of each period of the wall; all begin at x = 0."""
+    start = np.zeros((3, len(speeds)))
+    start[0] = speeds
+    particles = swarm.Particles(np.zeros_like(start), start, np.ones(len(speeds)))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "fermi.h5"
+        swarm.simulate(
+            accelerator(), particles, swarm.Impact(), until=periods * PERIOD, every=PERIOD, trajectory=file,
+            precision="float64",
+        )  # fmt: skip
+        with swarm.load(file) as trajectory:
+            frames = [trajectory.frame(k) for k in range(len(trajectory))]
+    return np.array([one.position[0] for one in frames]), np.array([one.velocity[0] for one in frames])
+
+
+def draw(places: np.ndarray, velocities: np.ndarray, file: Path) -> None:
+    """The phase space once a period, and the largest and smallest speed of each particle."""
+    from .paper.plotting import BLUE, GREY, RED, page
+
+    speeds = np.abs(velocities)
+    with page(file, "Fermi's accelerator, once a period", 1, 2, (8.5, 3.8)) as axes:
+        for k, colour in enumerate(np.where(np.ptp(speeds, axis=0) > 0.1, RED, BLUE)):
+            axes[0].plot(places[:, k], velocities[:, k], ",", color=colour)
+        axes[0].set(xlabel="x [m]", ylabel="velocity away from the wall at rest [m/s]", ylim=(0.0, 0.9))
+        axes[1].fill_between(speeds[0], speeds.min(axis=0), speeds.max(axis=0), color=BLUE, alpha=0.4, linewidth=0.0)
+        axes[1].plot(speeds[0], speeds[0], color=GREY, linewidth=0.8)
+        axes[1].set(xlabel="speed at the start [m/s]", ylabel="speeds since then [m/s]")
+
+
+def main() -> None:
+    """Run, draw and print."""
+    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask.add_argument("--periods", type=int, default=2000)
+    ask.add_argument("-o", "--output", type=Path, default=Path("fermi.png"))
+    asked = ask.parse_args()
+    speeds = np.linspace(0.05, 2.0, 157)
+    places, velocities = run(speeds, asked.periods)
+    largest = np.abs(velocities).max(axis=0)
+    print(f"{asked.periods} periods: particles that begin below 0.3 m/s reach {largest[speeds < 0.3].max():.3f} m/s")
+    kept = np.ptp(np.abs(velocities), axis=0)[speeds > 1.5].max()
+    print(f"the speed of those above 1.5 m/s varies by {kept:.3f} m/s at most")
+    draw(places, velocities, asked.output)
+    print(f"written {asked.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""A piston that compresses a gas slowly: its temperature follows the adiabatic law.
+
+    python -m examples.piston
+
+The gas has no collisions. Balls in the vessel scatter its particles, so that the three directions share the energy and
+T V^(2/3) is constant; without them only the motion along the piston is compressed, and T_z L^2 is constant.
+"""
+
+import argparse
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import swarm
+
+HALF, LENGTH, RADIUS = 0.5, 1.0, 0.18
+# kinetic temperature k_B T [J] of particles of mass 1 kg, and the part of the length that is left at the end
+TEMPERATURE, LEFT = 1.0, 0.6
+BALLS = ((0.22, 0.22, 0.3), (-0.22, -0.22, 0.3), (0.22, -0.22, 0.3), (-0.22, 0.22, 0.3))
+
+
+class Compressed(NamedTuple):
+    """What a run shows, frame by frame."""
+
+    volume: np.ndarray  # over that of the start
+    temperature: np.ndarray  # over that of the start, of all directions
+    along: float  # of the direction of the piston alone, at the end
+    error: np.ndarray  # standard error of the temperature; between the ends by a straight line
+    balance: float  # of energy and work, over the energy
+
+
+def vessel(speed: float, balls: bool) -> swarm.Scene:
+    """A shaft from z = 0 up, a piston that comes down from z = LENGTH, and balls that scatter."""
+    walls = [
+        swarm.Box((HALF, HALF, LENGTH), center=(0.0, 0.0, LENGTH), open=("+z",)),
+        swarm.Plane((0.0, 0.0, 1.0), LENGTH, motion=swarm.Translation((0.0, 0.0, -speed))),
+    ]
+    solids = [swarm.Sphere(RADIUS, center=center, side="outside") for center in BALLS]
+    return swarm.Scene(walls + solids * balls)
+
+
+def run(count: int, speed: float, frames: int = 20, balls: bool = True) -> Compressed:
+    """The gas, while the piston moves with this speed [m/s] until LEFT of the length is left."""
+    scene = vessel(speed, balls)
+    gas = swarm.fill(scene, count, temperature=TEMPERATURE, seed=1)
+    until = (1.0 - LEFT) * LENGTH / speed
+    result = swarm.simulate(scene, gas, swarm.Impact(), until=until, every=until / frames)
+    seen, start, end = result.observables, 0.5 * gas.velocity**2, 0.5 * result.particles.velocity**2
+    free = (2.0 * HALF) ** 2 * LENGTH - (len(BALLS) * 4.0 / 3.0 * np.pi * RADIUS**3 if balls else 0.0)
+    volume = 1.0 - (2.0 * HALF) ** 2 * speed * seen["time"] / free
+    energy = seen["kinetic_energy"] / seen["kinetic_energy"][0]
+    along = float(end[2].sum() / start[2].sum())
+    # Of a ratio of two means over the same particles, R = <e1>/<e0>: the spread of e1 - R e0
+    before, after = start.sum(axis=0), end.sum(axis=0)
+    spread = (after - energy[-1] * before).std() / after.mean() / np.sqrt(count)
+    kept = seen["total_energy"] - seen["wall_work"].sum(axis=1)
+    balance = float(np.abs(kept - kept[0]).max() / seen["total_energy"].max())
+    # None at the start, all of it at the end
+    return Compressed(volume, energy, along, spread * energy * np.linspace(0.0, 1.0, len(energy)), balance)
+
+
+def draw(found: Compressed, file: Path) -> None:
+    """Temperature over volume, beside the adiabatic law."""
+    from .paper.plotting import BLUE, GREY, RED, page
+
+    with page(file, "A slow piston and a gas without collisions", 1, 2, (8.0, 3.2)) as axes:
+        law = found.volume ** (-2.0 / 3.0)
+        axes[0].plot(found.volume, law, color=GREY, label="V^(-2/3)")
+        axes[0].errorbar(found.volume, found.temperature, found.error, fmt=".", color=BLUE, label="gas")
+        axes[0].set(xlabel="volume, over that of the start", ylabel="temperature, over that of the start")
+        axes[0].legend()
+        axes[1].errorbar(found.volume, found.temperature / law - 1.0, found.error / law, fmt=".", color=RED)
+        axes[1].axhline(0.0, color=GREY, linewidth=0.8)
+        axes[1].set(xlabel="volume, over that of the start", ylabel="T V^(2/3) - 1")
+
+
+def main() -> None:
+    """Run, draw and print."""
+    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask.add_argument("--particles", type=int, default=4_000)
+    ask.add_argument("--speed", type=float, default=0.001)
+    ask.add_argument("-o", "--output", type=Path, default=Path("piston.png"))
+    asked = ask.parse_args()
+    found = run(asked.particles, asked.speed)
+    off, error = found.temperature * found.volume ** (2.0 / 3.0) - 1.0, found.error / found.temperature
+    print(f"volume {found.volume[-1]:.4f}, temperature {found.temperature[-1]:.4f} of those of the start")
+    print(f"T V^(2/3) is off by {off[-1]:.1e}, standard error {error[-1]:.1e}; energy less work by {found.balance:.1e}")
+    draw(found, asked.output)
+    print(f"written {asked.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,413 @@
+"""Walls that move: the same physics in every frame, hits that none skips, work that is booked, contacts that last."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import swarm
+from swarm.kernel.vector import ZERO, Vec, vec
+from swarm.motion import pose
+from swarm.surfaces import safe
+from swarm.surfaces.moving import at
+
+G = 9.81
+DOWN = (0.0, 0.0, -G)
+VELOCITY = (0.3, -0.2, 0.1)
+SWING = swarm.Oscillation((0.05, 0.03, 0.08), frequency=0.7, phase=0.4)
+TURN = swarm.Rotation((1.0, 2.0, 3.0), rate=1.3, center=(0.1, 0.0, -0.05))
+PATH = swarm.Path(
+    times=tuple(np.linspace(0.0, 6.0, 13).tolist()),
+    positions=tuple((0.04 * math.sin(k), 0.05 * math.cos(k) - 0.05, 0.03 * math.sin(2.0 * k)) for k in range(13)),
+)
+MOTIONS = {
+    "oscillation": SWING,
+    "rotation": TURN,
+    "path": PATH,
+    "sum": swarm.Translation(VELOCITY) + SWING + TURN,
+}
+CAVITIES = {
+    "sphere": lambda motion: swarm.Sphere(0.5, motion=motion),
+    "box": lambda motion: swarm.Box((0.5, 0.4, 0.3), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion),
+    "cylinder": lambda motion: swarm.Cylinder(0.4, axis=(1.0, 0.0, 1.0), length=0.9, motion=motion),
+    "ellipsoid": lambda motion: swarm.Ellipsoid((0.5, 0.6, 0.4), motion=motion),
+    "cone": lambda motion: swarm.Cone(0.6, center=(0.0, 0.0, -0.5), motion=motion),
+    "paraboloid": lambda motion: swarm.Paraboloid(0.2, center=(0.0, 0.0, -0.4), motion=motion),
+    "capsule": lambda motion: swarm.Capsule(0.3, 0.5, motion=motion),
+    "torus": lambda motion: swarm.Torus(0.6, 0.3, motion=motion),
+    "slab": lambda motion: swarm.Slab((1.0, 1.0, 0.0), 0.4, motion=motion),
+    "plane": lambda motion: swarm.Plane((0.0, 1.0, 1.0), 0.3, motion=motion),
+    "formula": lambda motion: swarm.Formula("x**2/0.25 + y**2/0.25 + z**4/0.0625 - 1", motion=motion),
+}
+SOLIDS = {
+    "ball": lambda motion: swarm.Sphere(0.2, side="outside", motion=motion),
+    "block": lambda motion: swarm.Box((0.2, 0.1, 0.15), side="outside", motion=motion),
+    "rod": lambda motion: swarm.Cylinder(0.1, length=0.4, side="outside", motion=motion),
+    "ring": lambda motion: swarm.Torus(0.3, 0.1, side="outside", motion=motion),
+}
+
+
+def run(scene, particles, until, frames=1, method=None, **options):
+    method = method or swarm.Impact()
+    return swarm.simulate(scene, particles, method, until=until, every=until / frames, compile="never", **options)
+
+
+def imbalance(result):
+    """What the energy, with what was lost and less the work, has changed by; relative."""
+    seen = result.observables
+    kept = (
+        seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum(axis=1) - seen["wall_heat"].sum(axis=1)
+    )
+    return np.abs(kept - kept[0]).max() / np.abs(seen["total_energy"]).max()
+
+
+# --- Uniform motion: the trajectory at rest, transformed -------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", ["sphere", "box", "ellipsoid", "torus"])
+def test_a_vessel_in_uniform_motion_is_one_at_rest(name, gravity):
+    rest, moving = (swarm.Scene([CAVITIES[name](motion)], gravity) for motion in (None, swarm.Translation(VELOCITY)))
+    start = swarm.fill(rest, 4, speed=1.0, seed=3)
+    shift = np.array(VELOCITY)[:, None]
+    carried = swarm.Particles(start.position, start.velocity + shift, start.mass)
+    until = 8.0
+    here, there = run(rest, start, until), run(moving, carried, until)
+    assert here.observables["impacts"][-1] >= 4 * 9
+    moved = there.particles.position - until * shift
+    # An orbit in a torus or an ellipsoid takes errors along that grow from impact to impact.
+    assert np.abs(moved - here.particles.position).max() <= (1e-12 if name in ("sphere", "box") else 1e-10)
+    assert imbalance(there) <= 1e-14
+    assert there.observables["energy_error"].max() <= 1e-14
+
+
+def test_a_ball_in_uniform_motion_after_fifty_impacts():
+    velocity = (0.11, 0.05, -0.07)
+    scenes = [
+        swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=m), swarm.Sphere(0.15, side="outside", motion=m)])
+        for m in (None, swarm.Translation(velocity))
+    ]
+    start = swarm.Particles([0.3, 0.1, 0.05], [1.0, 0.0, 0.0], 1.0)
+    carried = swarm.Particles(start.position, start.velocity + np.array(velocity)[:, None], 1.0)
+    here, there = (run(scene, p, 1.5) for scene, p in zip(scenes, (start, carried), strict=True))
+    moved = there.particles.position[:, 0] - 1.5 * np.array(velocity)
+    assert np.abs(moved - here.particles.position[:, 0]).max() <= 1e-12
+
+
+# --- Hits: none is skipped, to round-off of the time -----------------------------------------------------
+
+
+def first_hit_by_scan(scene, r, v, pull, start, end, samples=4000):
+    """The first time at which a gap rises through 0, from many samples; infinite if there is none."""
+
+    def gap(t):
+        place = (r + v * t + 0.5 * t * t * np.array(pull))[:, None]
+        return scene.gaps(place, start + t).max()
+
+    times = np.linspace(0.0, end, samples)
+    values = np.array([gap(t) for t in times])
+    found = np.flatnonzero((values[:-1] <= 0.0) & (values[1:] > 0.0))
+    return brentq(gap, times[found[0]], times[found[0] + 1], xtol=1e-15, rtol=9e-16) if found.size else math.inf
+
+
+@pytest.mark.parametrize("pull", [(0.0, 0.0, 0.0), (0.3, 0.0, -2.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("name", [*CAVITIES, *SOLIDS])
+def test_the_first_hit_is_found(name, motion, pull):
+    made = (CAVITIES | SOLIDS)[name](MOTIONS[motion])
+    scene, rng, found = swarm.Scene([made]), np.random.default_rng(5), 0
+    start, span = 0.6, 2.5
+    chain = scene.chain(start + span)
+    for _ in range(60):
+        r, v = rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
+        if name in SOLIDS:
+            v = 0.2 * v - rng.uniform(0.5, 2.0) * r
+        if not (scene.gaps(r[:, None], start) < -1e-3).all():
+            continue
+        gravity = swarm.Scene([made], pull).pull()
+        with np.errstate(all="ignore"):
+            hit = safe.first_hit(chain, gravity, vec(r), vec(v), span)
+        wanted = first_hit_by_scan(scene, r, v, pull, start, span, 500)
+        if not hit.time < span:
+            # Not within the span, or still under way: never past the hit.
+            assert hit.time <= wanted or wanted == math.inf
+            continue
+        found += 1
+        # Where the scan is too coarse for a flight that only touches, it finds a later hit.
+        assert hit.time <= wanted + 1e-12
+        place = r + v * hit.time + 0.5 * hit.time**2 * np.array(pull)
+        assert abs(scene.distances_outside(place[:, None], start + hit.time)).min() <= 1e-14
+        if found >= 4:
+            break
+    assert found >= 2
+
+
+def test_a_hit_of_a_wall_that_comes_and_goes():
+    """A floor that swings just up to a particle which stands still, or just not."""
+    amplitude, rest = 0.25, Vec(0.0, 0.0, 0.0)
+    for gap, hits in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
+        floor = swarm.Plane((0, 0, -1), offset=gap * amplitude, motion=swarm.Oscillation((0, 0, amplitude), 1.0))
+        chain = swarm.Scene([floor]).chain(0.6)
+        with np.errstate(all="ignore"):
+            found = safe.first_hit(chain, None, rest, ZERO, 0.6)
+        assert (found.time < 0.6) == hits
+        if hits:
+            # amplitude sin(2 pi t) = gap amplitude, a little before the top
+            assert found.time == pytest.approx(math.asin(gap) / (2.0 * math.pi), rel=1e-9)
+
+
+# --- Work ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("name", ["sphere", "box", "cylinder", "formula"])
+def test_work_is_booked(name, motion):
+    scene = swarm.Scene([CAVITIES[name](MOTIONS[motion])], gravity=(0.0, 0.0, -1.0))
+    result = run(scene, swarm.fill(scene, 4, speed=1.0, seed=2), 4.0, frames=4)
+    assert imbalance(result) <= 1e-14
+    assert result.observables["dissipated_energy"][-1] == 0.0
+    assert result.observables["energy_error"].max() <= 1e-13
+    assert result.observables["max_penetration"].max() <= 1e-14
+
+
+def test_a_rotating_sphere_does_nothing_and_a_rotating_box_heats():
+    spin = swarm.Rotation((1.0, 0.5, 0.0), rate=3.0, center=(0.0, 0.0, 0.0))
+    rest, turning = (swarm.Scene([swarm.Sphere(0.5, motion=motion)]) for motion in (None, spin))
+    start = swarm.fill(rest, 5, speed=1.0, seed=4)
+    here, there = run(rest, start, 10.0), run(turning, start, 10.0)
+    assert np.abs(here.particles.position - there.particles.position).max() <= 1e-13
+    assert abs(there.observables["wall_work"][-1]).max() <= 1e-14
+    box = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=spin)])
+    result = run(box, swarm.fill(box, 20, speed=0.2, seed=4), 20.0)
+    seen = result.observables
+    assert seen["total_energy"][-1] > 4.0 * seen["total_energy"][0]
+    assert imbalance(result) <= 1e-14
+
+
+def test_the_laws_act_on_the_relative_velocity():
+    """A ball that meets a bat: v1 = u + e (u - v) across it, and friction along it."""
+    e, mu, u = 0.6, 0.1, np.array([0.4, 0.0, 0.7])
+    bat = swarm.Plane((0, 0, -1), restitution=e, friction=mu, motion=swarm.Translation(tuple(u)))
+    v = np.array([1.5, 0.0, -2.0])
+    result = run(swarm.Scene([bat]), swarm.Particles([0.0, 0.0, 1.0], v, 2.0), 1.0)
+    normal = (1.0 + e) * (u[2] - v[2])
+    wanted = np.array([v[0] - mu * normal, 0.0, v[2] + normal])
+    assert result.particles.velocity[:, 0] == pytest.approx(wanted, rel=1e-14, abs=1e-15)
+    seen = result.observables
+    # The impulse on the ball does work at the bat's velocity; what is lost is in the bat's frame.
+    assert seen["wall_work"][-1][0] == pytest.approx(2.0 * u @ (wanted - v), rel=1e-14)
+    lost = ((v - u) ** 2).sum() - ((wanted - u) ** 2).sum()
+    assert seen["dissipated_energy"][-1] == pytest.approx(lost, rel=1e-14)
+
+
+def test_a_hot_piston_gives_heat_and_work():
+    piston = swarm.Plane((0, 0, 1), 0.5, temperature=0.2, motion=swarm.Translation((0.0, 0.0, -0.05)))
+    scene = swarm.Scene([swarm.Cylinder(0.4), swarm.Plane((0, 0, -1), 0.5), piston])
+    result = run(scene, swarm.fill(scene, 20, temperature=0.1, seed=6), 3.0, frames=3)
+    assert imbalance(result) <= 1e-14
+    seen = result.observables
+    assert seen["wall_work"][-1][2] > 0.0
+    assert seen["wall_work"][-1][:2].tolist() == [0.0, 0.0]
+    assert seen["wall_heat"][-1][2] != 0.0
+
+
+# --- Against closed forms --------------------------------------------------------------------------------
+
+
+def test_a_piston_compresses_by_the_law_of_one_dimension():
+    """Between a wall at 0 and a piston at L - u t, from impact to impact: v -> v + 2 u at the piston."""
+    length, u, until = 1.0, 0.01, 60.0
+    scene = swarm.Scene(
+        [swarm.Plane((-1, 0, 0), 0.0), swarm.Plane((1, 0, 0), length, motion=swarm.Translation((-u, 0.0, 0.0)))]
+    )
+    result = run(scene, swarm.Particles([0.25, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0), until)
+    x, v, t = mpmath.mpf(1) / 4, mpmath.mpf(1), mpmath.mpf(0)
+    with mpmath.workdps(40):
+        piston = mpmath.mpf(-u)
+        while True:
+            wait = (length + piston * t - x) / (v - piston) if v > 0 else -x / v
+            if t + wait > until:
+                break
+            x, t = x + v * wait, t + wait
+            v = -v + 2 * piston if v > 0 else -v
+        x += v * (until - t)
+    assert result.particles.position[0, 0] == pytest.approx(float(x), abs=1e-11)
+    assert result.particles.velocity[0, 0] == pytest.approx(float(v), rel=1e-12)
+    # The adiabatic invariant of one degree of freedom: |v| L
+    assert abs(float(v)) * (length - u * until) == pytest.approx(length, rel=0.03)
+
+
+def fermi_ulam(v, amplitude, length, impacts):
+    """Positions and velocities at the swinging wall, x = length + amplitude sin t, to 50 digits, and when."""
+    with mpmath.workdps(50):
+        amplitude, length, t = mpmath.mpf(amplitude), mpmath.mpf(length), mpmath.mpf(0)
+        x, v = mpmath.mpf(0), mpmath.mpf(v)
+
+        def ahead(wait):
+            return x + v * wait - length - amplitude * mpmath.sin(t + wait)
+
+        for _ in range(impacts):
+            wait = mpmath.findroot(ahead, (length - x) / v, tol=1e-90)
+            t += wait
+            hit = length + amplitude * mpmath.sin(t)
+            v = 2 * amplitude * mpmath.cos(t) - v
+            back = hit / -v
+            t, x, v = t + back, mpmath.mpf(0), -v
+        return float(t), float(v)
+
+
+def test_the_fermi_ulam_trajectory_where_it_is_not_chaotic():
+    amplitude, length, v = 0.01, 1.0, 8.0
+    impacts = 500
+    until, wanted = fermi_ulam(v, amplitude, length, impacts)
+    wall = swarm.Plane(
+        (1, 0, 0), length, motion=swarm.Oscillation((amplitude, 0.0, 0.0), frequency=0.5 / math.pi, phase=0.0)
+    )
+    scene = swarm.Scene([swarm.Plane((-1, 0, 0), 0.0), wall])
+    result = run(scene, swarm.Particles([0.0, 0.0, 0.0], [v, 0.0, 0.0], 1.0), until - 1e-3, frames=7)
+    assert result.observables["impacts"][-1] == 2 * impacts - 1
+    assert -result.particles.velocity[0, 0] == pytest.approx(wanted, rel=1e-9)
+
+
+# --- Contacts that last ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_sliding_in_a_bowl_in_uniform_motion(friction):
+    law = {"friction": friction, "restitution": 0.0 if friction else 1.0}
+    rest, moving = (
+        swarm.Scene([swarm.Sphere(0.5, motion=motion, **law)], DOWN) for motion in (None, swarm.Translation(VELOCITY))
+    )
+    angle = np.array([0.4, 0.9])
+    places = 0.5 * (1.0 - 1e-15) * np.array([np.sin(angle), 0.0 * angle, -np.cos(angle)])
+    speeds = np.array([0.0 * angle, 0.3 + 0.0 * angle, 0.0 * angle])
+    shift = np.array(VELOCITY)[:, None]
+    here = run(rest, swarm.Particles(places, speeds, [1.0, 1.0]), 2.0)
+    there = run(moving, swarm.Particles(places, speeds + shift, [1.0, 1.0]), 2.0)
+    assert here.observables["sliding"][-1] == there.observables["sliding"][-1] == 2
+    assert np.abs(there.particles.position - 2.0 * shift - here.particles.position).max() <= 1e-8
+    assert imbalance(there) <= 1e-14
+    lost = here.observables["dissipated_energy"][-1]
+    assert there.observables["dissipated_energy"][-1] == pytest.approx(lost, abs=1e-7)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_sliding_in_a_bowl_that_swings(friction):
+    amplitude, frequency, phase, radius = np.array([0.02, 0.0, 0.03]), 1.5, 0.4, 0.5
+    rate = 2.0 * math.pi * frequency
+
+    def course(t, y):
+        angle, turn = y
+        a = -amplitude * rate**2 * math.sin(rate * t + phase)
+        down = G + a[2]
+        press = radius * turn**2 + down * math.cos(angle) - a[0] * math.sin(angle)
+        drag = friction * press * np.sign(turn)
+        return [turn, -(down * math.sin(angle) + a[0] * math.cos(angle) + drag) / radius]
+
+    until = 0.25 if friction else 1.0
+    angle, turn = 0.6, 0.5
+    end = solve_ivp(course, (0.0, until), [angle, turn], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    swing = swarm.Oscillation(tuple(amplitude), frequency, phase)
+    bowl = swarm.Sphere(radius, friction=friction, restitution=0.5 if friction else 1.0, motion=swing)
+    across, along = (
+        np.array([math.sin(angle), 0.0, -math.cos(angle)]),
+        np.array([math.cos(angle), 0.0, math.sin(angle)]),
+    )
+    speed = amplitude * rate * math.cos(phase) + radius * turn * along
+    start = swarm.Particles(radius * (1.0 - 1e-15) * across, speed, 1.0)
+    result = run(swarm.Scene([bowl], DOWN), start, until)
+    wanted = pose(swing, until).shift + radius * np.array([math.sin(end[0]), 0.0, -math.cos(end[0])])
+    assert result.observables["sliding"][-1] == 1
+    assert np.abs(result.particles.position[:, 0] - wanted).max() <= 3e-9
+    assert imbalance(result) <= 1e-14
+
+
+def test_sliding_on_a_plane_that_turns():
+    """s'' = w^2 s - g sin(w t) along it: centrifugal force, and no word of Coriolis' across it."""
+    rate, until, s, ds = 0.7, 0.9, 0.3, 0.1
+    end = solve_ivp(
+        lambda t, y: [y[1], rate**2 * y[0] - G * math.sin(rate * t)],
+        (0.0, until), [s, ds], method="DOP853", rtol=1e-13, atol=1e-14,
+    ).y[0, -1]  # fmt: skip
+    plane = swarm.Plane((0, 0, -1), motion=swarm.Rotation((0.0, -1.0, 0.0), rate, (0.0, 0.0, 0.0)))
+    result = run(swarm.Scene([plane], DOWN), swarm.Particles([s, 0.0, 0.0], [ds, 0.0, s * rate], 1.0), until)
+    wanted = end * np.array([math.cos(rate * until), 0.0, math.sin(rate * until)])
+    assert np.abs(result.particles.position[:, 0] - wanted).max() <= 3e-9
+
+
+@pytest.mark.parametrize("strength", [0.5, 2.0], ids=["it stays", "it is thrown"])
+def test_a_grain_on_a_floor_that_shakes(strength):
+    """Below g it comes to rest on the floor and follows it; above, it leaves where the floor falls faster than g."""
+    frequency = 5.0
+    rate = 2.0 * math.pi * frequency
+    amplitude = strength * G / rate**2
+    floor = swarm.Plane((0, 0, -1), restitution=0.0, motion=swarm.Oscillation((0, 0, amplitude), frequency))
+    scene = swarm.Scene([floor], DOWN)
+    leaves = math.asin(min(1.0, 1.0 / strength)) / rate
+    result = run(scene, swarm.Particles([0.0, 0.0, 0.0], [0.0, 0.0, amplitude * rate], 1.0), leaves + 0.03)
+    z, t = result.particles.position[2, 0], leaves + 0.03
+    if strength < 1.0:
+        assert z == pytest.approx(amplitude * math.sin(rate * t), abs=1e-14)
+        assert result.observables["sliding"][-1] == 1
+    else:
+        flight = (
+            amplitude * math.sin(rate * leaves) + amplitude * rate * math.cos(rate * leaves) * 0.03 - 0.5 * G * 9e-4
+        )
+        assert z == pytest.approx(flight, abs=1e-12)
+        assert result.observables["sliding"][-1] == 0
+    assert imbalance(result) <= 1e-13
+
+
+def test_a_drum_lifts_a_grain_to_the_angle_of_friction():
+    friction, rate, radius = 0.5, 0.2, 0.5
+    drum = swarm.Cylinder(
+        radius, axis=(0, 1, 0), friction=friction, restitution=0.0,
+        motion=swarm.Rotation((0.0, -1.0, 0.0), rate, (0.0, 0.0, 0.0)),
+    )  # fmt: skip
+    scene = swarm.Scene([drum], DOWN)
+    start = swarm.Particles([0.0, 0.0, -radius], [radius * rate, 0.0, 0.0], 1.0)
+    slips = math.atan(friction)
+    before = run(scene, start, 0.9 * slips / rate)
+    x, _y, z = before.particles.position[:, 0]
+    # It rests on the drum, and turns with it.
+    assert math.atan2(x, -z) == pytest.approx(0.9 * slips, rel=1e-12)
+    assert before.observables["dissipated_energy"][-1] == 0.0
+    after = run(scene, start, 3.0 * slips / rate, frames=30)
+    x, _y, z = after.particles.position[:, 0]
+    assert abs(math.atan2(x, -z) - slips) <= 1.1 * rate * math.sqrt(radius / G)
+    assert after.observables["dissipated_energy"][-1] > 0.0
+    assert imbalance(after) <= 1e-13
+
+
+# --- The same bits ---------------------------------------------------------------------------------------
+
+
+def test_frames_cut_nothing():
+    """Frames that end within a flight change no more than round-off."""
+    scene = swarm.Scene([CAVITIES["box"](MOTIONS["sum"])])
+    start = swarm.fill(scene, 3, speed=1.0, seed=8)
+    one, many = run(scene, start, 3.0), run(scene, start, 3.0, frames=17)
+    assert np.abs(one.particles.position - many.particles.position).max() <= 1e-11
+
+
+@pytest.mark.parametrize("motion", ["oscillation", "rotation"])
+def test_threads_and_blocks_change_no_bit(motion):
+    scene = swarm.Scene([CAVITIES["box"](MOTIONS[motion])], gravity=(0.0, 0.0, -1.0))
+    start = swarm.fill(scene, 600, speed=1.0, seed=8)
+    results = [
+        swarm.simulate(scene, start, swarm.Impact(), until=2.0, every=1.0, threads=threads, block_size=size)
+        for threads, size in ((1, None), (2, 256))
+    ]
+    assert np.array_equal(results[0].particles.position, results[1].particles.position)
+    assert np.array_equal(results[0].observables["wall_work"], results[1].observables["wall_work"])
+    plain = run(scene, start, 2.0, frames=2) if motion == "rotation" else results[0]
+    assert np.abs(plain.particles.position - results[0].particles.position).max() <= 1e-9
+
+
+def test_the_walls_of_a_chain_at_an_instant():
+    scene = swarm.Scene([CAVITIES["sphere"](None)])
+    assert at(scene.chain(), 0.3) is not None
+    assert at(scene.chain(), 0.3) == scene.chain()
