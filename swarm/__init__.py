@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .frames import Frame
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
-    from .motion import Oscillation, Path, Rotation, Translation
+    from .motion import Guide, Oscillation, Path, Rotation, Translation
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .run.simulation import Result, simulate
@@ -56,7 +56,7 @@ _HOMES = {
     "frames": ("Frame",),
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
-    "motion": ("Oscillation", "Path", "Rotation", "Translation"),
+    "motion": ("Guide", "Oscillation", "Path", "Rotation", "Translation"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -70,7 +70,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory", "Cylinder",
-    "Ellipsoid", "FileError", "Formula", "Frame", "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid",
+    "Ellipsoid", "FileError", "Formula", "Frame", "Guide", "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid",
     "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab",
     "Sphere", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
     "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "load", "place", "rigid", "simulate",

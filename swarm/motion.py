@@ -9,7 +9,7 @@ with the displacement d, and the rotation A about the centre c, both of one moti
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,10 +145,7 @@ class Rotation(Given):
     center: Vector
 
     def __post_init__(self) -> None:
-        axis = _vector("axis", self.axis)
-        if not any(axis):
-            raise SceneError("axis must have a direction, got (0, 0, 0)")
-        object.__setattr__(self, "axis", axis)
+        object.__setattr__(self, "axis", _axis(self.axis))
         rate = checks.number("rate", self.rate)
         checks.magnitude("|rate|", abs(rate))
         object.__setattr__(self, "rate", rate)
@@ -224,13 +221,13 @@ class Path(Given):
 
 @dataclass(frozen=True)
 class Sum(Given):
-    """Several motions of a wall at once: displacements add up, and at most one part is a rotation.
+    """Several motions of a wall at once: displacements add up, and at most one part is a rotation, and none a guide.
 
     Args:
         parts: at least one motion; the centre of a rotation moves with the displacements.
 
     Raises:
-        SceneError: two rotations.
+        SceneError: two rotations, or a guide.
 
     >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
     >>> len(both.parts)
@@ -240,14 +237,68 @@ class Sum(Given):
     parts: "tuple[WallMotion, ...]"
 
     def __post_init__(self) -> None:
+        for one in self.parts:
+            if isinstance(one, Guide):
+                raise SceneError(f"a sum of motions must have no guide, which needs a mass of its own, got {one}")
         turns = [one for one in self.parts if isinstance(one, Rotation)]
         if len(turns) > 1:
             raise SceneError(f"a sum of motions must have at most one rotation, got {len(turns)}")
 
 
-WallMotion = Translation | Oscillation | Rotation | Path | Sum
+@dataclass(frozen=True)
+class Guide(Given):
+    """A straight guide, and a spring: how a wall with a mass may move. It starts where it is given.
+
+    Args:
+        axis: three numbers, not all 0; its length does not matter.
+        speed: along the axis at the start, from -1e100 to 1e100 [m/s].
+        stiffness: of a spring that is relaxed where the wall is given, from 0 to 1e100 [N/m]; 0: no spring.
+
+    Gravity pulls the wall along the axis.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=10.0, motion=Guide(axis=(0.0, 0.0, 1.0), stiffness=40.0))
+    >>> piston.motion.speed
+    0.0
+    """
+
+    axis: Vector
+    speed: float = 0.0
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", _axis(self.axis))
+        speed = checks.number("speed", self.speed)
+        checks.magnitude("|speed|", abs(speed))
+        object.__setattr__(self, "speed", speed)
+        object.__setattr__(self, "stiffness", checks.magnitude("stiffness", self.stiffness))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """Where a point of the wall is before anything moves it."""
+        return Led(_point(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
+
+
+@dataclass(frozen=True)
+class Placed(Given):
+    """A wall that stays where a run has moved it: what is given at xi is at position + orientation xi.
+
+    Args:
+        position: three numbers [m].
+        orientation: a unit quaternion (w, x, y, z).
+    """
+
+    position: Vector
+    orientation: tuple[float, float, float, float]
+
+
+WallMotion = Translation | Oscillation | Rotation | Path | Sum | Guide | Placed
 # The motions by their kind in a scene file.
-KINDS: dict[str, Any] = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation, "path": Path}
+KINDS: dict[str, Any] = {
+    "translation": Translation, "oscillation": Oscillation, "rotation": Rotation, "path": Path,
+    "guide": Guide,
+}  # fmt: skip
 
 
 class Pose(NamedTuple):
@@ -281,7 +332,10 @@ def pose(motion: "WallMotion | None", time: float) -> Pose:
     """Where a wall with this motion is at a time [s]."""
     found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
     for one in parts_of(motion):
-        if isinstance(one, Rotation):
+        if isinstance(one, Placed):
+            w, *imaginary = one.orientation
+            found, quaternion, turn = np.array(one.position), one.orientation, _turned_to(w, np.array(imaginary))
+        elif isinstance(one, Rotation):
             center, turn, half = np.array(one.center), _turned_by(one, one.rate * time), 0.5 * one.rate * time
             x, y, z = (math.sin(half) * unit_axis(one)).tolist()
             quaternion = (math.cos(half), x, y, z)
@@ -290,7 +344,7 @@ def pose(motion: "WallMotion | None", time: float) -> Pose:
     return Pose(found, turn, center, quaternion)
 
 
-def displacement(motion: "Translation | Oscillation | Path", time: float) -> Floats:
+def displacement(motion: "Translation | Oscillation | Path | Guide", time: float) -> Floats:
     """The displacement (3,) of a wall at a time [s]."""
     if isinstance(motion, Path):
         return motion.displacement(time)
@@ -304,7 +358,7 @@ def parts_of(motion: Any) -> tuple[Any, ...]:
     return motion.parts if isinstance(motion, Sum) else (motion,)
 
 
-def unit_axis(rotation: Rotation) -> Floats:
+def unit_axis(rotation: Rotation | Guide) -> Floats:
     """The unit vector (3,) along its axis."""
     # By the largest part first: the squares of small components are 0.
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()
@@ -329,15 +383,30 @@ def parts_of_wall(value: Any) -> "WallMotion | None":
                     f"motion.{key}: unknown key, expected {checks.listed(names)}{checks.closest(key, names)}"
                 )
         for name in names:
-            if name not in given and name != "phase":
+            if name not in given and KINDS[kind].__dataclass_fields__[name].default is MISSING:
                 raise SceneError(f"motion.{name}: expected a value of a {kind}, got nothing; add {name} = ...")
         return KINDS[kind](**given)  # type: ignore[no-any-return]
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
         parts = [part for one in value for part in parts_of(parts_of_wall(one))]
         return parts[0] if len(parts) == 1 else Sum(tuple(parts))
     raise SceneError(
-        f"motion must be None, swarm.Translation, Oscillation, Rotation, Path or a sum of them, got {value!r}"
+        f"motion must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got {value!r}"
     )
+
+
+def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: float | None) -> None:
+    """Raise a `SceneError` where a wall with this mass or inertia has a motion that is none for it."""
+    if isinstance(motion, Guide) and mass is None:
+        raise SceneError("mass must go with a Guide, along which impacts move the wall, got None; give mass= [kg]")
+    if mass is not None and inertia is not None:
+        raise SceneError(f"inertia must be None where a mass is given, got {inertia:g}: a wall moves, or it turns")
+    if mass is not None and not (motion is None or isinstance(motion, Translation | Guide)):
+        raise SceneError(
+            f"motion must be None, a Translation or a Guide where a mass is given, got {motion}; a wall on a spring is "
+            "a Guide with a stiffness, one that turns has an inertia"
+        )
+    if inertia is not None and not isinstance(motion, Rotation):
+        raise SceneError(f"motion must be a Rotation where an inertia is given, got {motion}")
 
 
 def table_of(motion: "WallMotion") -> Any:
@@ -361,9 +430,23 @@ def _turned_by(rotation: Rotation, angle: float) -> Floats:
     return np.asarray((1.0 - versine) * np.eye(3) + versine * np.multiply.outer(k, k) + math.sin(angle) * across)
 
 
+def _turned_to(w: float, u: Floats) -> Floats:
+    """The matrix (3, 3) of a unit quaternion (w, u)."""
+    across = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+    return np.asarray((w * w - (u**2).sum()) * np.eye(3) + 2.0 * np.multiply.outer(u, u) + 2.0 * w * across)
+
+
 def _product(matrix: Floats, rows: Floats) -> Floats:
     """(3, 3) times (3, N), rounded term by term: the last bit of BLAS depends on the processor."""
     return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))
+
+
+def _axis(value: Vector) -> Vector:
+    """`value` as the direction of an axis."""
+    axis = _vector("axis", value)
+    if not any(axis):
+        raise SceneError("axis must have a direction, got (0, 0, 0)")
+    return axis
 
 
 def _vector(name: str, value: Vector) -> Vector:

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -89,8 +89,21 @@ class Scene:
             )
 
     def moves(self) -> bool:
-        """Whether a surface has a motion."""
-        return any(surface.motion is not None for surface in self.surfaces)
+        """Whether a surface moves, or may be moved."""
+        return any(surface.motion is not None or surface.reacts() for surface in self.surfaces)
+
+    def reacts(self) -> bool:
+        """Whether impacts move a surface."""
+        return any(surface.reacts() for surface in self.surfaces)
+
+    def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
+        """The scene whose walls that react stay where `wall_position` and `wall_orientation` of a frame say."""
+        surfaces = list(self.surfaces)
+        for i, surface in enumerate(surfaces):
+            if surface.reacts():
+                held = motions.Placed(tuple(np.array(positions)[i].tolist()), tuple(np.array(orientations)[i].tolist()))
+                surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
+        return Scene(surfaces, self.gravity)
 
     def chain(self, moment: float = 0.0) -> Chain | Carried | None:
         """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""

@@ -14,6 +14,7 @@ class Status(IntEnum):
     UNCONVERGED = 5
     TOO_FAST = 6
     HARD_CONTACT = 7
+    LEASE_ENDED = 8
 
     @property
     def sentence(self) -> str:
@@ -31,4 +32,5 @@ _SENTENCES = {
     Status.UNCONVERGED: "the multipliers of a contact did not converge",
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
+    Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
 }

@@ -27,7 +27,17 @@ _outside: dict[Any, list[Callable[..., Any]]] = {}
 
 _ROOT = Path(__file__).parents[1]
 # What kernels are made of: the functions and constants that they compile, and the types of their arguments.
-SOURCES = ("kernel", "surfaces", "contact", "methods", "lanes", "observables.py", "particles.py", "status.py")
+SOURCES = (
+    "kernel",
+    "surfaces",
+    "contact",
+    "methods",
+    "lanes",
+    "reacting",
+    "observables.py",
+    "particles.py",
+    "status.py",
+)
 
 
 def sources() -> list[Path]:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..output import paths
 from ..version import VERSION
-from .bodies import BodyRun
-from .engine import Run
 from .options import RunOptions, Task
+from .runs import AnyRun
 
 if TYPE_CHECKING:
     from ..output.background import Background
@@ -134,7 +133,7 @@ class Session:
             raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
         self._job, self._arrays = saved, arrays
 
-    def restore(self, run: Run | BodyRun) -> None:
+    def restore(self, run: AnyRun) -> None:
         """Put the run into the state of the checkpoint."""
         if self._arrays is not None and self._job is not None and self._path is not None:
             from ..output.checkpoint import require_fit
@@ -169,7 +168,7 @@ class Session:
         return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
 
     def look(
-        self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+        self, run: AnyRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
         """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
 
@@ -189,7 +188,7 @@ class Session:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
     def _save(
-        self, run: Run | BodyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+        self, run: AnyRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
         from ..output import checkpoint
 

@@ -20,10 +20,9 @@ from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
 from .admission import task_of
-from .bodies import BodyRun
-from .engine import Run
 from .options import RunOptions, Task
 from .outputs import recorder_of, writer_of
+from .runs import AnyRun, run_of
 from .session import Session
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     from .progress import display  # rich is imported only when it is shown
 
     recorder = recorder_of(task)
-    runs: list[Run | BodyRun] = []
+    runs: list[AnyRun] = []
 
     def stop() -> None:
         session.stop()
@@ -168,7 +167,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
         session.prepare(task)
         _require_room(task, session)
-        run = _run_of(task)
+        run = run_of(task)
         runs.append(run)
         session.restore(run)
         writer = writer_of(task, session, recorder)
@@ -185,16 +184,8 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
         )
 
 
-def _run_of(task: Task) -> Run | BodyRun:
-    options = task.options
-    how = options.thread_count(), options.block_size, options.compile
-    if task.bodies is None:
-        return Run(task.scene, task.particles, task.method, *how, options.seed)
-    return BodyRun(task.scene, task.bodies, task.particles, task.method, *how)
-
-
 def _frames(
-    task: Task, session: Session, run: Run | BodyRun, writer: "Background | None", show: "Display"
+    task: Task, session: Session, run: AnyRun, writer: "Background | None", show: "Display"
 ) -> list[dict[str, Any]]:
     """All frames of this session: their observables, if no trajectory holds them."""
     history: list[dict[str, Any]] = []

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
 from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, total
+from ..motion import Guide
 from . import contract
 from .course import rise_time
 from .flights import NEVER, Hit, hit, sooner
@@ -365,12 +366,16 @@ def _last_inside(chain, flight, low, high, wall):
 
 def lacks_bend(surface: Surface) -> bool:
     """Whether a surface moves so that its hits need safe steps, and does not bound its bend."""
+    return _needs_steps(surface) and any(_is_unknown(wall) for wall in surface.walls())
+
+
+def _needs_steps(surface: Surface) -> bool:
+    if surface.mass is not None:
+        return isinstance(surface.motion, Guide) and surface.motion.stiffness > 0.0
     if surface.motion is None:
         return False
     drive = drive_of(surface, 0.0)
-    if drive.swings is None and drive.track is None and drive.turn is None:
-        return False
-    return any(_is_unknown(wall) for wall in surface.walls())
+    return drive.swings is not None or drive.track is not None or drive.turn is not None
 
 
 def _is_unknown(wall: Any) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import motion as motions
-from ..checks import Vector, array, magnitude, number, one_of, vector
+from ..checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import contract
@@ -37,6 +37,10 @@ class Surface:
             temperature (diffusely), instead of specularly.
         motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
             the wall is before it moves. Its laws act on the velocity relative to the wall.
+        mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
+            `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the start.
+        inertia: of a wall that impacts turn about the axis of its `Rotation`, with that rate at the start [kg m^2],
+            above 0. Its centre of mass is on the axis.
     """
 
     rotation: Any = field(default=None, kw_only=True)
@@ -45,6 +49,8 @@ class Surface:
     temperature: float | None = field(default=None, kw_only=True)
     accommodation: float = field(default=1.0, kw_only=True)
     motion: Any = field(default=None, kw_only=True)
+    mass: float | None = field(default=None, kw_only=True)
+    inertia: float | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
@@ -62,6 +68,13 @@ class Surface:
             object.__setattr__(self, "center", vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))
         object.__setattr__(self, "motion", motions.parts_of_wall(self.motion))
+        for name in ("mass", "inertia"):
+            value = getattr(self, name)
+            if value is not None:
+                checked = positive(name, value)
+                magnitude(name, checked)
+                object.__setattr__(self, name, checked)
+        motions.require_freedom(self.motion, self.mass, self.inertia)
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
@@ -76,6 +89,10 @@ class Surface:
     def walls(self) -> tuple[Any, ...]:
         """What kernels take: one tuple for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
+
+    def reacts(self) -> bool:
+        """Whether impacts move it."""
+        return self.mass is not None or self.inertia is not None
 
     def own_center(self) -> Vector:
         """The centre in the surface's own frame, which is turned about the origin."""

@@ -1,0 +1,91 @@
+"""A queue of events: a heap that knows where each item is, of four children a node.
+
+The order is that of the keys, and of the numbers of the items where keys are equal: whatever was done to a heap before,
+the first item is the same.
+"""
+
+from typing import NamedTuple
+
+from .jit import Array, index, inlined, select
+
+# Children of a node: half as many levels as two, and the children are beside one another in memory.
+_CHILDREN = 4
+
+
+class Heap(NamedTuple):
+    """Each item's key, and the nodes: arrays of one length."""
+
+    key: Array  # (N,) of the items
+    item: Array  # (N,) in the nodes; node 0 is the first
+    place: Array  # (N,) the node of each item
+
+
+@inlined
+def _comes_before(heap, item, other):
+    one, two = heap.key[index(item)], heap.key[index(other)]
+    return (one < two) | ((one == two) & (item < other))
+
+
+@inlined
+def _put(heap, node, item):
+    heap.item[index(node)] = item
+    heap.place[index(item)] = node
+
+
+@inlined
+def _least_child(heap, node):
+    """The child node whose item comes first, or -1 where there is none."""
+    first = _CHILDREN * node + 1
+    least, end = first, min(first + _CHILDREN, heap.item.size)
+    for child in range(first + 1, end):
+        before = _comes_before(heap, heap.item[index(child)], heap.item[index(least)])
+        least = select(before, child, least)
+    return select(first < end, least, -1)
+
+
+@inlined
+def sink(heap, node):
+    """Order a heap where the key of the item at this node has grown."""
+    item = heap.item[index(node)]
+    while True:
+        child = _least_child(heap, node)
+        if child < 0 or not _comes_before(heap, heap.item[index(child)], item):
+            break
+        _put(heap, node, heap.item[index(child)])
+        node = child
+    _put(heap, node, item)
+
+
+@inlined
+def rise(heap, node):
+    """Order a heap where the key of the item at this node has become less."""
+    item = heap.item[index(node)]
+    while node > 0:
+        above = (node - 1) // _CHILDREN
+        if not _comes_before(heap, item, heap.item[index(above)]):
+            break
+        _put(heap, node, heap.item[index(above)])
+        node = above
+    _put(heap, node, item)
+
+
+@inlined
+def build(heap):
+    """Order a heap whatever its keys are."""
+    for node in range((heap.item.size - 2) // _CHILDREN, -1, -1):
+        sink(heap, node)
+
+
+@inlined
+def change(heap, item, key):
+    """Give an item another key."""
+    heap.key[index(item)] = key
+    rise(heap, heap.place[index(item)])
+    sink(heap, heap.place[index(item)])
+
+
+@inlined
+def second_key(heap):
+    """The key of the item that comes after the first; infinite where there is none."""
+    child = _least_child(heap, 0)
+    return select(child < 0, float("inf"), heap.key[index(heap.item[index(max(child, 0))])])

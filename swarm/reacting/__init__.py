@@ -1,0 +1,1 @@
+"""Walls that impacts move: the particles are no longer independent, and impacts are taken in order of time."""

@@ -1,0 +1,145 @@
+"""What kernels take of a scene with walls that react, from its description."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel.vector import Vec, vec
+from ..motion import Guide, Rotation, Translation, pose, unit_axis
+from ..scene import Scene
+from ..surfaces.fold import Chain
+from ..surfaces.moving import at
+from ..surfaces.surface import Surface
+from .freedoms import Freedoms, Free, Guided, Hinged, Sprung, posed
+from .queue import Scenery
+from .walls import Reacting
+
+Floats = NDArray[np.float64]
+
+
+def scenery_of(scene: Scene, moment: float) -> Scenery:
+    """The walls of a scene in the frame that ends at a moment [s]."""
+    owners = np.array(scene.owners())
+    rest = [surface for surface in scene.surfaces if not surface.reacts()]
+    given = Scene(rest, scene.gravity) if rest else None
+    reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
+    return Scenery(
+        None if given is None else given.chain(moment),
+        None if given is None else given.laws(),
+        np.flatnonzero(~reacts),
+        _reacting(scene),
+        scene.pull(),
+    )
+
+
+def _reacting(scene: Scene) -> Chain | None:
+    made, number, row = [], 0, 0
+    for surface in scene.surfaces:
+        walls = surface.walls()
+        if surface.reacts():
+            freedom = _freedom(surface, row, scene.gravity or (0.0, 0.0, 0.0))
+            made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
+            row += 1
+        number += len(walls)
+    chain = None
+    for wall in reversed(made):
+        chain = Chain(wall, chain)
+    return chain
+
+
+def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Free | Guided | Sprung | Hinged:
+    motion = surface.motion
+    if surface.inertia is not None:
+        return Hinged(row, 1.0 / surface.inertia, _vector(unit_axis(motion)), vec(motion.center))
+    assert surface.mass is not None
+    lightness = 1.0 / surface.mass
+    if not isinstance(motion, Guide):
+        return Free(row, lightness, vec(gravity))
+    axis = unit_axis(motion)
+    pull = _vector(float((axis * gravity).sum()) * axis)
+    if motion.stiffness > 0.0:
+        return Sprung(row, lightness, pull, _vector(axis), math.sqrt(motion.stiffness * lightness))
+    return Guided(row, lightness, pull, _vector(axis))
+
+
+def _vector(values: Floats) -> Vec:
+    return vec(values.tolist())
+
+
+def freedoms_of(scene: Scene, width: float) -> Freedoms:
+    """The walls that react at the start, with leases of this width [m/s]."""
+    surfaces = [surface for surface in scene.surfaces if surface.reacts()]
+    count = len(surfaces)
+    shift, velocity, rest, middle = np.zeros((4, 3, count))
+    angle, rate, rate_rest, time, turning, widths, until = np.zeros((7, count))
+    for k, surface in enumerate(surfaces):
+        motion = surface.motion
+        if isinstance(motion, Translation):
+            velocity[:, k] = motion.velocity
+        elif isinstance(motion, Guide):
+            velocity[:, k] = motion.speed * unit_axis(motion)
+        elif isinstance(motion, Rotation):
+            rate[k] = motion.rate
+        size = surface.size() if math.isfinite(surface.size()) else scene.finite_size()
+        widths[k] = width if surface.inertia is None else width / size
+    return Freedoms(shift, velocity, rest, angle, rate, rate_rest, time, middle, turning, widths, until)
+
+
+class Observed(NamedTuple):
+    """What is observed of the surfaces of a scene: of those that react where they are, and how they move."""
+
+    position: Floats  # (surfaces, 3) where what is given at the origin is [m]
+    orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
+    velocity: Floats  # (surfaces, 3) [m/s]
+    spin: Floats  # (surfaces, 3) [rad/s]
+    kinetic: Floats  # (surfaces,) [J]
+    potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
+
+
+def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
+    """The surfaces of a scene at a moment [s], at which the walls that react have been brought to the time 0."""
+    count, row = len(scene.surfaces), 0
+    poses, gravity = scene.poses(moment), np.array(scene.gravity or (0.0, 0.0, 0.0))
+    found = Observed(
+        np.array([pose.position() for pose in poses]), np.array([pose.quaternion for pose in poses]),
+        *np.zeros((2, count, 3)), *np.zeros((2, count)),
+    )  # fmt: skip
+    for i, surface in enumerate(scene.surfaces):
+        if not surface.reacts():
+            continue
+        motion, shift, v = surface.motion, freedoms.shift[:, row], freedoms.velocity[:, row]
+        found.position[i], found.orientation[i] = shift, (1.0, 0.0, 0.0, 0.0)
+        if surface.mass is not None:
+            found.velocity[i] = v
+            found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
+            stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
+            found.potential[i] = 0.5 * stiffness * (shift**2).sum() - surface.mass * (gravity * shift).sum()
+        else:
+            rate = freedoms.rate[row]
+            turned = pose(Rotation(motion.axis, freedoms.angle[row], motion.center), 1.0)
+            found.position[i], found.orientation[i] = turned.position(), turned.quaternion
+            found.spin[i], found.kinetic[i] = rate * unit_axis(motion), 0.5 * surface.inertia * rate**2
+        row += 1
+    return found
+
+
+def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Chain | None:
+    """All walls of a scene, in its order, at the end of the frame of `scenery`."""
+    given, reacting = _walls(at(scenery.given, 0.0)), _walls(scenery.reacting)
+    made = []
+    for i in scene.owners():
+        if scene.surfaces[i].reacts():
+            wall = reacting.pop(0)
+            made.append(posed(wall.freedom, wall.body, freedoms, 0.0, 0.0))
+        else:
+            made.append(given.pop(0))
+    chain = None
+    for wall in reversed(made):
+        chain = Chain(wall, chain)
+    return chain
+
+
+def _walls(chain: Chain | None) -> list[Any]:
+    return [] if chain is None else [chain.first, *_walls(chain.rest)]

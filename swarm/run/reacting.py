@@ -1,0 +1,247 @@
+"""The state of a run with walls that react; what `engine.Run` is for particles that are independent of one another."""
+
+import math
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import observables
+from ..errors import RunError
+from ..kernel.gravity import potential
+from ..kernel.heap import Heap
+from ..kernel.vector import vec
+from ..methods.base import Method
+from ..particles import Particles, State
+from ..reacting import queue as events
+from ..reacting.described import chain_now, freedoms_of, observed, scenery_of
+from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
+from ..scene import Scene
+from ..status import Status
+from . import failures
+from .tiers import Tier
+
+# Beyond this part of the scene's size a particle outside rigid walls is an error.
+_OUTSIDE = 1e-9
+# A particle this many times the scene's extent away from the origin has escaped from an open scene.
+_FAR = 100.0
+# The caller's thread looks for an interrupt so often [s].
+_GLANCE = 0.1
+_NEVER = 2**62
+# Fewer particles than this are predicted sooner than another thread is awake.
+_FEW = 4096
+# The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
+# many events a particle, and too wide where they last longer than that many.
+_WIDTH, _TOO_SHORT, _TOO_LONG = 0.1, 4.0, 32.0
+
+
+class ReactingRun:
+    """The particles and the walls that react, advanced from frame to frame; a context that ends its threads."""
+
+    def __init__(
+        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        compile: str = "always",
+    ) -> None:  # fmt: skip
+        n, walls = len(particles), len(scene.owners())
+        self._scene, self._method, self._owners = scene, method, scene.owners()
+        self._gravity = scene.pull()
+        energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(self._gravity, vec(particles.position))
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
+            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None,
+        )  # fmt: skip
+        state = self.state
+        number = np.arange(n)
+        self._queue = Queue(
+            state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
+            np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool), np.zeros(n, np.int64),
+            np.zeros(n, bool), np.zeros(n, np.int64), Heap(np.zeros(n), number.copy(), number.copy()),
+        )  # fmt: skip
+        speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
+        self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
+        self._clock = np.zeros(CLOCK)
+        self._halt = np.full(1, _NEVER)
+        self._scenery = scenery_of(scene, 0.0)
+        self._walls = observed(scene, self._freedoms, 0.0)
+        self._deepest = _OUTSIDE * scene.finite_size()
+        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
+        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
+        self._threads = threads if n >= _FEW else 1
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
+        self._cut_short = False
+        self._start = math.nan
+        self._tier = Tier(compile, (self._scenery, self._gravity), n)
+        self._tier.choose(self._calls(0.0))
+
+    def __enter__(self) -> "ReactingRun":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.halt()
+        self._pool.shutdown(wait=True)
+
+    def halt(self, passes: int = 0) -> None:
+        """Make the kernel call of this frame return after so many events; 0: at once."""
+        np.minimum(self._halt, passes, out=self._halt)
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        """Advance the particles and walls by `span` [s] and observe them: whether the frame is done."""
+        self._scenery = scenery_of(self._scene, moment)
+        rule = Rule(span, self._halt)
+        if self._tier.is_plain:
+            if self._tier.left <= 0.0:
+                self._tier.choose(self._calls(span))
+            latest = min(latest, time.monotonic() + self._tier.left)
+        began = time.perf_counter()
+        if not self._cut_short:
+            self._clock[NOW] = 0.0
+            self._predict(rule)
+        taking = self._scenery, self._freedoms, self._queue, self._clock, rule
+        status, particle = Status.LEASE_ENDED, 0
+        while status == Status.LEASE_ENDED:
+            status, particle = self._end_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest)
+            if status == Status.LEASE_ENDED:
+                self._fit_leases()
+                self._predict(rule)
+        self._tier.left -= time.perf_counter() - began
+        self._halt[0] = _NEVER
+        self._cut_short = status == Status.INTERRUPTED
+        if status == Status.STALLED:
+            raise RunError(self._stalled(particle, moment - span))
+        if not self._cut_short:
+            self._in_parts(events.arrive, self._scenery, self._queue, rule)
+            self._tier.kernel(events.settle)(self._scenery, self._freedoms, span)
+            self._freedoms.time.fill(0.0)
+            self._clock[events.BEFORE] += span
+            self._clock[NOW] = 0.0
+            self._observe(moment)
+        return not self._cut_short
+
+    def _predict(self, rule: Rule) -> None:
+        """New leases, and what is next for every particle."""
+        self._tier.kernel(events.lease)(self._scenery, self._freedoms, self._clock)
+        self._in_parts(events.predict, self._scenery, self._freedoms, self._queue, self._clock, rule)
+
+    def _fit_leases(self) -> None:
+        """Wider leases where they ended soon, narrower ones where they lasted long."""
+        a_particle = self._clock[TAKEN] / len(self.state.mass)
+        if a_particle < _TOO_SHORT:
+            self._freedoms.width[:] *= 2.0
+        elif a_particle > _TOO_LONG:
+            self._freedoms.width[:] *= 0.5
+
+    def _in_parts(self, kernel: Any, *arguments: Any) -> None:
+        """Call a kernel for all particles, a part of them in each thread."""
+        n = len(self.state.mass)
+        threads = 1 if self._tier.is_plain else self._threads
+        ends = np.linspace(0, n, threads + 1).astype(int).tolist()
+        chosen = self._tier.kernel(kernel)
+        parts = [self._pool.submit(chosen, *arguments, *part) for part in zip(ends[:-1], ends[1:], strict=True)]
+        for part in parts:
+            part.result()
+
+    def _end_of(self, end: "Future[tuple[int, int]]", latest: float) -> tuple[int, int]:
+        while True:
+            try:
+                return end.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
+            except TimeoutError:
+                if time.monotonic() >= latest:
+                    self.halt()
+                    latest = math.inf
+
+    def _stalled(self, particle: int, before: float) -> str:
+        place = self.state.position[:, particle]
+        return (
+            f"the frame after {before:g} s failed at particle {particle}: {Status.STALLED.sentence}; it is at "
+            f"({', '.join(f'{x:.6g}' for x in place)}) m at {before + self._queue.time[particle]:.9g} s, between walls "
+            "of which some react"
+        )
+
+    def _calls(self, span: float) -> Any:
+        """Every kernel of a frame, with arguments of the types that it is called with."""
+        rule, part = Rule(span, self._halt), (0, 0)
+        moving = self._freedoms, self._queue, self._clock, rule
+        yield events.lease, (self._scenery, self._freedoms, self._clock)
+        yield events.predict, (self._scenery, *moving, *part)
+        yield events.take, (self._scenery, *moving)
+        yield events.arrive, (self._scenery, self._queue, rule, *part)
+        yield events.settle, (self._scenery, self._freedoms, span)
+        yield observables.observe, self._observing(chain_now(self._scene, self._scenery, self._freedoms))
+
+    # --- What is observed --------------------------------------------------------------------------------
+
+    def _observing(self, chain: Any) -> tuple[Any, ...]:
+        drawn = np.arange(len(self._partial))
+        return None, chain, self._gravity, self.state, drawn, observables.CHUNK, self._partial
+
+    def observe(self) -> None:
+        """Observe the start."""
+        self._observe(0.0)
+        self._start = self._balance()
+
+    def _observe(self, moment: float) -> None:
+        self._walls = observed(self._scene, self._freedoms, moment)
+        chain = chain_now(self._scene, self._scenery, self._freedoms)
+        self._tier.kernel(observables.observe)(*self._observing(chain))
+
+    def _balance(self) -> float:
+        """The energy of particles and walls, with what was lost and without the work of walls that are moved."""
+        seen = self._summary()
+        kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum()
+        return kept
+
+    def _summary(self) -> dict[str, Any]:
+        seen = observables.summary(self._partial, self.state, self._owners, lasts=False)
+        walls = self._walls
+        energy = walls.kinetic + walls.potential
+        return {
+            **seen,
+            "total_energy": seen["total_energy"] + float(energy.sum()),
+            "wall_energy": energy,
+            "wall_velocity": walls.velocity,
+            "wall_spin": walls.spin,
+            "wall_position": walls.position,
+            "wall_orientation": walls.orientation,
+        }
+
+    def seen(self) -> dict[str, Any]:
+        """The observables of the last frame."""
+        seen = self._summary()
+        kept = self._balance()
+        scale = seen["kinetic_energy"] + self._walls.kinetic.sum() + abs(seen["potential_energy"])
+        seen["energy_error"] = abs(kept - self._start) / scale if scale > 0.0 else 0.0
+        return {**seen, "escaped": self._escaped()}
+
+    def _escaped(self) -> int:
+        if self._far == math.inf:
+            return 0
+        return int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        """Raise a RunError where a state is not finite, or a particle outside its walls."""
+        still = self._scene.placed(seen["wall_position"], seen["wall_orientation"])
+        failures.require_admissible(still, self.state, seen, self._deepest, moment)
+
+    # --- Checkpoints -------------------------------------------------------------------------------------
+
+    def share_done(self, span: float) -> float:
+        """How much of a frame that was cut short is done."""
+        return float(self._clock[NOW] / span)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What `restore` needs to continue with the same bits, not copied."""
+        queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass")}
+        freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
+        return {**queue, **freedoms, "key": self._queue.heap.key, "clock": self._clock}
+
+    def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
+        """Take the state of the run that gave these `arrays`."""
+        self._start = math.nan
+        self._walls = observed(self._scene, self._freedoms, 0.0)
+        self._observe(0.0)
+        self._start = self._balance()
+        for name, array in self.arrays().items():
+            np.copyto(array, arrays[name], casting="no")
+        self._cut_short = cut_short

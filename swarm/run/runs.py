@@ -1,0 +1,19 @@
+"""The run of a task: one class for particles alone, one for bodies, one for walls that react."""
+
+from .bodies import BodyRun
+from .engine import Run
+from .options import Task
+from .reacting import ReactingRun
+
+AnyRun = Run | BodyRun | ReactingRun
+
+
+def run_of(task: Task) -> AnyRun:
+    """The state of a run at its start, and the threads that advance it."""
+    options = task.options
+    how = options.thread_count(), options.block_size, options.compile
+    if task.bodies is not None:
+        return BodyRun(task.scene, task.bodies, task.particles, task.method, *how)
+    if task.scene.reacts():
+        return ReactingRun(task.scene, task.particles, task.method, *how)
+    return Run(task.scene, task.particles, task.method, *how, options.seed)
