@@ -69,12 +69,12 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory", "Cylinder",
-    "Ellipsoid", "FileError", "Formula", "Frame", "Guide", "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid",
-    "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab",
-    "Sphere", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
-    "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "load", "place", "rigid", "simulate",
-    "tetrahedron",
+    "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory",
+    "Cylinder", "Ellipsoid", "FileError", "Formula", "Frame", "Guide", "Impact", "Midpoint", "Oscillation",
+    "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation",
+    "RunError", "Scene", "SceneError", "Slab", "Sphere", "Strain", "SwarmError", "Torus", "Trajectory",
+    "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell",
+    "elastic", "fill", "load", "place", "rigid", "simulate", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -287,10 +287,12 @@ class Placed(Given):
     Args:
         position: three numbers [m].
         orientation: a unit quaternion (w, x, y, z).
+        turn: its matrix, (3, 3).
     """
 
     position: Vector
     orientation: tuple[float, float, float, float]
+    turn: tuple[Vector, ...]
 
 
 WallMotion = Translation | Oscillation | Rotation | Path | Sum | Guide | Placed
@@ -333,8 +335,7 @@ def pose(motion: "WallMotion | None", time: float) -> Pose:
     found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
     for one in parts_of(motion):
         if isinstance(one, Placed):
-            w, *imaginary = one.orientation
-            found, quaternion, turn = np.array(one.position), one.orientation, _turned_to(w, np.array(imaginary))
+            found, quaternion, turn = np.array(one.position), one.orientation, np.array(one.turn)
         elif isinstance(one, Rotation):
             center, turn, half = np.array(one.center), _turned_by(one, one.rate * time), 0.5 * one.rate * time
             x, y, z = (math.sin(half) * unit_axis(one)).tolist()
@@ -428,12 +429,6 @@ def _turned_by(rotation: Rotation, angle: float) -> Floats:
     across = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
     versine = 2.0 * half * half
     return np.asarray((1.0 - versine) * np.eye(3) + versine * np.multiply.outer(k, k) + math.sin(angle) * across)
-
-
-def _turned_to(w: float, u: Floats) -> Floats:
-    """The matrix (3, 3) of a unit quaternion (w, u)."""
-    across = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    return np.asarray((w * w - (u**2).sum()) * np.eye(3) + 2.0 * np.multiply.outer(u, u) + 2.0 * w * across)
 
 
 def _product(matrix: Floats, rows: Floats) -> Floats:

@@ -15,6 +15,7 @@ from .contact.laws import Laws, Moves, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .surfaces import required
+from .surfaces import rotation as rotations
 from .surfaces.fold import Chain
 from .surfaces.moving import Carried, carried
 from .surfaces.surface import SIDES, Box, HalfSpace, Surface
@@ -101,7 +102,9 @@ class Scene:
         surfaces = list(self.surfaces)
         for i, surface in enumerate(surfaces):
             if surface.reacts():
-                held = motions.Placed(tuple(np.array(positions)[i].tolist()), tuple(np.array(orientations)[i].tolist()))
+                turn = tuple(np.array(orientations)[i].tolist())
+                rows = tuple(map(tuple, rotations.matrix(turn).tolist()))
+                held = motions.Placed(tuple(np.array(positions)[i].tolist()), turn, rows)
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity)
 

@@ -13,7 +13,7 @@ from ..surfaces import required
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 # The laws of a surface, and their values where there is none.
-_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "motion": None}
+_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "motion": None, "mass": None, "inertia": None}
 
 
 @dataclass(frozen=True)

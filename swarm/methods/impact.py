@@ -87,6 +87,8 @@ class Impact(base.Method):
                 f"contact_step must be 0 where a surface has a restitution below 1, friction, a temperature or a "
                 f"motion, got {self.contact_step:g}: the contact step conserves the energy"
             )
+        if scene.reacts():
+            _require_reacting(scene)
         for i, surface in enumerate(scene.surfaces):
             if safe.lacks_bend(surface):
                 raise SceneError(
@@ -116,6 +118,27 @@ class Impact(base.Method):
 
     def may_slide(self) -> bool:
         return True
+
+
+def _require_reacting(scene: Scene) -> None:
+    """Raise a `SceneError` where a law of a wall is none for scenes in which impacts move walls."""
+    for i, surface in enumerate(scene.surfaces):
+        if surface.temperature is not None:
+            raise SceneError(
+                f"surfaces[{i}].temperature must be None where a wall has a mass, got {surface.temperature:g}; heat "
+                "the particles at the start, or give the wall a motion instead of a mass"
+            )
+        if surface.friction > 0.0 and surface.reacts():
+            raise SceneError(
+                f"surfaces[{i}].friction must be 0 of a wall with a mass, which is pushed along its normals, got "
+                f"{surface.friction:g}"
+            )
+        if surface.restitution < 1.0 and scene.gravity is not None:
+            raise SceneError(
+                f"surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got "
+                f"{surface.restitution:g}: particles would come to rest on walls that move with them; leave gravity "
+                "out, or give the wall a motion instead of a mass"
+            )
 
 
 class Lasting(NamedTuple):

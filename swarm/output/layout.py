@@ -118,6 +118,7 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
     later: dict[str, tuple[int, ...]] = {**dict.fromkeys(_LATER, (n,)), "wall_heat": (n, surfaces)}
     later |= {"wall_work": (n, surfaces), "wall_position": (n, surfaces, 3), "wall_orientation": (n, surfaces, 4)}
+    later |= {"wall_energy": (n, surfaces), "wall_velocity": (n, surfaces, 3), "wall_spin": (n, surfaces, 3)}
     shapes |= {name: shape for name, shape in later.items() if name in seen}
     for name, shape in shapes.items():
         if name not in seen or seen[name].shape != shape:

@@ -26,7 +26,8 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     trajectory.require_frames()
     scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observed()
     end = trajectory.frame(-1)
-    shapes = shapes_of(scene, end.position, float(times[-1]))
+    still = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1]) if scene.reacts() else scene
+    shapes = shapes_of(still, end.position, float(times[-1]))
     picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
     left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
 

@@ -29,6 +29,7 @@ from ..methods import Method
 from ..motion import pose
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.rotation import matrix
 from . import colours, paths, series, viewer
 from .drawn import Drawn
 from .shapes import Shape, shapes_of
@@ -205,7 +206,9 @@ class RecordingWriter:
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
-            self._send_walls(numbers, times)
+            if self._scene.moves():
+                walls = [(seen["wall_position"], seen["wall_orientation"]) for *_, seen in chosen]
+                self._send_walls(numbers, times, walls)
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
             # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
@@ -233,15 +236,15 @@ class RecordingWriter:
             columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
             self._send(_MESH, numbers, times, columns.partition([n] * frames))
 
-    def _send_walls(self, numbers: Any, times: Any) -> None:
-        """Send where the walls that move are, from where they were drawn: at the start."""
-        for shape, surface in zip(self._shapes, self._scene.surfaces, strict=True):
-            if surface.motion is not None:
+    def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
+        """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
+        for i, (shape, surface) in enumerate(zip(self._shapes, self._scene.surfaces, strict=True)):
+            if surface.motion is not None or surface.reacts():
                 first = pose(surface.motion, 0.0)
-                found = [pose(surface.motion, moment) for moment in times]
                 # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
-                turns = [one.turn @ first.turn.T for one in found]
-                ways = [one.position() - turn @ first.position() for one, turn in zip(found, turns, strict=True)]
+                turns = [matrix(tuple(orientation[i])) @ first.turn.T for _position, orientation in walls]
+                places = [position[i] for position, _orientation in walls]
+                ways = [place - turn @ first.position() for place, turn in zip(places, turns, strict=True)]
                 columns = rr.Transform3D.columns(translation=np.array(ways), mat3x3=np.array(turns))
                 self._send(_path(shape), numbers, times, columns)
 

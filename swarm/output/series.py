@@ -75,10 +75,19 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
             lines.append(Line(f"/{group}/{shape.name}", shape.name, _rate("impulse", area, i)))
     if method.is_rigid():
         lines.append(Line("/sliding", every, _of("sliding")))
-    for i, shape in enumerate(shapes):
-        if scene.surfaces[i].temperature is not None:
+    lines += _lines_of_walls(scene, shapes)
+    return lines
+
+
+def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
+    """Of surfaces that give heat, do work, or are moved."""
+    lines = []
+    for i, (shape, surface) in enumerate(zip(shapes, scene.surfaces, strict=True)):
+        if surface.temperature is not None:
             lines.append(Line(f"/heat/{shape.name}", shape.name, _rate("wall_heat", 1.0, i)))
-        if scene.surfaces[i].motion is not None:
+        if surface.reacts():
+            lines.append(Line(f"/energy/{shape.name}", f"energy of {shape.name}", _of_surface("wall_energy", i)))
+        elif surface.motion is not None:
             lines.append(Line(f"/energy/work_{shape.name}", f"work of {shape.name}", _of_surface("wall_work", i)))
     return lines
 

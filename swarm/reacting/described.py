@@ -12,7 +12,7 @@ from ..scene import Scene
 from ..surfaces.fold import Chain
 from ..surfaces.moving import at
 from ..surfaces.surface import Surface
-from .freedoms import Freedoms, Free, Guided, Hinged, Sprung, posed
+from .freedoms import Free, Freedoms, Guided, Hinged, Sprung, posed
 from .queue import Scenery
 from .walls import Reacting
 
@@ -116,7 +116,7 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
             found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
             stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
             found.potential[i] = 0.5 * stiffness * (shift**2).sum() - surface.mass * (gravity * shift).sum()
-        else:
+        elif surface.inertia is not None:
             rate = freedoms.rate[row]
             turned = pose(Rotation(motion.axis, freedoms.angle[row], motion.center), 1.0)
             found.position[i], found.orientation[i] = turned.position(), turned.quaternion

@@ -250,6 +250,29 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
     return kept
 
 
+@inlined
+def _carry_out(scenery, freedoms, queue, i, now, end):
+    """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
+    _fly(scenery, queue, i, now)
+    if queue.struck[i] >= 0.0:
+        _strike(scenery, freedoms, queue, i, now)
+    elif queue.wall[i] >= 0.0:
+        _bounce(scenery, queue, i, queue.wall[i], end - now)
+    _aim(scenery, queue, i, end)
+    queue.hits[i] += 1
+    return queue.hits[i] <= MOST_HITS
+
+
+@inlined
+def _listed(queue):
+    """List those that are near; how many there are."""
+    close = 0
+    for k in range(queue.near.size):
+        queue.listed[index(k)] = False
+        close = _list(queue, close, index(k))
+    return close
+
+
 @kernel
 def take(scenery, freedoms, queue, clock, rule):
     """Take event after event until the end of the frame: (status, particle).
@@ -257,37 +280,23 @@ def take(scenery, freedoms, queue, clock, rule):
     LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. INTERRUPTED after so many
     events as the rule says; it goes on with the same bits.
     """
-    heap, end, taken, close = queue.heap, rule.end, 0, 0
+    heap, end, taken = queue.heap, rule.end, 0
     build(heap)
-    for k in range(queue.near.size):
-        queue.listed[index(k)] = False
-        close = _list(queue, close, index(k))
-    until = _until(freedoms)
+    close, until = _listed(queue), _until(freedoms)
     while True:
         item = heap.item[0]
         i = index(item)
         now = heap.key[i]
-        if until < end and until <= now:
-            clock[NOW] = until
-            return Status.LEASE_ENDED.value, 0
-        if not now < end:
-            clock[NOW] = end
-            return Status.DONE.value, 0
+        if not now < min(until, end):
+            clock[NOW] = min(until, end)
+            return (Status.LEASE_ENDED.value if until < end else Status.DONE.value), 0
         if taken >= rule.halt[0]:
             return Status.INTERRUPTED.value, 0
         taken += 1
         clock[NOW], clock[TAKEN] = now, clock[TAKEN] + 1.0
         wall = queue.struck[i]
-        if wall >= 0.0 or queue.due[i] <= now:
-            _fly(scenery, queue, i, now)
-            queue.hits[i] += 1
-            if queue.hits[i] > MOST_HITS:
-                return Status.STALLED.value, item
-            if wall >= 0.0:
-                _strike(scenery, freedoms, queue, i, now)
-            elif queue.wall[i] >= 0.0:
-                _bounce(scenery, queue, i, queue.wall[i], end - now)
-            _aim(scenery, queue, i, end)
+        if (wall >= 0.0 or queue.due[i] <= now) and not _carry_out(scenery, freedoms, queue, i, now, end):
+            return Status.STALLED.value, item
         if wall >= 0.0:
             clock[STRIKES] += 1.0
             if not all_stay(scenery.reacting, wall, freedoms):

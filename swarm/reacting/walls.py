@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from ..kernel.jit import by_type, select
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces import contract, flights
-from ..surfaces.flights import NEVER, Hit, sooner
+from ..surfaces.flights import NEVER, sooner
 from ..surfaces.fold import Chain
 from .freedoms import arm_of, mobility, posed, push, renew, stays
 from .reach import reach

@@ -61,6 +61,11 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
                 f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
                 "anchors, in the frame of the wall"
             )
+        if surface.reacts():
+            raise SceneError(
+                f"surfaces[{i}] must have no mass and no inertia with bodies, got {surface}; make it a body, whose "
+                "cavities= are walls that it carries"
+            )
     if options.frames not in ("all", "none"):
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'

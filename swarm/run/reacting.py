@@ -1,5 +1,6 @@
 """The state of a run with walls that react; what `engine.Run` is for particles that are independent of one another."""
 
+import itertools
 import math
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -98,8 +99,8 @@ class ReactingRun:
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._predict(rule)
-        taking = self._scenery, self._freedoms, self._queue, self._clock, rule
-        status, particle = Status.LEASE_ENDED, 0
+        taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
+        status, particle = int(Status.LEASE_ENDED), 0
         while status == Status.LEASE_ENDED:
             status, particle = self._end_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest)
             if status == Status.LEASE_ENDED:
@@ -126,11 +127,12 @@ class ReactingRun:
 
     def _fit_leases(self) -> None:
         """Wider leases where they ended soon, narrower ones where they lasted long."""
+        width: Any = self._freedoms.width
         a_particle = self._clock[TAKEN] / len(self.state.mass)
         if a_particle < _TOO_SHORT:
-            self._freedoms.width[:] *= 2.0
+            width *= 2.0
         elif a_particle > _TOO_LONG:
-            self._freedoms.width[:] *= 0.5
+            width *= 0.5
 
     def _in_parts(self, kernel: Any, *arguments: Any) -> None:
         """Call a kernel for all particles, a part of them in each thread."""
@@ -138,7 +140,7 @@ class ReactingRun:
         threads = 1 if self._tier.is_plain else self._threads
         ends = np.linspace(0, n, threads + 1).astype(int).tolist()
         chosen = self._tier.kernel(kernel)
-        parts = [self._pool.submit(chosen, *arguments, *part) for part in zip(ends[:-1], ends[1:], strict=True)]
+        parts = [self._pool.submit(chosen, *arguments, *part) for part in itertools.pairwise(ends)]
         for part in parts:
             part.result()
 

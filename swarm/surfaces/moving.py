@@ -152,7 +152,8 @@ def _walls_of(surface: Surface, moment: float) -> list[Any]:
 
 def drive_of(surface: Surface, moment: float) -> Drive:
     """The motion of a surface in the frame that ends at a moment [s]."""
-    parts = motions.parts_of(surface.motion)
+    # A guide says how impacts move a wall, which is at rest before.
+    parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
     velocity, swings, track, turn, spin, center = np.zeros(3), None, None, None, None, ZERO
     fastest = hardest = jerk = 0.0
     pace = math.inf
