@@ -524,7 +524,7 @@ LAYERS = [
     ["bodies"],
     ["tables", "filling"],
     ["observables", "history"],
-    ["lanes"],
+    ["lanes", "reacting"],
     ["methods"],
     ["scene", "particles"],
     ["contact"],

@@ -82,10 +82,3 @@ def change(heap, item, key):
     heap.key[index(item)] = key
     rise(heap, heap.place[index(item)])
     sink(heap, heap.place[index(item)])
-
-
-@inlined
-def second_key(heap):
-    """The key of the item that comes after the first; infinite where there is none."""
-    child = _least_child(heap, 0)
-    return select(child < 0, float("inf"), heap.key[index(heap.item[index(max(child, 0))])])
