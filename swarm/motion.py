@@ -259,6 +259,7 @@ class Guide(Given):
     Raises:
         SceneError: an argument is out of its range.
 
+    >>> import swarm
     >>> piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=10.0, motion=Guide(axis=(0.0, 0.0, 1.0), stiffness=40.0))
     >>> piston.motion.speed
     0.0
