@@ -163,7 +163,7 @@ def _pass(method, chain, gravity, share, lanes, live):
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
     some_arrived, some_hard = False, False
-    for i in range(live):
+    for i in range(index(live)):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
         contact = methods.contact(method, at(chain, lane.left), gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
@@ -180,7 +180,7 @@ def _go(chain, gravity, method, lanes, live):
 @_go.register(Marched)
 def _(chain, gravity, method, lanes, live):
     rows = lanes.rows
-    for i in range(live):
+    for i in range(index(live)):
         hit = safe.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
         _flight(method, chain, gravity, lanes, i, hit)
 
@@ -200,7 +200,7 @@ def _fly(gravity, method, chain, lanes, live):
 @_fly.register(Nothing)
 def _(gravity, method, chain, lanes, live):
     rows = lanes.rows
-    for i in range(live):
+    for i in range(index(live)):
         hit = flights.NEVER
         if methods.lands(method):
             now = at(chain, rows[LEFT, i])
@@ -212,7 +212,7 @@ def _(gravity, method, chain, lanes, live):
 def _(gravity, method, chain, lanes, live):
     if methods.lands(method):
         _fall(chain, gravity, lanes, live)
-    for i in range(live):
+    for i in range(index(live)):
         hit = flights.NEVER
         if methods.lands(method):
             hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
@@ -223,14 +223,14 @@ def _(gravity, method, chain, lanes, live):
 def _fall(chain, gravity, lanes, live):
     """The course of every lane to its first hit, by safe steps."""
     rows, course, marked = lanes.rows, lanes.course, lanes.marked
-    for i in range(live):
+    for i in range(index(live)):
         now = at(chain, rows[LEFT, i])
         flights.begin_fall(now, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
     for _step in range(SAFE_STEPS):
-        for i in range(live):
+        for i in range(index(live)):
             flights.step_fall(at(chain, rows[LEFT, i]), course, 0, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
-    for i in range(live):
+    for i in range(index(live)):
         marked[i] = _needs_more(chain, lanes, i)
     for k in range(_marked(lanes, live)):
         lane = lanes.order[k]
@@ -255,7 +255,7 @@ def _exchange_heat(thermal, method, chain, gravity, share, lanes, live):
 @_exchange_heat.register(walls.Chain)
 def _(thermal, method, chain, gravity, share, lanes, live):
     rows, state = lanes.rows, share.state
-    for i in range(live):
+    for i in range(index(live)):
         wall, p = lanes.wall[i], index(lanes.particle[i])
         if wall >= 0.0:
             r, v = column(rows, R, i), column(rows, V, i)
