@@ -16,7 +16,7 @@ from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from ..surfaces import contract
 from ..surfaces import fold as walls
-from ..surfaces.moving import rising, straight_hit
+from ..surfaces.posed import rising, straight_hit
 from . import laws as wall_laws
 from .hold import Two, along, is_held_by, mean_drift, presses, split_at
 from .reflection import relative, wall_velocity

@@ -17,25 +17,11 @@ from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, total
 from ..motion import Guide
 from . import contract
 from .course import rise_time
+from .drive import Drive, Turn, drive_of, pose
 from .flights import NEVER, Hit, hit, sooner
 from .fold import Chain
-from .moving import (
-    Drifting,
-    Drive,
-    Following,
-    Marched,
-    Moving,
-    Posed,
-    Translated,
-    Turn,
-    arm_length,
-    at,
-    drive_of,
-    frame_pull,
-    in_frame,
-    own_place,
-    pose,
-)
+from .moving import Following, Marched, Moving, Translated, at
+from .posed import Drifting, Posed, arm_length, frame_pull, in_frame, own_place
 from .rotation import Rotated
 from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
