@@ -16,10 +16,10 @@ from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outl
 from ..kernel.vector import column, put, square
 from ..methods import contract as methods
 from ..status import Status
-from ..surfaces import flights, safe
+from ..surfaces import flights, safe, strides
 from ..surfaces import fold as walls
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.moving import Carried, Marched, at
+from ..surfaces.moving import Carried, Marched, Strided, at
 from .arrays import (
     EIGHT,
     HITS,
@@ -47,6 +47,8 @@ from .solve import solution, solve
 MOST_HITS = 1e8
 # After so many passes all lanes are looked at for that.
 _LOOK = 4096
+# Safe steps to walls in any motion that all lanes take in a pass after the first.
+STRIDES = 3
 # Passes of a call of `advance_block` that is never halted.
 NEVER = 2**63 - 1
 
@@ -183,6 +185,20 @@ def _(chain, gravity, method, lanes, live):
     for i in range(index(live)):
         hit = safe.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
         _flight(method, chain, gravity, lanes, i, hit)
+
+
+@_go.register(Strided)
+def _(chain, gravity, method, lanes, live):
+    rows, course = lanes.rows, lanes.course
+    for i in range(index(live)):
+        strides.begin(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
+    for i in range(index(live)):
+        strides.stride(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i], True)
+    for _stride in range(STRIDES):
+        for i in range(index(live)):
+            strides.stride(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i], False)
+    for i in range(index(live)):
+        _flight(method, chain, gravity, lanes, i, strides.end(course, i))
 
 
 @by_type

@@ -10,8 +10,9 @@ from typing import NamedTuple
 from ..kernel.jit import Array, by_type, index, inlined, select
 from ..kernel.vector import ZERO, Vec, column, cross, dot, norm, put, square
 from ..surfaces import contract
+from ..surfaces.drive import Drive, Pose, Rows, Swing, Turn, pose
 from ..surfaces.fold import Chain
-from ..surfaces.moving import Drive, Pose, Posed, Rows, Swing, Turn, pose
+from ..surfaces.posed import Posed
 
 
 class Freedoms(NamedTuple):

@@ -245,6 +245,12 @@ def clearance(surface, r):
 
 
 @by_type
+def has_levels(surface):
+    """Whether the third derivative of the level along a flight has a bound that rising.py knows."""
+    return False
+
+
+@by_type
 def passed(surface, r, v):
     """Whether a straight flight surely never meets the surface again."""
     return False

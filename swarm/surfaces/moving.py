@@ -7,7 +7,7 @@ without motion has none of this around its walls and pays nothing.
 from typing import Any, NamedTuple
 
 from ..kernel.jit import by_type
-from . import stroke  # noqa: F401
+from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of, pose
 from .fold import Chain, length
 from .posed import Drifting, Posed
@@ -41,6 +41,10 @@ class Marched(Carried):
     """The same where others move in any other way: flights to these end by safe steps."""
 
 
+class Strided(Marched):
+    """The same where all of these steps are taken in lanes: see strides.py."""
+
+
 length.register(Carried, lambda chain: length(chain.walls))
 
 # --- From a description ----------------------------------------------------------------------------------
@@ -48,13 +52,21 @@ length.register(Carried, lambda chain: length(chain.walls))
 
 def carried(surfaces: tuple[Surface, ...], moment: float) -> Chain | Carried | None:
     """The walls of a scene in the frame that ends at a moment [s]."""
-    made = [wall for surface in surfaces for wall in _walls_of(surface, moment)]
+    of_surfaces = [_walls_of(surface, moment) for surface in surfaces]
     chain = None
-    for wall in reversed(made):
+    for wall in reversed([wall for walls in of_surfaces for wall in walls]):
         chain = Chain(wall, chain)
     if chain is None or all(surface.motion is None for surface in surfaces):
         return chain
-    return Marched(chain) if any(type(wall) is Moving for wall in made) else Carried(chain)
+    marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]
+    if not marched:
+        return Carried(chain)
+    return (Strided if all(map(_may_stride, marched)) else Marched)(chain)
+
+
+def _may_stride(walls: list[Any]) -> bool:
+    """Whether lanes can take the safe steps of the walls of a surface; of a spline each would look for its piece."""
+    return walls[0].drive.track is None and all(contract.has_levels(wall.body) for wall in walls)
 
 
 def _walls_of(surface: Surface, moment: float) -> list[Any]:
