@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
+from examples import heavy_piston
 from swarm.run.admission import task_of
 from swarm.run.options import RunOptions
 from swarm.run.runs import run_of
@@ -235,6 +236,15 @@ def test_a_light_piston_takes_its_share():
     assert abs(mean - energy / (count + 1)) <= 3.0 * error
     assert error <= 0.05 * mean
     assert result.observables["energy_error"].max() <= 1e-13
+
+
+def test_a_hot_gas_warms_a_cold_one_through_a_heavy_piston():
+    """examples/heavy_piston.py with few particles: equal mean energies at the end, within 3 standard errors."""
+    found = heavy_piston.run(count=300, mass=10.0, until=1000.0)
+    difference, error = heavy_piston.late_difference(found)
+    assert found.above[0] > 2.0 * found.below[0]
+    assert abs(difference) <= 3.0 * error <= 0.1 * found.above[0]
+    assert found.balance <= 1e-14
 
 
 # --- The same bits ---------------------------------------------------------------------------------------
