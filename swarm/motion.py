@@ -400,9 +400,7 @@ def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: fl
     """Raise a `SceneError` where a wall with this mass or inertia has a motion that is none for it."""
     if isinstance(motion, Guide) and mass is None:
         raise SceneError("mass must go with a Guide, along which impacts move the wall, got None; give mass= [kg]")
-    if mass is not None and inertia is not None:
-        raise SceneError(f"inertia must be None where a mass is given, got {inertia:g}: a wall moves, or it turns")
-    if mass is not None and not (motion is None or isinstance(motion, Translation | Guide)):
+    if mass is not None and inertia is None and not (motion is None or isinstance(motion, Translation | Guide)):
         raise SceneError(
             f"motion must be None, a Translation or a Guide where a mass is given, got {motion}; a wall on a spring is "
             "a Guide with a stiffness, one that turns has an inertia"

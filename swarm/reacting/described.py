@@ -13,6 +13,7 @@ from ..surfaces.fold import Chain
 from ..surfaces.moving import at
 from ..surfaces.surface import Surface
 from .freedoms import Free, Freedoms, Guided, Hinged, Sprung, posed
+from .pendulum import TERMS, Pendulum, expand
 from .queue import Scenery
 from .walls import Reacting
 
@@ -49,10 +50,10 @@ def _reacting(scene: Scene) -> Chain | None:
     return chain
 
 
-def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Free | Guided | Sprung | Hinged:
+def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Any:
     motion = surface.motion
     if surface.inertia is not None:
-        return Hinged(row, 1.0 / surface.inertia, _vector(unit_axis(motion)), vec(motion.center))
+        return _turning(surface, row, np.array(gravity))
     assert surface.mass is not None
     lightness = 1.0 / surface.mass
     if not isinstance(motion, Guide):
@@ -62,6 +63,21 @@ def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) ->
     if motion.stiffness > 0.0:
         return Sprung(row, lightness, pull, _vector(axis), math.sqrt(motion.stiffness * lightness))
     return Guided(row, lightness, pull, _vector(axis))
+
+
+def _turning(surface: Surface, row: int, gravity: Floats) -> Hinged | Pendulum:
+    """The freedom of a wall on an axis: its weight is at its centre."""
+    motion, lightness = surface.motion, 1.0 / (surface.inertia or 1.0)
+    k, pivot = unit_axis(motion), np.array(motion.center)
+    if surface.mass is not None:
+        arm = np.array(surface.center) - pivot  # type: ignore[attr-defined]
+        arm = arm - (arm * k).sum() * k
+        # The torque k.(A l x M G) = M (k.(l x G) cos theta - l.G sin theta), over the inertia
+        sine, cosine = ((k * np.cross(arm, gravity)).sum(), (arm * gravity).sum())
+        stiffness = surface.mass * lightness * math.hypot(sine, cosine)
+        if stiffness > 0.0:
+            return Pendulum(row, lightness, _vector(k), _vector(pivot), stiffness, math.atan2(sine, cosine))
+    return Hinged(row, lightness, _vector(k), _vector(pivot))
 
 
 def _vector(values: Floats) -> Vec:
@@ -84,7 +100,14 @@ def freedoms_of(scene: Scene, width: float) -> Freedoms:
             rate[k] = motion.rate
         size = surface.size() if math.isfinite(surface.size()) else scene.finite_size()
         widths[k] = width if surface.inertia is None else width / size
-    return Freedoms(shift, velocity, rest, angle, rate, rate_rest, time, middle, turning, widths, until)
+    series = np.zeros((3 * TERMS, count))
+    made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
+    wall = _reacting(scene)
+    while wall is not None:
+        if isinstance(wall.first.freedom, Pendulum):
+            expand(wall.first.freedom, made)
+        wall = wall.rest
+    return made
 
 
 class Observed(NamedTuple):
@@ -111,7 +134,7 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
             continue
         motion, shift, v = surface.motion, freedoms.shift[:, row], freedoms.velocity[:, row]
         found.position[i], found.orientation[i] = shift, (1.0, 0.0, 0.0, 0.0)
-        if surface.mass is not None:
+        if surface.mass is not None and surface.inertia is None:
             found.velocity[i] = v
             found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
             stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
@@ -121,6 +144,10 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
             turned = pose(Rotation(motion.axis, freedoms.angle[row], motion.center), 1.0)
             found.position[i], found.orientation[i] = turned.position(), turned.quaternion
             found.spin[i], found.kinetic[i] = rate * unit_axis(motion), 0.5 * surface.inertia * rate**2
+            if surface.mass is not None:
+                center = np.array(surface.center)  # type: ignore[attr-defined]
+                fallen = turned.placed(center[:, None])[:, 0] - center
+                found.potential[i] = -surface.mass * (gravity * fallen).sum()
         row += 1
     return found
 

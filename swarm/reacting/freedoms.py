@@ -24,6 +24,7 @@ class Freedoms(NamedTuple):
     angle: Array  # (K,) [rad]
     rate: Array  # (K,) [rad/s]
     rate_rest: Array  # (K,)
+    series: Array  # (.., K) of pendulums, the Taylor coefficients of the angle from that time on
     time: Array  # (K,) since the start of the frame [s]
     middle: Array  # (3, K) of the velocities of its lease
     turning: Array  # (K,) of the rates of its lease
@@ -114,17 +115,19 @@ def _(freedom, walls, t):
 def _(freedom, walls, t):
     k = index(freedom.row)
     angle = walls.angle[k] + walls.rate[k] * (t - walls.time[k])
-    a, c, s = freedom.axis, math.cos(angle), math.sin(angle)
-    # Rodrigues: A = c + (1 - c) a a^T + s [a]
+    return Pose(ZERO, ZERO, ZERO, rows_about(freedom.axis, angle))
+
+
+@inlined
+def rows_about(axis, angle):
+    """The rows of the rotation about an axis by an angle (Rodrigues)."""
+    a, c, s = axis, math.cos(angle), math.sin(angle)
     b = 1.0 - c
-    return Pose(
-        ZERO, ZERO, ZERO,
-        Rows(
-            Vec(c + b * a.x * a.x, b * a.x * a.y - s * a.z, b * a.x * a.z + s * a.y),
-            Vec(b * a.y * a.x + s * a.z, c + b * a.y * a.y, b * a.y * a.z - s * a.x),
-            Vec(b * a.z * a.x - s * a.y, b * a.z * a.y + s * a.x, c + b * a.z * a.z),
-        ),
-    )  # fmt: skip
+    return Rows(
+        Vec(c + b * a.x * a.x, b * a.x * a.y - s * a.z, b * a.x * a.z + s * a.y),
+        Vec(b * a.y * a.x + s * a.z, c + b * a.y * a.y, b * a.y * a.z - s * a.x),
+        Vec(b * a.z * a.x - s * a.y, b * a.z * a.y + s * a.x, c + b * a.z * a.z),
+    )
 
 
 @by_type

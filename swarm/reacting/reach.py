@@ -17,6 +17,7 @@ from ..surfaces.shapes.rotated import own as rotated_own
 from ..surfaces.shapes.slab import SlabNumbers, along
 from ..surfaces.shapes.sphere import SphereNumbers
 from .freedoms import Hinged, arm_of, axis_of, pose_of
+from .pendulum import Pendulum
 
 # Trials of a time for which the fall is bounded.
 _TRIALS = 3
@@ -45,6 +46,7 @@ def reach(freedom, body, walls, flight):
 
 
 @reach.register(Hinged)
+@reach.register(Pendulum)
 def _(freedom, body, walls, flight):
     # No point of the wall within the arm and the clearance is faster than the rate says.
     k = index(freedom.row)

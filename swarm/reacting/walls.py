@@ -3,12 +3,14 @@
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, select
+from ..kernel.jit import by_type, index, select
 from ..kernel.vector import ZERO, Vec, dot, square
-from ..surfaces import contract, flights
+from ..surfaces import contract, flights, safe
 from ..surfaces.flights import NEVER, sooner
 from ..surfaces.fold import Chain
+from ..surfaces.relative import flight_of
 from .freedoms import arm_of, mobility, posed, push, renew, stays
+from .pendulum import Pendulum, swaying
 from .reach import reach
 
 
@@ -62,9 +64,23 @@ def first_hit(chain, gravity, walls, flight, end):
 
 @first_hit.register(Chain)
 def _(chain, gravity, walls, flight, end):
-    wall = posed(chain.first.freedom, chain.first.body, walls, flight.time, end)
-    time, found = flights.hit(gravity, wall, flight.r, flight.v)
+    time, found = _hit(chain.first.freedom, chain.first.body, gravity, walls, flight, end)
     return sooner(time, found, first_hit(chain.rest, gravity, walls, flight, end))
+
+
+@by_type
+def _hit(freedom, body, gravity, walls, flight, end):
+    """When a flight meets one wall: (time, whether it does then)."""
+    return flights.hit(gravity, posed(freedom, body, walls, flight.time, end), flight.r, flight.v)
+
+
+@_hit.register(Pendulum)
+def _(freedom, body, gravity, walls, flight, end):
+    # What comes after the lease is asked again then.
+    longest = min(flight.longest, max(walls.until[index(freedom.row)] - flight.time, 0.0))
+    wall = swaying(freedom, body, walls, flight, longest)
+    found = safe.march(Chain(wall, None), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    return found.time, found.wall >= 0.0
 
 
 @by_type

@@ -82,7 +82,7 @@ def _(mine, wall, number, rest, longest):
 
 
 @outlined
-def _march(chain, flight, longest):
+def march(chain, flight, longest):
     """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
     t, before = 0.0, 0.0
     for i in range(_MARCH):
@@ -121,7 +121,7 @@ def lacks_bend(surface: Surface) -> bool:
 
 
 def _needs_steps(surface: Surface) -> bool:
-    if surface.mass is not None:
+    if surface.mass is not None and surface.inertia is None:
         return isinstance(surface.motion, Guide) and surface.motion.stiffness > 0.0
     if surface.motion is None:
         return False
@@ -149,7 +149,7 @@ def first_hit(chain, gravity, r, v, left):
 def _(chain, gravity, r, v, left):
     found = closed_hit(at(chain, left), gravity, r, v)
     longest = select(found.time < left, found.time, left)
-    met = _march(chain.walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
+    met = march(chain.walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
     return found
@@ -180,7 +180,7 @@ _closed.register(Drifting, lambda surface, gravity, r, v: hit(gravity, surface, 
 @outlined
 def _alone(surface, r, v, pull):
     """When a flight leaves the admissible side of this wall: (time, whether it does then)."""
-    found = _march(Chain(Moving(surface.body, surface.drive), None), flight_of(r, v, pull, surface.left), surface.left)
+    found = march(Chain(Moving(surface.body, surface.drive), None), flight_of(r, v, pull, surface.left), surface.left)
     return found.time, found.wall >= 0.0
 
 

@@ -40,7 +40,7 @@ class Surface:
         mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
             `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the start.
         inertia: of a wall that impacts turn about the axis of its `Rotation`, with that rate at the start [kg m^2],
-            above 0. Its centre of mass is on the axis.
+            above 0. With a mass as well it is a pendulum, whose weight is at its `center`; without, on the axis.
     """
 
     rotation: Any = field(default=None, kw_only=True)
@@ -75,6 +75,11 @@ class Surface:
                 magnitude(name, checked)
                 object.__setattr__(self, name, checked)
         motions.require_freedom(self.motion, self.mass, self.inertia)
+        if self.mass is not None and self.inertia is not None and not hasattr(self, "center"):
+            raise SceneError(
+                f"mass must be None where an inertia is given to a {type(self).__name__}, which has no center that its "
+                f"weight could be at, got {self.mass:g}"
+            )
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""

@@ -6,6 +6,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import swarm
 from examples import heavy_piston
@@ -20,6 +21,11 @@ SHAFT = swarm.Box((0.5, 0.5, 2.0), center=(0.0, 0.0, 2.0), open=("+z",))
 
 def piston(mass, **guide):
     return swarm.Plane(UP, 1.0, mass=mass, motion=swarm.Guide(UP, **guide))
+
+
+def bob(rate):
+    hinge = swarm.Rotation((0.0, 1.0, 0.0), rate=rate, center=(0.0, 0.0, 0.3))
+    return swarm.Sphere(0.15, center=(0.3, 0.0, 0.1), side="outside", mass=2.0, inertia=0.4, motion=hinge)
 
 
 SCENES = {
@@ -43,6 +49,7 @@ SCENES = {
         ],
         g,
     ),
+    "pendulum": lambda g: swarm.Scene([swarm.Box((0.6, 0.6, 0.6)), bob(0.5)], DOWN),
     "two pistons": lambda g: swarm.Scene(
         [swarm.Box((0.5, 0.5, 2.0)), piston(8.0), swarm.Plane((0.0, 0.0, -1.0), 1.0, mass=3.0, motion=swarm.Guide(UP))],
         None,
@@ -121,6 +128,23 @@ def test_nothing_strikes():
     assert seen["wall_spin"][-1, 1] == pytest.approx((0.0, 0.0, 2.0))
     seen = walls(swarm.Sphere(9.0, mass=1.0, motion=swarm.Translation((0.1, 0.0, 0.0))), DOWN)
     assert np.abs(seen["wall_position"][:, 1, 2] + 0.5 * times**2).max() <= 1e-14
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.5, 30.0])
+def test_a_pendulum_that_nothing_strikes(rate):
+    """Against DOP853, from small vibrations to one that goes round and round."""
+    scene = swarm.Scene([swarm.Box((5.0, 5.0, 5.0)), bob(rate)], (0.0, 0.0, -9.81))
+    seen = run(scene, swarm.Particles([4.0, 4.0, 4.0], [0.0, 0.0, 0.0]), 0.8, frames=4).observables
+    arm, axis, weight = np.array([0.3, 0.0, -0.2]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -2.0 * 9.81])
+
+    def slope(_t, y):
+        turned = arm * np.cos(y[0]) + np.sin(y[0]) * np.cross(axis, arm)
+        return [y[1], axis @ np.cross(turned, weight) / 0.4]
+
+    path = solve_ivp(slope, (0.0, 0.8), [0.0, rate], method="DOP853", rtol=1e-13, atol=1e-13, t_eval=seen["time"])
+    assert np.abs(seen["wall_spin"][:, 1, 1] - path.y[1]).max() <= 1e-11 * max(1.0, rate)
+    assert np.abs(seen["wall_orientation"][:, 1, 2] - np.sin(0.5 * path.y[0])).max() <= 1e-11
+    assert seen["energy_error"].max() <= 1e-14
 
 
 def test_one_dimension_against_a_plain_event_loop():
@@ -298,6 +322,10 @@ WRONG = [
     (lambda: swarm.Sphere(0.5, mass=math.inf), "mass must be a finite number"),
     (lambda: swarm.Sphere(0.5, mass=1.0, motion=swarm.Oscillation((1.0, 0.0, 0.0), 1.0)), "a Guide with a stiffness"),
     (lambda: swarm.Sphere(0.5, inertia=1.0), "motion must be a Rotation where an inertia is given, got None"),
+    (
+        lambda: swarm.Plane(UP, mass=1.0, inertia=1.0, motion=swarm.Rotation((1.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))),
+        "mass must be None where an inertia is given to a Plane",
+    ),
     (lambda: swarm.Plane(UP, motion=swarm.Guide(UP)), "mass must go with a Guide"),
     (lambda: swarm.Guide((0.0, 0.0, 0.0)), "axis must have a direction"),
     (lambda: swarm.Guide(UP, stiffness=-1.0), "stiffness must be"),
