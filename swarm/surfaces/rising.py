@@ -16,7 +16,7 @@ from ..kernel.vector import absolute, dot, norm, square
 from . import contract
 from .course import rise_time
 from .fold import Chain
-from .relative import Seen, bounds_of
+from .relative import Bounds, Seen, bounds_of, turning
 from .rotation import Rotated
 from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
@@ -115,6 +115,23 @@ def _(body, seen):
     return Chain(Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(a.x, a.y, a.z)), None)
 
 
+@by_type
+def bounds_on(body, drive, seen, within):
+    """`Bounds` in the frame of a wall, or in any other in which its level is the same function of place."""
+    return bounds_of(drive, seen, within)
+
+
+@bounds_on.register(SphereNumbers)
+def _(body, drive, seen, within):
+    # In a frame that its centre carries along: it does not turn.
+    spin, arm = turning(drive.turn), norm(body.center - drive.center)
+    return Bounds(
+        seen.speed + seen.weight * within + drive.fastest + spin * arm,
+        seen.weight + drive.hardest + spin * spin * arm,
+        drive.jerk + spin * spin * spin * arm,
+    )
+
+
 @inlined
 def third_of(level, bounds, within):
     """The bound of f''' within that time."""
@@ -123,31 +140,33 @@ def third_of(level, bounds, within):
 
 
 @by_type
-def _step_of(found, drive, seen, longest):
+def _step_of(found, body, drive, seen, longest):
     """The `Step` of all levels of a wall."""
     return Step(-math.inf, 0.0, math.inf)
 
 
 @_step_of.register(Chain)
-def _(found, drive, seen, longest):
+def _(found, body, drive, seen, longest):
     here = found.first
     within = min(rise_time(here.level, here.half, here.bend), longest)
     time, too_long = 0.0, within
     for _k in range(_TRIALS):
-        third = third_of(here, bounds_of(drive, seen, within), within)
+        third = third_of(here, bounds_on(body, drive, seen, within), within)
         time = max(time, min(rise_time(here.level, here.half, here.bend + third * within * (1.0 / 6.0)), within))
         # The bounds grow with the time that they hold for: those of a long time say little of a short step.
         too_long = select(time < within, within, too_long)
         if not _CLOSE * time < too_long:
             break
         within = math.sqrt(time * too_long)
-    other = _step_of(found.rest, drive, seen, longest)
+    other = _step_of(found.rest, body, drive, seen, longest)
     return Step(here.level, here.half, min(time, other.time))
 
 
 def _with_levels(kind: Any) -> None:
     contract.has_levels.register(kind, lambda surface: True)
-    safe_step.register(kind, lambda body, drive, seen, longest: _step_of(levels(body, seen), drive, seen, longest))
+    safe_step.register(
+        kind, lambda body, drive, seen, longest: _step_of(levels(body, seen), body, drive, seen, longest)
+    )
 
 
 _with_levels(PlaneNumbers)

@@ -15,8 +15,8 @@ from .course import rise_time
 from .flights import Hit
 from .fold import Chain
 from .moving import at
-from .relative import Framed, bounds_of, flight_of, motion_of
-from .rising import levels, third_of
+from .relative import Framed, flight_of, motion_of
+from .rising import bounds_on, levels, third_of
 from .safe import closed_hit
 
 _EPSILON = 2.220446049250313e-16
@@ -29,6 +29,7 @@ class Known(NamedTuple):
     """The levels of a wall, and the particle in its frame."""
 
     levels: Any
+    body: Any
     framed: Framed
 
 
@@ -90,7 +91,7 @@ def _known_of(mine, wall):
     return
 
 
-_known_of.register(Framed, lambda mine, wall: Known(levels(wall.body, mine.seen), mine))
+_known_of.register(Framed, lambda mine, wall: Known(levels(wall.body, mine.seen), wall.body, mine))
 
 
 # --- When the parabola of a level rises ------------------------------------------------------------------
@@ -150,7 +151,7 @@ def _sooner(known, number, within, is_first, rest):
 @_sooner.register(Known)
 def _(known, number, within, is_first, rest):
     framed = known.framed
-    bounds = bounds_of(framed.drive, framed.seen, within)
+    bounds = bounds_on(known.body, framed.drive, framed.seen, within)
     room = _EPSILON * framed.seen.coordinates
     return _of_levels(known.levels, number, within, bounds, room, is_first, rest)
 
