@@ -75,44 +75,50 @@ class Level(NamedTuple):
     magnitude: float
 
 
+class Between(NamedTuple):
+    """The levels of the two planes of a slab: the place between them in the direction of motion, f'/2 > 0 and f''/2."""
+
+    place: float
+    half: float
+    bend: float
+    radius: float
+
+
 @by_type
-def levels(body, seen):
-    """The `Level` of a wall whose H is constant, as a Chain: of a slab two, each of a plane."""
-    return
+def level_of(body, seen):
+    """`Level` of a wall, or `Between`."""
+    raise NotImplementedError
 
 
-@levels.register(PlaneNumbers)
+@level_of.register(PlaneNumbers)
 def _(body, seen):
     n = body.normal
-    return Chain(Level(dot(n, seen.r) - body.offset, 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a), 1.0, 0.0), None)
+    return Level(dot(n, seen.r) - body.offset, 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a), 1.0, 0.0)
 
 
-@levels.register(SlabNumbers)
+@level_of.register(SlabNumbers)
 def _(body, seen):
     # Of the two planes: a bound of f''' of the square would be ten times as far from it.
-    x, inside = along(body.normal, seen.r) - body.offset, body.side > 0.0
-    sign = select(x > 0.0, 1.0, -1.0)
-    x, half, bend = sign * x, 0.5 * sign * along(body.normal, seen.v), 0.5 * sign * along(body.normal, seen.a)
-    near = Level(body.side * (x - body.radius), body.side * half, body.side * bend, 1.0, 0.0)
-    # A solid has no far one.
-    once = select(inside, 1.0, 0.0)
-    return Chain(near, Chain(Level(-x - body.radius, -once * half, -once * bend, once, 0.0), None))
+    half = 0.5 * along(body.normal, seen.v)
+    sign = math.copysign(1.0, half)
+    x, bend = along(body.normal, seen.r) - body.offset, 0.5 * along(body.normal, seen.a)
+    return Between(sign * x, abs(half), sign * bend, body.radius)
 
 
-@levels.register(SphereNumbers)
+@level_of.register(SphereNumbers)
 def _(body, seen):
     d, side = seen.r - body.center, body.side
     q = square(d)
     bend = square(seen.v) + dot(d, seen.a)
-    return Chain(Level(side * (q - body.radius2), side * dot(d, seen.v), side * bend, 2.0 * math.sqrt(q), 1.0), None)
+    return Level(side * (q - body.radius2), side * dot(d, seen.v), side * bend, 2.0 * math.sqrt(q), 1.0)
 
 
-@levels.register(QuadricNumbers)
+@level_of.register(QuadricNumbers)
 def _(body, seen):
     n, side, a = contract.slope(body, seen.r), body.side, absolute(body.a)
     bend = form(body.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
     level = contract.level_of(body, contract.inner(body, seen.r))
-    return Chain(Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(a.x, a.y, a.z)), None)
+    return Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(a.x, a.y, a.z))
 
 
 @by_type
@@ -132,22 +138,24 @@ def _(body, drive, seen, within):
     )
 
 
-@inlined
+@by_type
 def third_of(level, bounds, within):
     """The bound of f''' within that time."""
+    raise NotImplementedError
+
+
+@third_of.register(Level)
+def _(level, bounds, within):
     moved = level.steepness + 2.0 * level.magnitude * bounds.speed * within
     return 6.0 * level.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
 
 
-@by_type
-def _step_of(found, body, drive, seen, longest):
-    """The `Step` of all levels of a wall."""
-    return Step(-math.inf, 0.0, math.inf)
+third_of.register(Between, lambda level, bounds, within: bounds.jerk)
 
 
-@_step_of.register(Chain)
-def _(found, body, drive, seen, longest):
-    here = found.first
+@inlined
+def _step_of(here, body, drive, seen, longest):
+    """The `Step` of a level."""
     within = min(rise_time(here.level, here.half, here.bend), longest)
     time, too_long = 0.0, within
     for _k in range(_TRIALS):
@@ -158,21 +166,34 @@ def _(found, body, drive, seen, longest):
         if not _CLOSE * time < too_long:
             break
         within = math.sqrt(time * too_long)
-    other = _step_of(found.rest, body, drive, seen, longest)
-    return Step(here.level, here.half, min(time, other.time))
+    return Step(here.level, here.half, time)
 
 
-def _with_levels(kind: Any) -> None:
+def _of_level(kind: Any) -> None:
     contract.has_levels.register(kind, lambda surface: True)
     safe_step.register(
-        kind, lambda body, drive, seen, longest: _step_of(levels(body, seen), body, drive, seen, longest)
+        kind, lambda body, drive, seen, longest: _step_of(level_of(body, seen), body, drive, seen, longest)
     )
 
 
-_with_levels(PlaneNumbers)
-_with_levels(SlabNumbers)
-_with_levels(SphereNumbers)
-_with_levels(QuadricNumbers)
+_of_level(PlaneNumbers)
+_of_level(SphereNumbers)
+_of_level(QuadricNumbers)
+# Between its planes; of a solid there is one.
+contract.has_levels.register(SlabNumbers, lambda surface: surface.side > 0.0)
+
+
+@safe_step.register(SlabNumbers)
+def _(body, drive, seen, longest):
+    x, side = along(body.normal, seen.r) - body.offset, body.side
+    sign = select(x > 0.0, 1.0, -1.0)
+    x, half, bend = sign * x, 0.5 * sign * along(body.normal, seen.v), 0.5 * sign * along(body.normal, seen.a)
+    here, other = (
+        Level(side * (x - body.radius), side * half, side * bend, 1.0, 0.0),
+        Level(-x - body.radius, -half, -bend, 1.0, 0.0),
+    )
+    near, far = _step_of(here, body, drive, seen, longest), _step_of(other, body, drive, seen, longest)
+    return Step(near.level, near.half, select((side > 0.0) & (far.time < near.time), far.time, near.time))
 
 
 @inlined
@@ -185,7 +206,7 @@ def _own(body, seen):
 
 
 contract.has_levels.register(Rotated, lambda surface: contract.has_levels(surface.body))
-levels.register(Rotated, lambda body, seen: levels(body.body, _own(body, seen)))
+level_of.register(Rotated, lambda body, seen: level_of(body.body, _own(body, seen)))
 
 
 @safe_step.register(Rotated)

@@ -1,8 +1,8 @@
 """Safe steps in lanes, to walls in any motion whose levels have a bound of their third derivative.
 
-A stride is one safe step of all walls. Its bounds hold until the parabola of a level itself rises: near the hit what
-is not known of f''' is the only error, and a stride leaves the cube of its length. What a few strides do not find goes
-on in the next pass, from where it is.
+A stride is one safe step of all walls together. Its bounds hold until the parabola of a level itself rises: near the
+hit what is not known of f''' is the only error, and a stride leaves the cube of its length. What a few strides do not
+find goes on in the next pass, from where it is.
 """
 
 import math
@@ -14,23 +14,32 @@ from ..kernel.vector import ZERO
 from .course import rise_time
 from .flights import Hit
 from .fold import Chain
-from .moving import at
+from .moving import Moving, at
 from .relative import Framed, flight_of, motion_of
-from .rising import bounds_on, levels, third_of
+from .rising import Between, Level, bounds_on, level_of, third_of
 from .safe import closed_hit
 
 _EPSILON = 2.220446049250313e-16
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
 # the walls that have a closed form.
 _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
+# The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
+_AHEAD = 32.0
 
 
 class Known(NamedTuple):
-    """The levels of a wall, and the particle in its frame."""
+    """The level of a wall, the wall and the particle in its frame."""
 
-    levels: Any
+    level: Any
     body: Any
     framed: Framed
+
+
+class Rise(NamedTuple):
+    """When a level rises at the soonest, and by how much it is at most below 0 then."""
+
+    time: float
+    error: float
 
 
 class Stride(NamedTuple):
@@ -39,6 +48,9 @@ class Stride(NamedTuple):
     time: float
     wall: float
     meets: Any
+
+
+# --- In a lane -------------------------------------------------------------------------------------------
 
 
 @inlined
@@ -52,17 +64,18 @@ def begin(chain, gravity, course, lane, r, v, left):
 @inlined
 def stride(chain, gravity, course, lane, r, v, left, is_first):
     """One stride of a lane that has not met a wall."""
-    t, met = course[_TIME, lane], course[_MET, lane]
-    longest = select(course[_CLOSED, lane] < left, course[_CLOSED, lane], left) - t
+    t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
+    longest = select(closed < left, closed, left) - t
     flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), left)
     known = _known(chain.walls, None, flight, t)
-    within = _first_rise(known)
-    within = select(within < longest, within, longest)
+    within, ahead = _first_rise(known), _AHEAD * _pace(chain.walls)
+    ahead = select(ahead < longest, ahead, longest)
+    within = select(within < ahead, within, ahead)
     found = _stride(known, 0.0, within, is_first)
-    under_way = (met < 0.0) & (longest > 0.0)
     step = select(found.time < within, found.time, within)
+    under_way = (met < 0.0) & (longest > 0.0)
     course[_TIME, lane] = select(under_way, t + step, t)
-    course[_MET, lane] = select(under_way & found.meets & (found.time <= longest), found.wall, met)
+    course[_MET, lane] = select(under_way & found.meets & (found.time <= within), found.wall, met)
 
 
 @inlined
@@ -75,8 +88,30 @@ def end(course, lane):
 
 
 @by_type
+def _pace(chain):
+    """The shortest pace of all walls that are met by safe steps."""
+    return math.inf
+
+
+@_pace.register(Chain)
+def _(chain):
+    mine, other = _pace_of(chain.first), _pace(chain.rest)
+    return select(mine < other, mine, other)
+
+
+@by_type
+def _pace_of(wall):
+    return math.inf
+
+
+_pace_of.register(Moving, lambda wall: wall.drive.pace)
+
+# --- All walls that are met by safe steps ----------------------------------------------------------------
+
+
+@by_type
 def _known(chain, last, flight, t):
-    """`Known` of all walls that are met by safe steps; `last` is `Framed` of the wall before."""
+    """`Known` of each; `last` is `Framed` of the wall before."""
     return
 
 
@@ -91,10 +126,7 @@ def _known_of(mine, wall):
     return
 
 
-_known_of.register(Framed, lambda mine, wall: Known(levels(wall.body, mine.seen), wall.body, mine))
-
-
-# --- When the parabola of a level rises ------------------------------------------------------------------
+_known_of.register(Framed, lambda mine, wall: Known(level_of(wall.body, mine.seen), wall.body, mine))
 
 
 @by_type
@@ -105,30 +137,16 @@ def _first_rise(known):
 
 @_first_rise.register(Chain)
 def _(known):
-    mine, other = _first_rise_of(known.first), _first_rise(known.rest)
+    mine, other = _own_rise_of(known.first), _first_rise(known.rest)
     return select(mine < other, mine, other)
 
 
 @by_type
-def _first_rise_of(known):
+def _own_rise_of(known):
     return math.inf
 
 
-_first_rise_of.register(Known, lambda known: _parabolas(known.levels))
-
-
-@by_type
-def _parabolas(found):
-    return math.inf
-
-
-@_parabolas.register(Chain)
-def _(found):
-    mine, other = rise_time(found.first.level, found.first.half, found.first.bend), _parabolas(found.rest)
-    return select(mine < other, mine, other)
-
-
-# --- A stride --------------------------------------------------------------------------------------------
+_own_rise_of.register(Known, lambda known: _own_rise(known.level))
 
 
 @by_type
@@ -150,33 +168,81 @@ def _sooner(known, number, within, is_first, rest):
 
 @_sooner.register(Known)
 def _(known, number, within, is_first, rest):
-    framed = known.framed
-    bounds = bounds_on(known.body, framed.drive, framed.seen, within)
-    room = _EPSILON * framed.seen.coordinates
-    return _of_levels(known.levels, number, within, bounds, room, is_first, rest)
+    drive, seen = known.framed.drive, known.framed.seen
+    sixth = third_of(known.level, bounds_on(known.body, drive, seen, within), within) * (1.0 / 6.0)
+    time = _rise(known.level, sixth, within, is_first)
+    # The parabola is above f by no more than this.
+    meets = 2.0 * sixth * within * time * time <= _EPSILON * seen.coordinates * _steepness(known.level)
+    mine = time < rest.time
+    return Stride(
+        select(mine, time, rest.time), select(mine, number, rest.wall), (mine & meets) | ((not mine) & rest.meets)
+    )
+
+
+# --- Of one level ----------------------------------------------------------------------------------------
 
 
 @by_type
-def _of_levels(found, number, within, bounds, room, is_first, rest):
-    return rest
+def _own_rise(level):
+    """When its own parabola rises."""
+    raise NotImplementedError
 
 
-@_of_levels.register(Chain)
-def _(found, number, within, bounds, room, is_first, rest):
-    here = found.first
-    third = third_of(here, bounds, within)
-    sixth = third * within * (1.0 / 6.0)
-    time = rise_time(here.level, here.half, here.bend + sixth)
+@by_type
+def _rise(level, sixth, within, is_first):
+    """When it rises at the soonest, if a sixth of f''' is bounded within that time."""
+    raise NotImplementedError
+
+
+@by_type
+def _steepness(level):
+    raise NotImplementedError
+
+
+_own_rise.register(Level, lambda level: rise_time(level.level, level.half, level.bend))
+_steepness.register(Level, lambda level: level.steepness)
+
+
+@_rise.register(Level)
+def _(level, sixth, within, is_first):
+    c, b, a = level.level, level.half, level.bend + sixth * within
     if is_first:
         # From the wall inwards f is t (f' + f''/2 t + ...): one power of t nearer to it than the parabola.
-        leaving = rise_time(2.0 * here.half, 0.5 * here.bend, third * (1.0 / 6.0))
-        time = select((here.half <= 0.0) & (leaving > time), leaving, time)
-    # The parabola is above f by no more than this.
-    meets = 2.0 * sixth * time * time <= here.steepness * room
-    other = _of_levels(found.rest, number, within, bounds, room, is_first, rest)
-    mine = time < other.time
-    return Stride(
-        select(mine, time, other.time),
-        select(mine, number, other.wall),
-        (mine & meets) | ((not mine) & other.meets),
-    )
+        leaves = level.half <= 0.0
+        c, b = select(leaves, 2.0 * level.half, c), select(leaves, 0.5 * level.bend, b)
+        a = select(leaves, sixth, a)
+    return rise_time(c, b, a)
+
+
+_steepness.register(Between, lambda level: 1.0)
+
+
+@_own_rise.register(Between)
+def _(level):
+    # The plane ahead, unless the particle turns short of it: then the one behind
+    c, b, a = level.place - level.radius, level.half, level.bend
+    discriminant = b * b - a * c
+    reaches = (discriminant >= 0.0) | (a > 0.0)
+    discriminant = select(reaches, discriminant, b * b - a * (level.place + level.radius))
+    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+    over, under = select(reaches, -c, b + root), select(reaches, b + root, -a)
+    return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
+
+
+@_rise.register(Between)
+def _(level, sixth, within, is_first):
+    b, k = level.half, sixth * within
+    c, a = level.place - level.radius, level.bend + k
+    discriminant = b * b - a * c
+    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+    reaches = ((discriminant >= 0.0) | (a > 0.0)) & (b + root > 0.0)
+    ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
+    # The one behind: the particle moves away from it.
+    c, a = -level.place - level.radius, k - level.bend
+    if is_first:
+        behind = rise_time(-2.0 * b, -0.5 * level.bend, sixth)
+    else:
+        discriminant = b * b - a * c
+        root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+        behind = select(a > 0.0, (b + root) / a, math.inf)
+    return select(behind < ahead, behind, ahead)
