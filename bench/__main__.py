@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import accuracy, bars, bodies, compare, contacts, endurance, report, scenes, stability, throughput
+from . import accuracy, bars, bodies, compare, contacts, endurance, motion, report, scenes, stability, throughput
 from .peers import race
 
 
@@ -23,6 +23,7 @@ def main() -> None:
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
     commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
     commands.add_parser("bodies", help="a step and an impact of bodies of several points, and what they conserve")
+    commands.add_parser("motion", help="walls that move and walls that are moved: exactness, conservation, speed")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -42,6 +43,7 @@ def main() -> None:
         "scenes": scenes,
         "contacts": contacts,
         "bodies": bodies,
+        "motion": motion,
         "endurance": endurance,
     }
     before = report.stolen()

@@ -28,6 +28,7 @@ class Compressed(NamedTuple):
     along: float  # of the direction of the piston alone, at the end
     error: np.ndarray  # standard error of the temperature; between the ends by a straight line
     balance: float  # of energy and work, over the energy
+    impacts: int
 
 
 def vessel(speed: float, balls: bool) -> swarm.Scene:
@@ -57,7 +58,8 @@ def run(count: int, speed: float, frames: int = 20, balls: bool = True) -> Compr
     kept = seen["total_energy"] - seen["wall_work"].sum(axis=1)
     balance = float(np.abs(kept - kept[0]).max() / seen["total_energy"].max())
     # None at the start, all of it at the end
-    return Compressed(volume, energy, along, spread * energy * np.linspace(0.0, 1.0, len(energy)), balance)
+    error = spread * energy * np.linspace(0.0, 1.0, len(energy))
+    return Compressed(volume, energy, along, error, balance, int(seen["impacts"][-1]))
 
 
 def draw(found: Compressed, file: Path) -> None:

@@ -156,3 +156,10 @@ def test_what_others_took_is_told(monkeypatch):
     assert report.told_of_others((100, 1000)).split(" of the time")[0].endswith("took 15 %")
     monkeypatch.setattr(report, "stolen", lambda: (100, 1000))
     assert "an unknown part" in report.told_of_others((100, 1000))
+
+
+@pytest.mark.long
+def test_motion_quick():
+    told = printed("motion")
+    for row in ("piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^4 kg", "box oscillating, an impact"):
+        assert row in told

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import swarm
+from examples import fermi
 from swarm.kernel.vector import ZERO, Vec, vec
 from swarm.motion import pose
 from swarm.surfaces import safe
@@ -240,29 +241,10 @@ def test_a_piston_compresses_by_the_law_of_one_dimension():
     assert abs(float(v)) * (length - u * until) == pytest.approx(length, rel=0.03)
 
 
-def fermi_ulam(v, amplitude, length, impacts):
-    """Positions and velocities at the swinging wall, x = length + amplitude sin t, to 50 digits, and when."""
-    with mpmath.workdps(50):
-        amplitude, length, t = mpmath.mpf(amplitude), mpmath.mpf(length), mpmath.mpf(0)
-        x, v = mpmath.mpf(0), mpmath.mpf(v)
-
-        def ahead(wait):
-            return x + v * wait - length - amplitude * mpmath.sin(t + wait)
-
-        for _ in range(impacts):
-            wait = mpmath.findroot(ahead, (length - x) / v, tol=1e-90)
-            t += wait
-            hit = length + amplitude * mpmath.sin(t)
-            v = 2 * amplitude * mpmath.cos(t) - v
-            back = hit / -v
-            t, x, v = t + back, mpmath.mpf(0), -v
-        return float(t), float(v)
-
-
 def test_the_fermi_ulam_trajectory_where_it_is_not_chaotic():
     amplitude, length, v = 0.01, 1.0, 8.0
     impacts = 500
-    until, wanted = fermi_ulam(v, amplitude, length, impacts)
+    until, wanted = fermi.in_fifty_digits(v, amplitude, impacts)
     wall = swarm.Plane(
         (1, 0, 0), length, motion=swarm.Oscillation((amplitude, 0.0, 0.0), frequency=0.5 / math.pi, phase=0.0)
     )
