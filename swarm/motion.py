@@ -221,13 +221,14 @@ class Path(Given):
 
 @dataclass(frozen=True)
 class Sum(Given):
-    """Several motions of a wall at once: displacements add up, and at most one part is a rotation, and none a guide.
+    """Several motions of a wall at once: displacements add up.
 
     Args:
-        parts: at least one motion; the centre of a rotation moves with the displacements.
+        parts: at least one motion, of which at most one is a rotation, at most one a path, and none a guide. The
+            centre of a rotation moves with the displacements.
 
     Raises:
-        SceneError: two rotations, or a guide.
+        SceneError: two rotations, two paths, or a guide.
 
     >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
     >>> len(both.parts)
@@ -240,9 +241,10 @@ class Sum(Given):
         for one in self.parts:
             if isinstance(one, Guide):
                 raise SceneError(f"a sum of motions must have no guide, which needs a mass of its own, got {one}")
-        turns = [one for one in self.parts if isinstance(one, Rotation)]
-        if len(turns) > 1:
-            raise SceneError(f"a sum of motions must have at most one rotation, got {len(turns)}")
+        for kind in (Rotation, Path):
+            parts = [one for one in self.parts if isinstance(one, kind)]
+            if len(parts) > 1:
+                raise SceneError(f"a sum of motions must have at most one {kind.__name__}, got {len(parts)}")
 
 
 @dataclass(frozen=True)
@@ -386,7 +388,9 @@ def parts_of_wall(value: Any) -> "WallMotion | None":
                 )
         for name in names:
             if name not in given and KINDS[kind].__dataclass_fields__[name].default is MISSING:
-                raise SceneError(f"motion.{name}: expected a value of a {kind}, got nothing; add {name} = ...")
+                raise SceneError(
+                    f"motion.{name}: expected a value where kind is '{kind}', got nothing; add {name} = ..."
+                )
         return KINDS[kind](**given)  # type: ignore[no-any-return]
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
         parts = [part for one in value for part in parts_of(parts_of_wall(one))]

@@ -122,6 +122,27 @@ def test_shipped_scenes_are_read(path):
             "radius = 0.5\nrotation = { axis = [0, 0, 0], angle = 1.0 }",
             r"surface\[0\]\.rotation\.axis must not be of length 0",
         ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "oscilation", amplitude = [0, 0, 1], frequency = 1.0 }',
+            r"surface\[0\]\.motion\.kind must be one of .*; did you mean 'oscillation'",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "oscillation", amplitude = [0, 0, 1] }',
+            r"surface\[0\]\.motion\.frequency: expected a value where kind is 'oscillation', got nothing",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "translation", velocity = [0, 0, 1], speed = 1.0 }',
+            r"surface\[0\]\.motion\.speed: unknown key, expected 'velocity'",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "oscillation", amplitude = [0, 0, 1], frequency = 1 }\nmass = 2.0',
+            r"surface\[0\].*motion must be None, a Translation or a Guide where a mass is given",
+        ),
+        ("radius = 0.5", "radius = 0.5\nmass = -2.0", r"surface\[0\]\.mass must be above 0, got -2"),
         ("radius = 0.5", "radius = 0.5\nfriction = -1", r"surface\[0\]\.friction must be 0 or more, got -1"),
         (
             "radius = 0.5",

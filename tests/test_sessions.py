@@ -21,10 +21,20 @@ from swarm.run import progress
 from swarm.run.engine import Run
 from swarm.run.progress import lines
 
+DOWN = (0.0, 0.0, -1.0)
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 NESTED = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")])
 LOSSY = swarm.Scene([swarm.Sphere(0.5, restitution=0.999)])
+SWUNG = swarm.Scene(
+    [
+        swarm.Box(
+            (0.5, 0.4, 0.3), motion=swarm.Oscillation((0.05, 0.0, 0.1), 0.7) + swarm.Rotation(DOWN, 1.3, (0, 0, 0))
+        )
+    ],
+    DOWN,
+)
 CASES = {
+    "impact, a box that swings and turns": (SWUNG, METHODS["impact"]),
     "impact, sphere": (SPHERE, METHODS["impact"]),
     "impact, nested": (NESTED, METHODS["impact"]),
     "impact, lossy": (LOSSY, METHODS["impact"]),

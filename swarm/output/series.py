@@ -82,7 +82,8 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
 def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
     """Of surfaces that give heat, do work, or are moved."""
     lines = []
-    for i, (shape, surface) in enumerate(zip(shapes, scene.surfaces, strict=True)):
+    for i, shape in enumerate(shapes):
+        surface = scene.surfaces[i]
         if surface.temperature is not None:
             lines.append(Line(f"/heat/{shape.name}", shape.name, _rate("wall_heat", 1.0, i)))
         if surface.reacts():

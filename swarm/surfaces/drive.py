@@ -105,8 +105,6 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             hardest += amplitude * led.rate**2
             jerk += amplitude * led.rate**3
         elif isinstance(one, motions.Path):
-            if track is not None:
-                raise NotImplementedError
             cubics = one.cubics()
             track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
             # Within a piece the velocity is largest at an end or where the second derivative is 0.

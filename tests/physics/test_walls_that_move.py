@@ -1,6 +1,7 @@
 """Walls that move: the same physics in every frame, hits that none skips, work that is booked, contacts that last."""
 
 import math
+import re
 
 import mpmath
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.optimize import brentq
 import swarm
 from examples import fermi
 from swarm.kernel.vector import ZERO, Vec, vec
+from swarm.lanes import block
 from swarm.motion import pose
 from swarm.surfaces import safe
 from swarm.surfaces.moving import at
@@ -393,3 +395,81 @@ def test_the_walls_of_a_chain_at_an_instant():
     scene = swarm.Scene([CAVITIES["sphere"](None)])
     assert at(scene.chain(), 0.3) is not None
     assert at(scene.chain(), 0.3) == scene.chain()
+
+
+# --- Bad input, and walls that close ---------------------------------------------------------------------
+
+WEST = swarm.Particles([-0.3, 0.0, 0.0], [0.0, 0.0, 0.0])
+INSIDE = swarm.Particles([0.0, 0.0, 0.2], [0.1, 0.0, 0.0])
+UP = (0.0, 0.0, 1.0)
+
+
+def started(motion, method=None, particles=INSIDE, **options):
+    return swarm.simulate(
+        swarm.Scene([swarm.Sphere(0.5, motion=motion)]), particles, method or swarm.Impact(),
+        **{"until": 1.0, "compile": "never", **options},
+    )  # fmt: skip
+
+
+WRONG = {
+    "velocity": (lambda: swarm.Translation((math.inf, 0.0, 0.0)), "velocity"),
+    "amplitude": (lambda: swarm.Oscillation((0.0, math.nan, 0.0), 1.0), "amplitude"),
+    "frequency": (lambda: swarm.Oscillation(UP, 0.0), "frequency must be above 0, got 0"),
+    "phase": (lambda: swarm.Oscillation(UP, 1.0, phase=math.inf), "phase must be a finite number, got inf"),
+    "rate": (lambda: swarm.Rotation(UP, math.nan, (0.0, 0.0, 0.0)), "rate must be a finite number, got nan"),
+    "axis": (lambda: swarm.Rotation((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0)), "axis must have a direction"),
+    "one time": (lambda: swarm.Path((0.0,), (UP,)), r"times must be at least two, ascending, got the shape \(1,\)"),
+    "descending": (lambda: swarm.Path((0.0, 2.0, 1.0), (UP, UP, UP)), "ascending, got 2 before 1"),
+    "twice": (lambda: swarm.Path((0.0, 1.0, 1.0), (UP, UP, UP)), "ascending, got 1 before 1"),
+    "too few": (lambda: swarm.Path((0.0, 1.0), (UP,)), "positions must be one for each of the 2 times, got 1"),
+    "two rotations": (lambda: TURN + TURN, "at most one Rotation, got 2"),
+    "two paths": (lambda: PATH + PATH, "at most one Path, got 2"),
+    "not a motion": (lambda: swarm.Sphere(0.5, motion=3.0), "motion must be None, swarm.Translation"),
+    "ends early": (
+        lambda: started(swarm.Path((0.0, 0.5), ((0, 0, 0), UP))),
+        r"surfaces\[0\].motion.times must cover the run from 0 to 1 s, got 0 to 0.5",
+    ),
+    "starts late": (lambda: started(swarm.Path((0.1, 2.0), ((0, 0, 0), UP))), "must cover the run from 0 to 1 s"),
+    "penalty": (lambda: started(SWING, swarm.Verlet(1e-3, 1e4)), r"motion"),
+    "contact step": (lambda: started(SWING, swarm.Impact(contact_step=1e-3)), "contact_step must be 0 where .* motion"),
+    "bodies": (
+        lambda: started(
+            SWING, swarm.Impact(dt=1e-3),
+            swarm.place(swarm.Scene([swarm.Sphere(0.5)]), swarm.dumbbell(0.1, 1.0), 2, speed=0.1, spin=0.0, seed=1),
+        ),
+        r"surfaces\[0\].motion must be None with bodies",
+    ),
+    "one step": (
+        lambda: swarm.contact_history(
+            swarm.Scene([swarm.Sphere(0.5, motion=SWING)]), (0.4, 0.3, 0.0), (0.3, 0.4, 0.0), 1.0,
+            swarm.AugmentedLagrangian(dt=0.025, penalty=1e4),
+        ),
+        "scene must have no wall that moves",
+    ),
+    "outside": (
+        lambda: started(swarm.Path((0.0, 2.0), ((0.4, 0.0, 0.0), UP)), particles=WEST),
+        "particles must start inside their walls, got 1 of 1 outside",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_bad_input(name):
+    call, sentence = WRONG[name]
+    with pytest.raises(swarm.SceneError, match=sentence):
+        call()
+
+
+def test_walls_that_close_say_where_and_when(tmp_path, monkeypatch):
+    """The volume vanishes at 1 s; the frames before are kept."""
+    monkeypatch.setattr(block, "MOST_HITS", 1000.0)
+    walls = [swarm.Plane((-1, 0, 0), 0.0), swarm.Plane((1, 0, 0), 0.5, motion=swarm.Translation((-0.5, 0.0, 0.0)))]
+    start = swarm.Particles([[0.2, 0.3], [0.0, 0.0], [0.0, 0.0]], [[1.0, -0.7], [0.0, 0.1], [0.0, 0.0]])
+    file = tmp_path / "run.h5"
+    told = r"at particle [01]: .* it is at .* s: walls that move have closed on it"
+    with pytest.raises(swarm.RunError, match=told) as caught:
+        run(swarm.Scene(walls), start, 2.0, frames=20, trajectory=file)
+    moment = float(re.search(r" at ([\d.]+) s: walls that move", str(caught.value)).group(1))
+    assert moment == pytest.approx(1.0, abs=1e-2)
+    with swarm.load(file) as trajectory:
+        assert trajectory.times[-1] == pytest.approx(0.9)
