@@ -422,8 +422,8 @@ WRONG = {
     "descending": (lambda: swarm.Path((0.0, 2.0, 1.0), (UP, UP, UP)), "ascending, got 2 before 1"),
     "twice": (lambda: swarm.Path((0.0, 1.0, 1.0), (UP, UP, UP)), "ascending, got 1 before 1"),
     "too few": (lambda: swarm.Path((0.0, 1.0), (UP,)), "positions must be one for each of the 2 times, got 1"),
-    "two rotations": (lambda: TURN + TURN, "at most one Rotation, got 2"),
-    "two paths": (lambda: PATH + PATH, "at most one Path, got 2"),
+    "two rotations": (lambda: TURN + TURN, "at most 1 Rotation, got 2"),
+    "two paths": (lambda: PATH + PATH, "at most 1 Path, got 2"),
     "not a motion": (lambda: swarm.Sphere(0.5, motion=3.0), "motion must be None, swarm.Translation"),
     "ends early": (
         lambda: started(swarm.Path((0.0, 0.5), ((0, 0, 0), UP))),

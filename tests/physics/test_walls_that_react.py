@@ -330,7 +330,7 @@ WRONG = [
     (lambda: swarm.Guide((0.0, 0.0, 0.0)), "axis must have a direction"),
     (lambda: swarm.Guide(UP, stiffness=-1.0), "stiffness must be"),
     (lambda: swarm.Guide(UP, speed=math.nan), "speed must be"),
-    (lambda: swarm.Guide(UP) + swarm.Translation(UP), "a sum of motions must have no guide"),
+    (lambda: swarm.Guide(UP) + swarm.Translation(UP), "a sum of motions must have at most 0 Guide, got 1"),
     (
         lambda: run(swarm.Scene([SHAFT, swarm.Sphere(0.5, temperature=1.0), piston(1.0)]), ONE, 1.0),
         r"surfaces\[1\].temperature must be None where a wall has a mass",

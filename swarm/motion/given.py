@@ -1,0 +1,227 @@
+"""Motions that are given: how a point that is led, or a wall, moves in time.
+
+A led point has one form for all, so that one kernel serves every motion:
+    s(t) = start + velocity t + cosine (cos(rate t) - 1) + sine sin(rate t).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import checks
+from ..checks import Vector
+from ..errors import SceneError
+
+Floats = NDArray[np.float64]
+
+
+class Led(NamedTuple):
+    """The path of one point.
+
+    Attributes:
+        start: (3,) its place at time 0 [m].
+        velocity: (3,) of the steady part [m/s].
+        cosine: (3,) what cos(rate t) - 1 multiplies [m].
+        sine: (3,) what sin(rate t) multiplies [m].
+        rate: of the angle [rad/s].
+    """
+
+    start: Floats
+    velocity: Floats
+    cosine: Floats
+    sine: Floats
+    rate: float
+
+    def position(self, time: ArrayLike) -> Floats:
+        """The place (3,) at a time [s], or the places (3, T) at T times."""
+        t = np.asarray(time, dtype=np.float64)
+        start, velocity, cosine, sine = (part.reshape(3, *(1,) * t.ndim) for part in self[:4])
+        half = np.sin(0.5 * self.rate * t)
+        # cos a - 1 = -2 sin^2(a/2) has no cancellation.
+        return np.asarray(start + velocity * t - cosine * (2.0 * half * half) + sine * np.sin(self.rate * t))
+
+    def velocity_at(self, time: float) -> Floats:
+        """Its velocity (3,) at a time [s]."""
+        angle = self.rate * time
+        return self.velocity + self.rate * (self.sine * math.cos(angle) - self.cosine * math.sin(angle))
+
+
+class Given:
+    """A motion that is given; motions add up: `Translation(...) + Rotation(...)`."""
+
+    # How many of its kind a sum may have.
+    most: ClassVar[float] = math.inf
+
+    def __add__(self, other: "Given") -> "Sum":
+        return Sum((*parts_of(self), *parts_of(other)))
+
+    def __radd__(self, other: Any) -> "Given":
+        return self if other == 0 else NotImplemented
+
+
+@dataclass(frozen=True)
+class Translation(Given):
+    """Steady motion along a straight line.
+
+    Args:
+        velocity: three numbers, each from -1e100 to 1e100 [m/s].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Translation(velocity=(2.0, 0.0, 0.0)).harmonic((0.0, 0.0, 1.0)).position(3.0)
+    array([6., 0., 1.])
+    """
+
+    velocity: Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "velocity", vector_of("velocity", self.velocity))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        return Led(point_of(start), np.array(self.velocity), np.zeros(3), np.zeros(3), 0.0)
+
+
+@dataclass(frozen=True)
+class Oscillation(Given):
+    """Displacement amplitude (sin(2 pi frequency t + phase) - sin(phase)).
+
+    Args:
+        amplitude: three numbers, each from -1e100 to 1e100 [m].
+        frequency: above 0 [1/s].
+        phase: the angle at time 0 [rad].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Oscillation(amplitude=(0.0, 0.0, 0.1), frequency=5.0).harmonic((1.0, 0.0, 0.0)).position(0.05)
+    array([1. , 0. , 0.1])
+    """
+
+    amplitude: Vector
+    frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "amplitude", vector_of("amplitude", self.amplitude))
+        frequency = checks.positive("frequency", self.frequency)
+        checks.magnitude("frequency", frequency)
+        object.__setattr__(self, "frequency", frequency)
+        object.__setattr__(self, "phase", checks.number("phase", self.phase))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        amplitude = np.array(self.amplitude)
+        # sin(a + phase) - sin(phase) = sin(phase) (cos a - 1) + cos(phase) sin a
+        cosine, sine = amplitude * math.sin(self.phase), amplitude * math.cos(self.phase)
+        return Led(point_of(start), np.zeros(3), cosine, sine, 2.0 * math.pi * self.frequency)
+
+
+@dataclass(frozen=True)
+class Rotation(Given):
+    """Steady rotation about an axis that is fixed in space.
+
+    Args:
+        axis: three numbers, not all 0; its length does not matter. The rotation is right-handed about it.
+        rate: from -1e100 to 1e100 [rad/s].
+        center: a point of the axis [m].
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> import math
+    >>> path = Rotation(axis=(0.0, 0.0, 1.0), rate=math.pi, center=(0.0, 0.0, 0.0)).harmonic((1.0, 0.0, 5.0))
+    >>> path.position(0.5).round(12)
+    array([0., 1., 5.])
+    """
+
+    axis: Vector
+    rate: float
+    center: Vector
+    most: ClassVar[float] = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", axis_of(self.axis))
+        rate = checks.number("rate", self.rate)
+        checks.magnitude("|rate|", abs(rate))
+        object.__setattr__(self, "rate", rate)
+        object.__setattr__(self, "center", vector_of("center", self.center))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """The path of a point that is at `start` (3,) [m] at time 0."""
+        point, axis = point_of(start), unit_axis(self)
+        arm = point - self.center
+        radius = arm - (arm * axis).sum() * axis
+        return Led(point, np.zeros(3), radius, np.cross(axis, radius), self.rate)
+
+
+@dataclass(frozen=True)
+class Sum(Given):
+    """Several motions of a wall at once: displacements add up.
+
+    Args:
+        parts: at least one motion, of which at most one is a rotation, at most one a path, and none a guide. The
+            centre of a rotation moves with the displacements.
+
+    Raises:
+        SceneError: two rotations, two paths, or a guide.
+
+    >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
+    >>> len(both.parts)
+    2
+    """
+
+    parts: tuple[Given, ...]
+
+    def __post_init__(self) -> None:
+        for kind in {type(one) for one in self.parts}:
+            count = sum(isinstance(one, kind) for one in self.parts)
+            if count > kind.most:
+                raise SceneError(f"a sum of motions must have at most {kind.most} {kind.__name__}, got {count}")
+
+
+def parts_of(motion: Any) -> tuple[Any, ...]:
+    """What a motion is the sum of; nothing of None."""
+    if motion is None:
+        return ()
+    return motion.parts if isinstance(motion, Sum) else (motion,)
+
+
+Motion = Translation | Oscillation | Rotation
+
+
+def led(motion: Motion | None, start: ArrayLike) -> Led:
+    """The path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
+    return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
+
+
+def unit_axis(rotation: Any) -> Floats:
+    """The unit vector (3,) along its axis."""
+    # By the largest part first: the squares of small components are 0.
+    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()
+    return np.asarray(axis / np.sqrt((axis**2).sum()))
+
+
+def axis_of(value: Vector) -> Vector:
+    """`value` as the direction of an axis."""
+    axis = vector_of("axis", value)
+    if not any(axis):
+        raise SceneError("axis must have a direction, got (0, 0, 0)")
+    return axis
+
+
+def vector_of(name: str, value: Vector) -> Vector:
+    """`value` as three numbers of an admissible size."""
+    parts = checks.vector(name, value)
+    for i, part in enumerate(parts):
+        checks.magnitude(f"|{name}[{i}]|", abs(part))
+    return parts
+
+
+def point_of(start: ArrayLike) -> Floats:
+    """A point as an array."""
+    return np.array(checks.vector("start", start))

@@ -1,0 +1,182 @@
+"""Motions of walls: along a path, of several at once, along a guide; and what a scene file says of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import checks
+from ..checks import Vector
+from ..errors import SceneError
+from .given import Floats, Given, Led, Oscillation, Rotation, Sum, Translation, axis_of, parts_of, point_of, vector_of
+
+
+@dataclass(frozen=True)
+class Path(Given):
+    """Displacement along a cubic spline, which is C^2: of a wall, not of a point.
+
+    Args:
+        times: at least two, ascending [s].
+        positions: for each time three numbers, the displacement from where the wall is given [m].
+
+    The second derivative is 0 at both ends (the natural spline); there is no motion beyond them.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Path(times=(0.0, 1.0, 2.0), positions=((0, 0, 0), (0, 0, 1), (0, 0, 0))).displacement(0.5)
+    array([0.    , 0.    , 0.6875])
+    """
+
+    times: tuple[float, ...]
+    positions: tuple[Vector, ...]
+    most: ClassVar[float] = 1
+
+    def __post_init__(self) -> None:
+        times = checks.array("times", self.times)
+        if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
+            wrong = np.flatnonzero(~(np.diff(times) > 0.0)) if times.ndim == 1 else np.empty(0)
+            came = f"{times[wrong[0]]:g} before {times[wrong[0] + 1]:g}" if wrong.size else f"the shape {times.shape}"
+            raise SceneError(f"times must be at least two, ascending, got {came}")
+        if not np.isfinite(times).all():
+            raise SceneError(f"times must be finite, got {times[~np.isfinite(times)][0]:g}")
+        if isinstance(self.positions, (str, bytes)) or len(self.positions) != times.size:
+            raise SceneError(f"positions must be one for each of the {times.size} times, got {len(self.positions)}")
+        object.__setattr__(self, "times", tuple(times.tolist()))
+        places = tuple(vector_of(f"positions[{k}]", place) for k, place in enumerate(self.positions))
+        object.__setattr__(self, "positions", places)
+
+    def cubics(self) -> Floats:
+        """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""
+        t, x = np.array(self.times), np.array(self.positions).T
+        h, slope = np.diff(t), np.diff(x) / np.diff(t)
+        bends = np.zeros_like(x)  # second derivatives at the knots
+        # h_k-1 m_k-1 + 2 (h_k-1 + h_k) m_k + h_k m_k+1 = 6 (slope_k - slope_k-1), a tridiagonal system
+        upper, right = np.zeros(t.size), np.zeros_like(x)
+        for k in range(1, t.size - 1):
+            pivot = 2.0 * (h[k - 1] + h[k]) - h[k - 1] * upper[k - 1]
+            upper[k] = h[k] / pivot
+            right[:, k] = (6.0 * (slope[:, k] - slope[:, k - 1]) - h[k - 1] * right[:, k - 1]) / pivot
+        for k in range(t.size - 2, 0, -1):
+            bends[:, k] = right[:, k] - upper[k] * bends[:, k + 1]
+        first = slope - h * (2.0 * bends[:, :-1] + bends[:, 1:]) / 6.0
+        return np.array([x[:, :-1], first, 0.5 * bends[:, :-1], np.diff(bends) / (6.0 * h)])
+
+    def displacement(self, time: float) -> Floats:
+        """The displacement (3,) at a time [s]."""
+        k = min(max(int(np.searchsorted(self.times, time, "right")) - 1, 0), len(self.times) - 2)
+        s, (a, b, c, d) = time - self.times[k], self.cubics()[:, :, k]
+        return np.asarray(a + s * (b + s * (c + s * d)))
+
+
+@dataclass(frozen=True)
+class Guide(Given):
+    """A straight guide, and a spring: how a wall with a mass may move. It starts where it is given.
+
+    Args:
+        axis: three numbers, not all 0; its length does not matter.
+        speed: along the axis at the start, from -1e100 to 1e100 [m/s].
+        stiffness: of a spring that is relaxed where the wall is given, from 0 to 1e100 [N/m]; 0: no spring.
+
+    Gravity pulls the wall along the axis.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> import swarm
+    >>> piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=10.0, motion=Guide(axis=(0.0, 0.0, 1.0), stiffness=40.0))
+    >>> piston.motion.speed
+    0.0
+    """
+
+    axis: Vector
+    speed: float = 0.0
+    stiffness: float = 0.0
+    most: ClassVar[float] = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", axis_of(self.axis))
+        speed = checks.number("speed", self.speed)
+        checks.magnitude("|speed|", abs(speed))
+        object.__setattr__(self, "speed", speed)
+        object.__setattr__(self, "stiffness", checks.magnitude("stiffness", self.stiffness))
+
+    def harmonic(self, start: ArrayLike) -> Led:
+        """Where a point of the wall is before anything moves it."""
+        return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
+
+
+@dataclass(frozen=True)
+class Placed(Given):
+    """A wall that stays where a run has moved it: what is given at xi is at position + orientation xi.
+
+    Args:
+        position: three numbers [m].
+        orientation: a unit quaternion (w, x, y, z).
+        turn: its matrix, (3, 3).
+    """
+
+    position: Vector
+    orientation: tuple[float, float, float, float]
+    turn: tuple[Vector, ...]
+
+
+WallMotion = Translation | Oscillation | Rotation | Path | Sum | Guide | Placed
+# The motions by their kind in a scene file.
+KINDS: dict[str, Any] = {
+    "translation": Translation, "oscillation": Oscillation, "rotation": Rotation, "path": Path,
+    "guide": Guide,
+}  # fmt: skip
+
+
+def parts_of_wall(value: Any) -> "WallMotion | None":
+    """`value` as the motion of a wall: None, a motion, its table, or a list of several.
+
+    Raises:
+        SceneError: it is none of these.
+    """
+    if value is None or isinstance(value, WallMotion):
+        return value
+    if isinstance(value, Mapping):
+        kind = checks.one_of("motion.kind", value.get("kind"), KINDS)
+        given = {key: part for key, part in value.items() if key != "kind"}
+        names = list(KINDS[kind].__dataclass_fields__)
+        for key in given:
+            if key not in names:
+                raise SceneError(
+                    f"motion.{key}: unknown key, expected {checks.listed(names)}{checks.closest(key, names)}"
+                )
+        for name in names:
+            if name not in given and KINDS[kind].__dataclass_fields__[name].default is MISSING:
+                raise SceneError(
+                    f"motion.{name}: expected a value where kind is '{kind}', got nothing; add {name} = ..."
+                )
+        return KINDS[kind](**given)  # type: ignore[no-any-return]
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
+        parts = [part for one in value for part in parts_of(parts_of_wall(one))]
+        return parts[0] if len(parts) == 1 else Sum(tuple(parts))
+    raise SceneError(
+        f"motion must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got {value!r}"
+    )
+
+
+def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: float | None) -> None:
+    """Raise a `SceneError` where a wall with this mass or inertia has a motion that is none for it."""
+    if isinstance(motion, Guide) and mass is None:
+        raise SceneError("mass must go with a Guide, along which impacts move the wall, got None; give mass= [kg]")
+    if mass is not None and inertia is None and not (motion is None or isinstance(motion, Translation | Guide)):
+        raise SceneError(
+            f"motion must be None, a Translation or a Guide where a mass is given, got {motion}; a wall on a spring is "
+            "a Guide with a stiffness, one that turns has an inertia"
+        )
+    if inertia is not None and not isinstance(motion, Rotation):
+        raise SceneError(f"motion must be a Rotation where an inertia is given, got {motion}")
+
+
+def table_of(motion: "WallMotion") -> Any:
+    """The table of a wall's motion, of a sum a list of tables."""
+    names = {cls: kind for kind, cls in KINDS.items()}
+    tables = [{"kind": names[type(one)], **asdict(one)} for one in parts_of(motion)]
+    return tables[0] if len(tables) == 1 else tables
