@@ -1,4 +1,4 @@
-"""How a lasting contact begins and ends, one particle at a time: what it becomes at a wall, and where a step is cut."""
+"""How a lasting contact begins and ends, one particle at a time: what it becomes at a wall."""
 
 import math
 from typing import NamedTuple
@@ -6,9 +6,8 @@ from typing import NamedTuple
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, inlined, outlined
 from ..kernel.vector import ZERO, Vec, dot, norm, square
-from ..surfaces import contract, flights
+from ..surfaces import flights
 from ..surfaces import fold as walls
-from ..surfaces.moving import Carried, at
 from . import hold, sliding, touching
 from . import laws as wall_laws
 from .hold import One, Two
@@ -23,15 +22,13 @@ FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
 GRAZING = 5e-5
 # Of a velocity, the part across the walls that is none: its square is round-off of the energy.
 _NO_HOP = 1e-7
-# Parts of an acceleration, of a length and of a time that are none.
-_PRESSED, _NEAR, _INSTANT = 1e-12, 1e-13, 1e-9
+# Parts of an acceleration and of a time that are none.
+_PRESSED, _INSTANT = 1e-12, 1e-9
 # Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
 _SHARPEST = 1e-7
 _EPSILON = 2.220446049250313e-16
 # Walls within this part of the scene's size hold a particle together.
 _TOUCH = 1e-10
-# Places of a step that are looked at for another wall, and halvings down to its instant.
-_PLACES, _HALVINGS = 16, 60
 
 
 class Particle(NamedTuple):
@@ -278,108 +275,3 @@ def off_the_wall(chain, wall, r, v, u):
     n = _normal(chain, wall, r)
     b, least = dot(relative(u, v), n), 4.0 * _EPSILON * norm(v)
     return v - (b + least) * n if abs(b) <= least else v
-
-
-# --- Where a step is cut ---------------------------------------------------------------------------------
-
-
-class Arrival(NamedTuple):
-    """The part of a step after which it meets a wall, infinite where it meets none, and that wall."""
-
-    time: float
-    wall: float
-
-
-@by_type
-def arrival(chain, number, held, path, near, left):
-    """The first wall that a step goes into, with so much of the frame left at its start [s]."""
-    raise NotImplementedError
-
-
-@arrival.register(walls.Chain)
-def _(chain, number, held, path, near, left):
-    later = arrival(chain.rest, number + 1.0, held, path, near, left)
-    if hold.is_held_by(held, number):
-        return later
-    time = _deep_after(chain.first, path, near)
-    if time <= later.time:
-        return Arrival(time, number)
-    return later
-
-
-arrival.register(type(None), lambda chain, number, held, path, near, left: Arrival(math.inf, -1.0))
-
-
-@arrival.register(Carried)
-def _(chain, number, held, path, near, left):
-    found = Arrival(math.inf, -1.0)
-    for i in range(walls.length(chain)):
-        if not hold.is_held_by(held, float(i)):
-            time = _deep_later(chain, float(i), path, near, left)
-            if time < found.time:
-                found = Arrival(time, float(i))
-    return found
-
-
-@outlined
-def _deep_later(chain, wall, path, near, left):
-    """`_deep_after` of a wall that may move."""
-    start = at(chain, left)
-    towards = path.v0 - walls.velocity(start, wall, path.r0)
-    if walls.distance(start, wall, path.r0) >= -near and dot(walls.unit_normal(start, wall, path.r0), towards) > 0.0:
-        return 0.0
-    low, high = 0.0, math.inf
-    for k in range(1, _PLACES + 1):
-        s = k / _PLACES
-        if walls.distance(at(chain, left - s * path.h), wall, _at(path, s)) > near:
-            high = s
-            break
-        low = s
-    if not high < math.inf:
-        return high
-    for _i in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if walls.distance(at(chain, left - middle * path.h), wall, _at(path, middle)) > 0.0:
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-@outlined
-def _deep_after(surface, path, near):
-    """The part of a step after which it is deeper than `near` in a wall; 0 where it is there and goes in."""
-    depth = contract.distance(surface, path.r0)
-    if depth >= -near and dot(contract.unit_normal(surface, path.r0), path.v0) > 0.0:
-        return 0.0
-    low, high = 0.0, math.inf
-    for k in range(1, _PLACES + 1):
-        if contract.distance(surface, _at(path, k / _PLACES)) > near:
-            high = k / _PLACES
-            break
-        low = k / _PLACES
-    if not high < math.inf:
-        time, found = contract.first_hit(surface, path.r0, path.r1 - path.r0)
-        return time if found and 0.0 < time < 1.0 else math.inf
-    for _i in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if contract.distance(surface, _at(path, middle)) > 0.0:
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-@inlined
-def _at(path, s):
-    """The cubic through both ends of a step."""
-    d, h = path.r1 - path.r0, path.h
-    # Hermite's form: r0 + h v0 s + (3 d - h (2 v0 + v1)) s^2 + (h (v0 + v1) - 2 d) s^3
-    a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
-    return path.r0 + s * (h * path.v0 + s * (a + s * b))
-
-
-@inlined
-def near(rules, r):
-    """A distance that is none."""
-    return _NEAR * rules.size + 8.0 * _EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))

@@ -9,16 +9,15 @@ Sources: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki,
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from ..surfaces import contract
 from ..surfaces import fold as walls
-from ..surfaces.posed import rising, straight_hit
 from . import laws as wall_laws
-from .hold import Two, along, is_held_by, mean_drift, presses, split_at
+from .hold import Two, along, mean_drift, presses, split_at
 from .reflection import relative, wall_velocity
 
 _EPSILON = 2.220446049250313e-16
@@ -323,58 +322,3 @@ def next_step(h, ratio):
     factor = _SAFE / math.sqrt(math.sqrt(select(some, ratio, 1.0)))
     factor = select(some & (factor < _GROW), factor, _GROW)
     return h * select(factor > _SHRINK, factor, _SHRINK)
-
-
-class Path(NamedTuple):
-    """A step of length h."""
-
-    r0: Vec
-    v0: Vec
-    r1: Vec
-    v1: Vec
-    h: Any
-
-
-@by_type
-def meets(chain, ends, number, held, path, near):
-    """Whether a step may go deeper than `near` into a wall that does not hold the particle.
-
-    `ends` are the walls at its end, which are others where they move.
-    """
-    raise NotImplementedError
-
-
-@meets.register(walls.Chain)
-def _(chain, ends, number, held, path, near):
-    here = _may_meet(chain.first, ends.first, path, near) & (not is_held_by(held, number))
-    return here | meets(chain.rest, ends.rest, number + 1.0, held, path, near)
-
-
-meets.register(type(None), lambda chain, ends, number, held, path, near: False)
-
-
-@inlined
-def _may_meet(surface, end, path, near):
-    level0, rise0, _scale = _level(surface, path.r0, path.v0)
-    level1, rise1, scale = _level(end, path.r1, path.v1)
-    # The cubic through both ends is below its control points; the start is known to be admissible.
-    third, deep = path.h / 3.0, near * scale
-    on_line = _on_line(surface, end, path.r0, path.r1)
-    return (level0 + third * rise0 > deep) | (level1 - third * rise1 > deep) | (level1 > deep) | on_line
-
-
-@inlined
-def _level(surface, r, v):
-    """The level of a wall, its rate of change, and the length of its gradient."""
-    n = contract.unit_normal(surface, r)
-    scale = abs(dot(n, contract.slope(surface, r)))
-    return contract.level_of(surface, contract.inner(surface, r)), scale * rising(surface, n, r, v), scale
-
-
-@by_type
-def _on_line(surface, end, r0, r1):
-    """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
-    if contract.is_quartic(surface) or contract.flat(surface):
-        return False
-    time, _found = straight_hit(surface, end, r0, r1)
-    return time < 1.0

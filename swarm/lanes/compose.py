@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import events, hold
+from ..contact import crossing, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.reflection import relative, wall_velocity
@@ -211,9 +211,9 @@ def end_steps(kind, method, chain, gravity, lanes, live):
         v1 = _restored(moving, v1, twice - rest, scale2)
         force = slides.force(laws, held, now, gravity, r1, v1)
         ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), rows[ALLOWED, i])
-        path = slides.Path(r0, v0, r1, v1, h)
+        path = crossing.Path(r0, v0, r1, v1, h)
         lifted = hold.lets_go(held, force.n, force.m)
-        met = slides.meets(start, now, 0.0, held, path, events.near(method, r1))
+        met = crossing.meets(start, now, 0.0, held, path, crossing.near(method, r1))
         good = (ratio <= 1.0) & (lanes.event[i] == 0)
         fine = good & (not lifted) & (not met)
         happened = select(lifted, LIFTED, 0) | select(met, MET, 0)

@@ -9,19 +9,18 @@ import math
 
 import numpy as np
 
-from ..contact import events, hold
+from ..contact import crossing, events, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
-from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
-from ..contact.projection import ALLOWED
+from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
 from ..contact.reflection import wall_velocity
-from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined
-from ..kernel.vector import ZERO, column, norm, put, square
+from ..kernel.gravity import potential
+from ..kernel.jit import by_type, index, inlined, kernel, outlined
+from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
-from ..surfaces.moving import at, during
+from ..surfaces.moving import at
 from .arrays import LANES, following_particle, speed2_scale, with_distances
 from .compose import (
     CUT,
@@ -35,7 +34,6 @@ from .compose import (
     R1,
     SCALE2,
     SHORTEST,
-    SLOWEST,
     STEP,
     STOPPED,
     STUCK,
@@ -56,6 +54,7 @@ from .compose import (
     twice_after,
     work,
 )  # fmt: skip
+from .stay import phase_of, stay
 
 # Times that a step is cut before the lane is given up: it takes four or so.
 _MOST_TRIALS = 100
@@ -63,16 +62,6 @@ _MOST_TRIALS = 100
 _FIRST = 1e-3
 # A step that is tried again is so much shorter.
 _RETRY = 0.25
-# Halvings of the interval in which a wall lets a particle go that rests on it.
-_HALVINGS = 60
-
-
-@by_type
-def _phase(kind):
-    return HELD
-
-
-_phase.register(hold.Two, lambda kind: EDGE)
 
 
 @kernel
@@ -103,7 +92,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
-            if phase != _phase(kind):
+            if phase != phase_of(kind):
                 _retire(kind, moving, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
                     kind, method, chain, gravity, share, lanes, i, (following, stop, drawn)
@@ -118,7 +107,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
 def _leave(kind, moving, chain, share, lanes, live):
     """The live lanes back into their particles, which go on when the frame does."""
     for i in range(live):
-        _retire(kind, moving, chain, share, lanes, i, _phase(kind))
+        _retire(kind, moving, chain, share, lanes, i, phase_of(kind))
 
 
 @outlined
@@ -126,7 +115,7 @@ def _refill(kind, method, chain, gravity, share, lanes, lane, at):
     """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one."""
     following, stop, drawn = at
     while True:
-        following, stop, drawn = following_particle(share, _phase(kind), following, stop, drawn)
+        following, stop, drawn = following_particle(share, phase_of(kind), following, stop, drawn)
         if following == stop:
             return following, stop, drawn, False
         following += 1
@@ -137,7 +126,7 @@ def _refill(kind, method, chain, gravity, share, lanes, lane, at):
 @inlined
 def _next_phase(kind, method, chain, gravity, state, lanes, i):
     """What a lane does after a step."""
-    phase = _phase(kind)
+    phase = phase_of(kind)
     if lanes.event[i] != 0:
         phase = _decide(kind, method, chain, gravity, state, lanes, i)
     return phase if lanes.rows[LEFT, i] > 0.0 else ARRIVED
@@ -166,7 +155,7 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
     put(rows, R, lane, r)
     put(rows, V, lane, v)
     phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
-    if phase != _phase(kind):
+    if phase != phase_of(kind):
         _retire(kind, wall_laws.moving(methods.laws(method)), chain, share, lanes, lane, phase)
         return False
     return True
@@ -185,7 +174,7 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     if not rows[STEP, i] > 0.0:
         rows[STEP, i] = _FIRST * method.size / np.sqrt(rows[SCALE2, i])
     if wall_laws.moves(laws):
-        return _stay(wall_laws.moving(laws), kind, method, chain, gravity, state, lanes, i)
+        return stay(wall_laws.moving(laws), kind, method, chain, gravity, state, lanes, i)
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
         contacts.sliding[p] += left
@@ -195,7 +184,7 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
         push(state, lanes, i, force.n * left, force.m * left)
         rows[LEFT, i] = 0.0
         return ARRIVED
-    return _phase(kind)
+    return phase_of(kind)
 
 
 @outlined
@@ -218,7 +207,7 @@ def _retire(kind, moving, chain, share, lanes, i, phase):
     if phase != ARRIVED:
         contacts.phase[p] = phase if slid else FLYING
     elif contacts.phase[p] != ARRIVED:
-        contacts.phase[p] = _phase(kind)
+        contacts.phase[p] = phase_of(kind)
     contacts.left[p] = rows[LEFT, i] if phase != ARRIVED else 0.0
     contacts.step[p] = rows[STEP, i] if slid else 0.0
     contacts.keep[p] = keep
@@ -258,11 +247,11 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     if event & LIFTED:
         particle = events.Particle(r, v, rows[LEFT, i], rows[TWICE, i], rows[SCALE2, i])
         phase, cut = _lift(kind, lanes, i, events.weightless(method, gravity, particle))
-        if phase != _phase(kind):
+        if phase != phase_of(kind):
             return phase
     if event & MET:
-        path = slides.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
-        met = events.arrival(chain, 0.0, held, path, events.near(method, r), rows[LEFT, i])
+        path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
+        met = crossing.arrival(chain, 0.0, held, path, crossing.near(method, r), rows[LEFT, i])
         if met.time == 0.0:
             state.contacts.met[lanes.particle[i]] = met.wall
             put(rows, R, i, walls.settle(at(chain, rows[LEFT, i]), met.wall, r))
@@ -273,7 +262,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
         return _take(kind, method, chain, gravity, state, lanes, i)
     rows[CUT, i] = cut * h
     rows[TRIALS, i] += 1.0
-    return _phase(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
+    return phase_of(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
 
 
 @by_type
@@ -298,112 +287,6 @@ def _(moving, chain, gravity, state, lanes, i):
     lose(state, lanes, i, lost)
     work(moving, state, lanes, i, given, 0.0)
     put(rows, V, i, u)
-
-
-@by_type_outlined
-def _stay(moving, kind, method, chain, gravity, state, lanes, i):
-    """What a lane does that moves with its walls as long as friction, or a balance of forces, holds it there."""
-    return _phase(kind)
-
-
-@_stay.register(wall_laws.Moves)
-def _(moving, kind, method, chain, gravity, state, lanes, i):
-    rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
-    r, v = column(rows, R, i), column(rows, V, i)
-    now = at(chain, left)
-    u = walls.velocity(now, first, r)
-    if square(v - u) > SLOWEST * rows[SCALE2, i] or not _rests(kind, method, now, gravity, lanes, i, r):
-        return _phase(kind)
-    pace, low, high = walls.pace(now, first), 0.0, 0.0
-    pressed, pressed_second = 0.0, 0.0
-    while low < left:
-        step = min(pace, left - low)
-        high = left if low + step >= left else low + step
-        middle = 0.5 * (low + high)
-        if not (
-            _rests_later(kind, method, chain, gravity, lanes, i, middle)
-            and _rests_later(kind, method, chain, gravity, lanes, i, high)
-        ):
-            break
-        # Simpson's rule for what presses
-        one, two, three = (
-            _press_later(kind, method, chain, gravity, lanes, i, low),
-            _press_later(kind, method, chain, gravity, lanes, i, middle),
-            _press_later(kind, method, chain, gravity, lanes, i, high),
-        )
-        pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
-        pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
-        low = high
-    end = low
-    if low < left:
-        start = low
-        for _k in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            if _rests_later(kind, method, chain, gravity, lanes, i, middle):
-                low = middle
-            else:
-                high = middle
-        end = high
-        one, two = (
-            _press_later(kind, method, chain, gravity, lanes, i, start),
-            _press_later(kind, method, chain, gravity, lanes, i, low),
-        )
-        pressed += 0.5 * (one.n + two.n) * (end - start)
-        pressed_second += 0.5 * (one.m + two.m) * (end - start)
-    after = left - end
-    r1 = walls.carry(during(chain, left, after), first, r)
-    then = at(chain, after)
-    v1 = walls.velocity(then, first, r1)
-    twice = square(v1) + 2.0 * potential(gravity, r1)
-    given = twice - rows[TWICE, i]
-    rows[TWICE, i], rows[LEFT, i], rows[KEEP, i] = twice, after, 0.0
-    put(rows, R, i, r1)
-    put(rows, V, i, v1)
-    push(state, lanes, i, pressed, pressed_second)
-    work(moving, state, lanes, i, given, 0.0)
-    state.contacts.sliding[lanes.particle[i]] += end
-    if not after > 0.0:
-        return ARRIVED
-    held = hold.of_lane(kind, first, rows[WALL + 1, i])
-    force = slides.force(methods.laws(method), held, then, gravity, r1, v1)
-    put(rows, A, i, force.acceleration)
-    rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
-    return _phase(kind)
-
-
-@outlined
-def _rests(kind, method, now, gravity, lanes, i, r):
-    """Whether a lane that moves with its first wall goes on to do so from here."""
-    force, acceleration = _force_at_rest(kind, method, now, gravity, lanes, i, r)
-    pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
-    pressed = not hold.lets_go(kind, force.n, force.m)
-    return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
-
-
-@outlined
-def _force_at_rest(kind, method, now, gravity, lanes, i, r):
-    """The force on a lane at r that moves with its first wall, and the acceleration of that."""
-    first = lanes.rows[WALL, i]
-    held = hold.of_lane(kind, first, lanes.rows[WALL + 1, i])
-    u = walls.velocity(now, first, r)
-    return slides.force(methods.laws(method), held, now, gravity, r, u), walls.acceleration(now, first, r)
-
-
-@outlined
-def _rests_later(kind, method, chain, gravity, lanes, i, t):
-    rows = lanes.rows
-    left, r = rows[LEFT, i], column(rows, R, i)
-    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
-    return _rests(kind, method, at(chain, left - t), gravity, lanes, i, r1)
-
-
-@outlined
-def _press_later(kind, method, chain, gravity, lanes, i, t):
-    rows = lanes.rows
-    left, r = rows[LEFT, i], column(rows, R, i)
-    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
-    force, _acceleration = _force_at_rest(kind, method, at(chain, left - t), gravity, lanes, i, r1)
-    return force
 
 
 @outlined
@@ -432,7 +315,7 @@ def _shorten(kind, method, chain, state, lanes, i):
     rows, h = lanes.rows, lanes.rows[H, i]
     rows[STEP, i], rows[CUT, i] = _RETRY * h, np.inf
     if h > SHORTEST * method.size / math.sqrt(rows[SCALE2, i]):
-        return _phase(kind)
+        return phase_of(kind)
     end = column(rows, R, i) + h * column(rows, V, i)
     if walls.outside(at(chain, rows[LEFT, i] - h), -1.0, end) or not h > 0.0:
         return _give_up(state, lanes, i)
@@ -447,7 +330,7 @@ def _lift(kind, lanes, i, none):
     rows = lanes.rows
     if rows[PRESS, i] <= none:
         return FLYING, 0.0
-    return _phase(kind), _part(rows[PRESS, i], rows[PRESS1, i])
+    return phase_of(kind), _part(rows[PRESS, i], rows[PRESS1, i])
 
 
 @_lift.register(hold.Two)
@@ -460,7 +343,7 @@ def _(kind, lanes, i, none):
     if rows[PRESS + 1, i] <= none and rows[PRESS1 + 1, i] < 0.0:
         rows[WALL + 1, i] = -1.0
         return HELD, 0.0
-    return _phase(kind), min(_part(rows[PRESS, i], rows[PRESS1, i]), _part(rows[PRESS + 1, i], rows[PRESS1 + 1, i]))
+    return phase_of(kind), min(_part(rows[PRESS, i], rows[PRESS1, i]), _part(rows[PRESS + 1, i], rows[PRESS1 + 1, i]))
 
 
 @inlined

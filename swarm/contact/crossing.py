@@ -1,0 +1,178 @@
+"""Whether a step of a particle that slides goes into a wall that does not hold it, and where it is cut then."""
+
+import math
+from typing import Any, NamedTuple
+
+from ..kernel.jit import by_type, inlined, outlined
+from ..kernel.vector import Vec, dot
+from ..surfaces import contract
+from ..surfaces import fold as walls
+from ..surfaces.moving import Carried, at
+from ..surfaces.posed import rising, straight_hit
+from .hold import is_held_by
+
+_EPSILON = 2.220446049250313e-16
+# Of a length, the part that is none.
+_NEAR = 1e-13
+# Places of a step that are looked at for another wall, and halvings down to its instant.
+_PLACES, _HALVINGS = 16, 60
+
+
+class Path(NamedTuple):
+    """A step of length h."""
+
+    r0: Vec
+    v0: Vec
+    r1: Vec
+    v1: Vec
+    h: Any
+
+
+@by_type
+def meets(chain, ends, number, held, path, near):
+    """Whether a step may go deeper than `near` into a wall that does not hold the particle.
+
+    `ends` are the walls at its end, which are others where they move.
+    """
+    raise NotImplementedError
+
+
+@meets.register(walls.Chain)
+def _(chain, ends, number, held, path, near):
+    here = _may_meet(chain.first, ends.first, path, near) & (not is_held_by(held, number))
+    return here | meets(chain.rest, ends.rest, number + 1.0, held, path, near)
+
+
+meets.register(type(None), lambda chain, ends, number, held, path, near: False)
+
+
+@inlined
+def _may_meet(surface, end, path, near):
+    level0, rise0, _scale = _level(surface, path.r0, path.v0)
+    level1, rise1, scale = _level(end, path.r1, path.v1)
+    # The cubic through both ends is below its control points; the start is known to be admissible.
+    third, deep = path.h / 3.0, near * scale
+    on_line = _on_line(surface, end, path.r0, path.r1)
+    return (level0 + third * rise0 > deep) | (level1 - third * rise1 > deep) | (level1 > deep) | on_line
+
+
+@inlined
+def _level(surface, r, v):
+    """The level of a wall, its rate of change, and the length of its gradient."""
+    n = contract.unit_normal(surface, r)
+    scale = abs(dot(n, contract.slope(surface, r)))
+    return contract.level_of(surface, contract.inner(surface, r)), scale * rising(surface, n, r, v), scale
+
+
+@by_type
+def _on_line(surface, end, r0, r1):
+    """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
+    if contract.is_quartic(surface) or contract.flat(surface):
+        return False
+    time, _found = straight_hit(surface, end, r0, r1)
+    return time < 1.0
+
+
+# --- Where it is cut -------------------------------------------------------------------------------------
+
+
+class Arrival(NamedTuple):
+    """The part of a step after which it meets a wall, infinite where it meets none, and that wall."""
+
+    time: float
+    wall: float
+
+
+@by_type
+def arrival(chain, number, held, path, near, left):
+    """The first wall that a step goes into, with so much of the frame left at its start [s]."""
+    raise NotImplementedError
+
+
+@arrival.register(walls.Chain)
+def _(chain, number, held, path, near, left):
+    later = arrival(chain.rest, number + 1.0, held, path, near, left)
+    if is_held_by(held, number):
+        return later
+    time = _deep_after(chain.first, path, near)
+    if time <= later.time:
+        return Arrival(time, number)
+    return later
+
+
+arrival.register(type(None), lambda chain, number, held, path, near, left: Arrival(math.inf, -1.0))
+
+
+@arrival.register(Carried)
+def _(chain, number, held, path, near, left):
+    found = Arrival(math.inf, -1.0)
+    for i in range(walls.length(chain)):
+        if not is_held_by(held, float(i)):
+            time = _deep_later(chain, float(i), path, near, left)
+            if time < found.time:
+                found = Arrival(time, float(i))
+    return found
+
+
+@outlined
+def _deep_later(chain, wall, path, near, left):
+    """`_deep_after` of a wall that may move."""
+    start = at(chain, left)
+    towards = path.v0 - walls.velocity(start, wall, path.r0)
+    if walls.distance(start, wall, path.r0) >= -near and dot(walls.unit_normal(start, wall, path.r0), towards) > 0.0:
+        return 0.0
+    low, high = 0.0, math.inf
+    for k in range(1, _PLACES + 1):
+        s = k / _PLACES
+        if walls.distance(at(chain, left - s * path.h), wall, _at(path, s)) > near:
+            high = s
+            break
+        low = s
+    if not high < math.inf:
+        return high
+    for _i in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if walls.distance(at(chain, left - middle * path.h), wall, _at(path, middle)) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@outlined
+def _deep_after(surface, path, near):
+    """The part of a step after which it is deeper than `near` in a wall; 0 where it is there and goes in."""
+    depth = contract.distance(surface, path.r0)
+    if depth >= -near and dot(contract.unit_normal(surface, path.r0), path.v0) > 0.0:
+        return 0.0
+    low, high = 0.0, math.inf
+    for k in range(1, _PLACES + 1):
+        if contract.distance(surface, _at(path, k / _PLACES)) > near:
+            high = k / _PLACES
+            break
+        low = k / _PLACES
+    if not high < math.inf:
+        time, found = contract.first_hit(surface, path.r0, path.r1 - path.r0)
+        return time if found and 0.0 < time < 1.0 else math.inf
+    for _i in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if contract.distance(surface, _at(path, middle)) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@inlined
+def _at(path, s):
+    """The cubic through both ends of a step."""
+    d, h = path.r1 - path.r0, path.h
+    # Hermite's form: r0 + h v0 s + (3 d - h (2 v0 + v1)) s^2 + (h (v0 + v1) - 2 d) s^3
+    a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
+    return path.r0 + s * (h * path.v0 + s * (a + s * b))
+
+
+@inlined
+def near(rules, r):
+    """A distance that is none."""
+    return _NEAR * rules.size + 8.0 * _EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))
