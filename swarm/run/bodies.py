@@ -1,9 +1,8 @@
 """The state of a run of bodies, and the threads that advance it; what `engine.Run` is for particles."""
 
 import math
-import time
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from ..scene import Scene
 from ..status import Status
 from ..surfaces.fold import chain_of
 from .tiers import Tier
+from .waiting import result_of
 
 # Round-off of a position on a wall, as a part of the scene's size.
 _ROUND_OFF = 8.0 * np.finfo(np.float64).eps
@@ -31,8 +31,6 @@ _OUTSIDE = 1e-9
 _STACK, _MOST_LANES = 1 << 20, 32
 # Bodies that a thread draws at a time.
 _AT_ONCE = 256
-# The caller's thread looks for an interrupt so often [s].
-_GLANCE = 0.1
 _NEVER = 2**62
 # Suzuki's composition: five steps of second order are one of fourth.
 _OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
@@ -131,7 +129,7 @@ class BodyRun:
         kernel = self._tier.kernel(advance_bodies)
         threads = 1 if self._tier.is_plain else self._threads
         ends = [self._pool.submit(kernel, *self._arguments(ticket)) for _ in range(threads)]
-        status, number = max(self._end_of(end, latest) for end in ends)
+        status, number = max(result_of(end, latest, self.halt) for end in ends)
         self._halt[0] = _NEVER
         self._cut_short = status == Status.INTERRUPTED
         if status not in (Status.DONE, Status.INTERRUPTED):
@@ -139,15 +137,6 @@ class BodyRun:
         if not self._cut_short:
             self.observe()
         return not self._cut_short
-
-    def _end_of(self, end: "Future[tuple[int, int]]", latest: float) -> tuple[int, int]:
-        while True:
-            try:
-                return end.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
-            except TimeoutError:
-                if time.monotonic() >= latest:
-                    self.halt()
-                    latest = math.inf
 
     def _failure(self, status: Status, number: int, moment: float) -> str:
         time_of = moment - self._bodies.left[number]

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from ..scene import Scene
 from ..status import Status
 from . import failures
 from .tiers import Tier
+from .waiting import result_of
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
@@ -33,8 +34,6 @@ _OUTSIDE = 1e-9
 _SHORT_FRAME = 0.05
 # The caller's thread alone does frames of less work than this [s]: waking another takes some 0.1 ms.
 _LITTLE_WORK = 2e-4
-# The caller's thread looks for an interrupt so often [s].
-_GLANCE = 0.1
 # A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
 # What slides in each phase, and what else is no flight: each is a kernel.
@@ -131,7 +130,7 @@ class Run:
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
         ends = [self._share(span)] if helps else []
-        ends += [self._end_of(share, latest) for share in shares]
+        ends += [result_of(share, latest, self.halt) for share in shares]
         seconds = time.perf_counter() - began
         self._tier.left -= seconds
         status, particle, _left = max(ends, key=lambda end: end[:2])
@@ -197,20 +196,6 @@ class Run:
             return status, particle, None
         live = particle
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
-
-    def _end_of(self, share: "Future[_End]", latest: float) -> _End:
-        """The end of a share, which is halted at `latest`.
-
-        In many short waits: Python takes up a signal between two of them, and one that comes just before a long wait
-        (or to another thread) would be seen at its end only.
-        """
-        while True:
-            try:
-                return share.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
-            except TimeoutError:
-                if time.monotonic() >= latest:
-                    self.halt()
-                    latest = math.inf
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""

@@ -3,7 +3,7 @@
 import itertools
 import math
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -23,13 +23,12 @@ from ..scene import Scene
 from ..status import Status
 from . import failures
 from .tiers import Tier
+from .waiting import result_of
 
 # Beyond this part of the scene's size a particle outside rigid walls is an error.
 _OUTSIDE = 1e-9
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
-# The caller's thread looks for an interrupt so often [s].
-_GLANCE = 0.1
 _NEVER = 2**62
 # Fewer particles than this are predicted sooner than another thread is awake.
 _FEW = 4096
@@ -102,7 +101,7 @@ class ReactingRun:
         taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
         status, particle = int(Status.LEASE_ENDED), 0
         while status == Status.LEASE_ENDED:
-            status, particle = self._end_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest)
+            status, particle = result_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest, self.halt)
             if status == Status.LEASE_ENDED:
                 self._fit_leases()
                 self._predict(rule)
@@ -143,15 +142,6 @@ class ReactingRun:
         parts = [self._pool.submit(chosen, *arguments, *part) for part in itertools.pairwise(ends)]
         for part in parts:
             part.result()
-
-    def _end_of(self, end: "Future[tuple[int, int]]", latest: float) -> tuple[int, int]:
-        while True:
-            try:
-                return end.result(min(_GLANCE, max(0.0, latest - time.monotonic())))
-            except TimeoutError:
-                if time.monotonic() >= latest:
-                    self.halt()
-                    latest = math.inf
 
     def _stalled(self, particle: int, before: float) -> str:
         place = self.state.position[:, particle]
