@@ -266,7 +266,7 @@ from swarm.run import simulation
 def interrupted(*about):
     signal.raise_signal(signal.SIGINT)
     raise KeyboardInterrupt
-simulation.Run = interrupted
+simulation.run_of = interrupted
 signal.signal(signal.SIGINT, signal.default_int_handler)
 cli.main()
 """

@@ -159,7 +159,7 @@ def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Chain | Non
     for i in scene.owners():
         if scene.surfaces[i].reacts():
             wall = reacting.pop(0)
-            made.append(posed(wall.freedom, wall.body, freedoms, 0.0, 0.0))
+            made.append(posed(wall.freedom, wall.body, freedoms, 0.0))
         else:
             made.append(given.pop(0))
     chain = None

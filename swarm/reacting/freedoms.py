@@ -131,14 +131,14 @@ def rows_about(axis, angle):
 
 
 @by_type
-def drive_of(freedom, walls, end):
-    """Its motion as that of a wall whose motion is given, if nothing strikes it until the end of the frame."""
+def drive_of(freedom, walls, t):
+    """Its motion from this time on as that of a wall whose motion is given, whose frame ends then."""
     return _AT_REST
 
 
 @drive_of.register(Sprung)
-def _(freedom, walls, end):
-    found, rate = pose_of(freedom, walls, end), freedom.rate
+def _(freedom, walls, t):
+    found, rate = pose_of(freedom, walls, t), freedom.rate
     away, speed = found.shift - freedom.pull / (rate * rate), found.velocity / rate
     most = math.sqrt(square(away) + square(speed))
     bounds = rate * most, rate * rate * most, rate * rate * rate * most
@@ -147,14 +147,14 @@ def _(freedom, walls, end):
 
 
 @drive_of.register(Hinged)
-def _(freedom, walls, end):
-    rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, end).turn
+def _(freedom, walls, t):
+    rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, t).turn
     turning = Turn(turn.x, turn.y, turn.z, freedom.axis, rate)
     return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf)
 
 
 @by_type
-def posed(freedom, body, walls, t, end):
+def posed(freedom, body, walls, t):
     """A wall at a time of the frame, as a surface."""
     here = pose_of(freedom, walls, t)
     return Falling(body, here, here, _AT_REST, 0.0, 0.0)
@@ -162,10 +162,10 @@ def posed(freedom, body, walls, t, end):
 
 @posed.register(Sprung)
 @posed.register(Hinged)
-def _(freedom, body, walls, t, end):
-    drive = drive_of(freedom, walls, end)
-    here = pose(drive, end - t)
-    return Posed(body, here, here, drive, end - t, end - t)
+def _(freedom, body, walls, t):
+    drive = drive_of(freedom, walls, t)
+    here = pose(drive, 0.0)
+    return Posed(body, here, here, drive, 0.0, 0.0)
 
 
 # --- What an impulse does --------------------------------------------------------------------------------

@@ -92,13 +92,13 @@ def _(freedom, walls, t):
 
 
 @drive_of.register(Pendulum)
-def _(freedom, walls, end):
-    spin = angle_at(freedom, walls, end).rate * freedom.axis
+def _(freedom, walls, t):
+    spin = angle_at(freedom, walls, t).rate * freedom.axis
     return Drive(ZERO, ZERO, None, None, None, spin, freedom.center, 0.0, 0.0, 0.0, math.inf)
 
 
 @posed.register(Pendulum)
-def _(freedom, body, walls, t, end):
+def _(freedom, body, walls, t):
     here = pose_of(freedom, walls, t)
     return Posed(body, here, here, drive_of(freedom, walls, t), 0.0, 0.0)
 

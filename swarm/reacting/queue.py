@@ -55,7 +55,8 @@ class Queue(NamedTuple):
     dissipated: Array  # (N,)
     impacts: Array  # (N,)
     time: Array  # (N,) of the frame [s]
-    due: Array  # (N,) when it meets a wall that does not react
+    wait: Array  # (N,) from then until it meets a wall that does not react [s]
+    due: Array  # (N,) when that is
     wall: Array  # (N,) that wall, or -1 where only so much is known
     struck: Array  # (N,) the wall that reacts that it meets at its key, or NONE
     near: Array  # (N,) bool, whether its key holds only until a wall that reacts is struck
@@ -99,7 +100,7 @@ def _aim(scenery, queue, i, end):
     """Find when particle i meets a wall that does not react, from where it is."""
     t, r, v = queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     hit = _given_hit(scenery.given, scenery.pull, r, v, end - t)
-    queue.due[i], queue.wall[i] = t + hit.time, hit.wall
+    queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 
 @inlined
@@ -123,7 +124,7 @@ def _next(scenery, walls, queue, i, now, end, soon):
     if free > soon:
         return now + free
     queue.near[i] = True
-    hit = first_hit(scenery.reacting, scenery.pull, walls, flight, end)
+    hit = first_hit(scenery.reacting, scenery.pull, walls, flight)
     if not hit.time < flight.longest:
         return target
     queue.struck[i] = hit.wall
@@ -131,9 +132,9 @@ def _next(scenery, walls, queue, i, now, end, soon):
 
 
 @inlined
-def _fly(scenery, queue, i, t):
-    """Bring particle i to a time."""
-    way, v, pull = t - queue.time[i], column(queue.velocity, 0, i), scenery.pull
+def _fly(scenery, queue, i, t, way):
+    """Bring particle i to a time, which is so long from where it is."""
+    v, pull = column(queue.velocity, 0, i), scenery.pull
     put(queue.position, 0, i, column(queue.position, 0, i) + displacement(pull, v, way))
     put(queue.velocity, 0, i, accelerated(pull, v, way))
     queue.time[i] = t
@@ -161,12 +162,13 @@ def _strike(scenery, walls, queue, i, now):
     blow = strike(scenery.reacting, queue.struck[i], walls, Flight(r, v, ZERO, now, 0.0), m)
     # The energy decides the speed, as for walls that stay: round-off of J has a bias, 1e-16 of the energy an impact.
     energy = queue.energy[i] - (blow.given + blow.lost) / m
-    speed2 = 2.0 * (energy - potential(scenery.pull, r))
+    speed2 = 2.0 * (energy - potential(scenery.pull, blow.r))
     error = speed2 - square(blow.v)
     near = (abs(error) <= _NEAR * speed2) & (speed2 > 0.0)
     turned = blow.v * (1.0 + select(near, 0.5 * error / select(near, speed2, 1.0), 0.0))
+    put(queue.position, 0, i, blow.r)
     put(queue.velocity, 0, i, turned)
-    queue.energy[i] = select(near, energy, 0.5 * square(turned) + potential(scenery.pull, r))
+    queue.energy[i] = select(near, energy, 0.5 * square(turned) + potential(scenery.pull, blow.r))
     queue.impulse[index(blow.owner), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0
@@ -200,7 +202,7 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
 def arrive(scenery, queue, rule, first, last):
     """Bring the particles from `first` to before `last` to the end of the frame."""
     for k in range(first, last):
-        _fly(scenery, queue, index(k), rule.end)
+        _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)])
 
 
 @kernel
@@ -253,7 +255,9 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
 @inlined
 def _carry_out(scenery, freedoms, queue, i, now, end):
     """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
-    _fly(scenery, queue, i, now)
+    # The time of the frame has fewer digits than the flight.
+    way = select(queue.struck[i] >= 0.0, now - queue.time[i], queue.wait[i])
+    _fly(scenery, queue, i, now, way)
     if queue.struck[i] >= 0.0:
         _strike(scenery, freedoms, queue, i, now)
     elif queue.wall[i] >= 0.0:

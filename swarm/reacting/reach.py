@@ -11,10 +11,13 @@ from ..kernel.jit import by_type, index, select
 from ..kernel.vector import Vec, column, dot, norm, square
 from ..surfaces import contract
 from ..surfaces.course import rise_time
+from ..surfaces.fold import Chain
 from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
+from ..surfaces.shapes.quadratic import QuadricNumbers
 from ..surfaces.shapes.rotated import own as rotated_own
 from ..surfaces.shapes.slab import SlabNumbers, along
+from ..surfaces.shapes.solid import SolidNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
 from .freedoms import Hinged, arm_of, axis_of, pose_of
 from .pendulum import Pendulum
@@ -52,9 +55,61 @@ def _(freedom, body, walls, flight):
     k = index(freedom.row)
     arm, turn = arm_of(freedom, flight.r), pose_of(freedom, walls, flight.time).turn
     own = freedom.center + turn.x * arm.x + turn.y * arm.y + turn.z * arm.z
-    clear = max(contract.clearance(body, own), 0.0)
+    clear = max(_clear(body, own), 0.0)
     fastest = (abs(walls.turning[k]) + walls.width[k]) * (norm(arm) + clear) + norm(flight.v)
     return rise_time(-clear, 0.5 * fastest, 0.5 * norm(flight.pull))
+
+
+@by_type
+def _clear(body, r):
+    """A lower bound of the distance to the wall."""
+    return contract.clearance(body, r)
+
+
+@_clear.register(SolidNumbers)
+def _(body, r):
+    return _farthest_part(body.parts, r)
+
+
+@_clear.register(Rotated)
+def _(body, r):
+    return _clear(body.body, rotated_own(body, r))
+
+
+@by_type
+def _farthest_part(parts, r):
+    """How far a point is out of the part that it is farthest from: so far at least it is from the body."""
+    return 0.0
+
+
+@_farthest_part.register(Chain)
+def _(parts, r):
+    return max(_out_of(parts.first, r), _farthest_part(parts.rest, r))
+
+
+@by_type
+def _out_of(part, r):
+    """How far a point is out of a part at least; below 0 inside."""
+    return 0.0
+
+
+@_out_of.register(PlaneNumbers)
+@_out_of.register(SlabNumbers)
+@_out_of.register(SphereNumbers)
+def _(part, r):
+    return -contract.gap_of(part, contract.inner(part, r))
+
+
+@_out_of.register(QuadricNumbers)
+def _(part, r):
+    # phi over its gradient is no more than the distance where phi is convex.
+    convex = min(part.a.x, part.a.y, part.a.z) >= 0.0
+    steepness = norm(contract.gradient(part, r))
+    out = -contract.gap_of(part, contract.inner(part, r)) / select(steepness > 0.0, steepness, 1.0)
+    return select(convex, out, 0.0)
+
+
+_out_of.register(Rotated, lambda part, r: _out_of(part.body, rotated_own(part, r)))
 
 
 @by_type
@@ -77,7 +132,7 @@ _across_slab.register(Vec, lambda axis, n: abs(along(n, axis)))
 @by_type
 def _reach(body, seen):
     # Of any shape the distance is all that is known.
-    clear = max(contract.clearance(body, seen.r), 0.0)
+    clear = max(_clear(body, seen.r), 0.0)
     return rise_time(-clear, 0.5 * (norm(seen.v) + seen.width), 0.5 * norm(seen.pull))
 
 

@@ -3,13 +3,14 @@
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, index, select
+from ..kernel.jit import by_type, index, inlined, select
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces import contract, flights, safe
 from ..surfaces.flights import NEVER, sooner
 from ..surfaces.fold import Chain
+from ..surfaces.moving import Moving
 from ..surfaces.relative import flight_of
-from .freedoms import arm_of, mobility, posed, push, renew, stays
+from .freedoms import Hinged, Sprung, arm_of, drive_of, mobility, posed, push, renew, stays
 from .pendulum import Pendulum, swaying
 from .reach import reach
 
@@ -36,6 +37,7 @@ class Flight(NamedTuple):
 class Blow(NamedTuple):
     """What an impact on a wall that reacts makes of a particle, and its impulse [N s]."""
 
+    r: Vec  # on the wall
     v: Vec
     impulse: float
     given: float  # energy that the wall gains [J]
@@ -57,28 +59,38 @@ def _(chain, walls, flight):
 
 
 @by_type
-def first_hit(chain, gravity, walls, flight, end):
+def first_hit(chain, gravity, walls, flight):
     """The first `Hit` of a flight, if nothing else strikes the walls before."""
     return NEVER
 
 
 @first_hit.register(Chain)
-def _(chain, gravity, walls, flight, end):
-    time, found = _hit(chain.first.freedom, chain.first.body, gravity, walls, flight, end)
-    return sooner(time, found, first_hit(chain.rest, gravity, walls, flight, end))
+def _(chain, gravity, walls, flight):
+    time, found = _hit(chain.first.freedom, chain.first.body, gravity, walls, flight)
+    return sooner(time, found, first_hit(chain.rest, gravity, walls, flight))
 
 
 @by_type
-def _hit(freedom, body, gravity, walls, flight, end):
+def _hit(freedom, body, gravity, walls, flight):
     """When a flight meets one wall: (time, whether it does then)."""
-    return flights.hit(gravity, posed(freedom, body, walls, flight.time, end), flight.r, flight.v)
+    return flights.hit(gravity, posed(freedom, body, walls, flight.time), flight.r, flight.v)
+
+
+@_hit.register(Sprung)
+@_hit.register(Hinged)
+def _(freedom, body, gravity, walls, flight):
+    return _march(Moving(body, drive_of(freedom, walls, flight.time)), flight, flight.longest)
 
 
 @_hit.register(Pendulum)
-def _(freedom, body, gravity, walls, flight, end):
+def _(freedom, body, gravity, walls, flight):
     # What comes after the lease is asked again then.
     longest = min(flight.longest, max(walls.until[index(freedom.row)] - flight.time, 0.0))
-    wall = swaying(freedom, body, walls, flight, longest)
+    return _march(swaying(freedom, body, walls, flight, longest), flight, longest)
+
+
+@inlined
+def _march(wall, flight, longest):
     found = safe.march(Chain(wall, None), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
     return found.time, found.wall >= 0.0
 
@@ -86,7 +98,7 @@ def _(freedom, body, gravity, walls, flight, end):
 @by_type
 def strike(chain, wall, walls, flight, mass):
     """The impact of a particle on the wall with this number: its `Blow`."""
-    return Blow(flight.v, 0.0, 0.0, 0.0, -1)
+    return Blow(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
 
 
 @strike.register(Chain)
@@ -94,10 +106,12 @@ def _(chain, wall, walls, flight, mass):
     if wall != 0.0:
         return strike(chain.rest, wall - 1.0, walls, flight, mass)
     first = chain.first
-    surface = posed(first.freedom, first.body, walls, flight.time, flight.time)
-    n, arm = contract.unit_normal(surface, flight.r), arm_of(first.freedom, flight.r)
+    surface = posed(first.freedom, first.body, walls, flight.time)
+    # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next time.
+    r = contract.settle(surface, flight.r)
+    n, arm = contract.unit_normal(surface, r), arm_of(first.freedom, r)
     # J = (1 + e) n.(v - u)/(n^2/m + 1/M_n)
-    speed = dot(n, contract.velocity(surface, flight.r))
+    speed = dot(n, contract.velocity(surface, r))
     approach = dot(n, flight.v) - speed
     approach = select(approach > 0.0, approach, 0.0)
     give = mobility(first.freedom, n, arm)
@@ -106,7 +120,7 @@ def _(chain, wall, walls, flight, mass):
     push(first.freedom, walls, flight.time, impulse * n, arm)
     lost = 0.5 * (1.0 - first.restitution) * (1.0 + first.restitution) * approach * approach / both
     given = impulse * (speed + 0.5 * impulse * give)
-    return Blow(flight.v - (impulse / mass) * n, impulse, given, lost, first.owner)
+    return Blow(r, flight.v - (impulse / mass) * n, impulse, given, lost, first.owner)
 
 
 # --- Leases ----------------------------------------------------------------------------------------------

@@ -56,8 +56,9 @@ class ReactingRun:
         number = np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
-            np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool), np.zeros(n, np.int64),
-            np.zeros(n, bool), np.zeros(n, np.int64), Heap(np.zeros(n), number.copy(), number.copy()),
+            np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
+            np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
+            Heap(np.zeros(n), number.copy(), number.copy()),
         )  # fmt: skip
         speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
         self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)

@@ -92,11 +92,12 @@ def march(chain, flight, longest):
             if near.depth <= _ROUND_OFF * near.room:
                 return Hit(t, near.past)
             return _last_inside(chain, flight, before, t, near.past)
+        # A step that only ends with the longest time is no hit, however short.
+        if not near.time < longest - t:
+            return Hit(longest, -1.0)
         before, t = t, t + near.time
         if (i > 0 or near.time == 0.0) and near.way <= near.room:
             return Hit(t, near.wall)
-        if not t < longest:
-            return Hit(longest, -1.0)
     return Hit(t, -1.0)
 
 

@@ -66,9 +66,11 @@ def run(scene, particles, until, frames=1, **options):
 
 
 def imbalance(result):
+    """Relative to what the energy is the sum of."""
     seen = result.observables
     kept = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum(axis=1)
-    return np.abs(kept - kept[0]).max() / np.abs(seen["total_energy"]).max()
+    parts = seen["kinetic_energy"] + np.abs(seen["potential_energy"]) + np.abs(seen["wall_energy"]).sum(axis=1)
+    return np.abs(kept - kept[0]).max() / parts.max()
 
 
 # --- Closed forms ----------------------------------------------------------------------------------------
