@@ -56,10 +56,13 @@ def _energies(law, chain, gravity, m, r, v):
 
 
 def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
-    """The energies of particles, positions and velocities (3, N), without a kernel: those of one go through NumPy."""
+    """The energies of particles, positions and velocities (3, N), at time 0.
+
+    Without a kernel: those of one particle go through NumPy.
+    """
     stored = np.zeros(len(mass))
     if law is not None:
-        chain = scene.chain()
+        chain = at(scene.chain(), 0.0)
         # Few particles are in a wall, and its law takes one number.
         for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
             stored[i] = contact_energy(law, chain, 1.0 / mass[i], column(position, 0, i))

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
-from ..kernel.vector import ZERO, Vec, largest, norm
+from ..kernel.vector import ZERO, Vec, dot, largest, norm
 from ..surfaces import contract
 from . import impulse as contact_impulse
 from . import regularisation as law_of
 from .discrete_gradient import reaction
+from .laws import Moves
 from .records import Step
 
 _EPSILON = 2.220446049250313e-16
@@ -90,6 +91,32 @@ def add_impulses(reactions, h, impulse, lane):
     """Add the impulse per mass of each wall in a step of length h, |2/h reaction|, to impulse[wall, lane]."""
     for k in range(reactions.shape[0]):
         impulse[k, lane] += 2.0 / h * norm(_reaction_of(reactions, k))
+
+
+@by_type_outlined
+def add_works(moving, chain, k, factor, reactions, impulse, lane):
+    """Add the work per mass of each wall in a step, `factor` times reaction.way, to its row of `impulse`: their sum.
+
+    The rows of work are behind those of impulses; where no wall moves there are none.
+    """
+    return 0.0
+
+
+@add_works.register(Moves)
+def _(moving, chain, k, factor, reactions, impulse, lane):
+    return _add_works(chain, k, factor, reactions, impulse, lane)
+
+
+@by_type_outlined
+def _add_works(chain, k, factor, reactions, impulse, lane):
+    work = factor * dot(_reaction_of(reactions, k), contract.way(chain.first))
+    impulse[reactions.shape[0] + k, lane] += work
+    return work + _add_works(chain.rest, k + 1, factor, reactions, impulse, lane)
+
+
+@_add_works.register(Nothing)
+def _(chain, k, factor, reactions, impulse, lane):
+    return 0.0
 
 
 @by_type_outlined

@@ -16,8 +16,10 @@ from typing import Any, NamedTuple
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from ..surfaces import contract
+from ..surfaces.stroke import framed
 from . import impulse
 from . import regularisation as law_of
+from .records import Step
 
 _EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
@@ -132,31 +134,33 @@ def _(form, law, multiplier, surface, step):
 
 @reaction.register(MeanValue)
 def _(form, law, multiplier, surface, step):
+    body, r0, p = framed(surface, step.r, step.p)
+    own = Step(r0, p, step.c)
     # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
     low, high = 0.0, 0.0
-    kappa, f_low = _pushed(law, multiplier, surface, step, low)
+    kappa, f_low = _pushed(law, multiplier, body, own, low)
     f_high = f_low
     for i in range(_PARTS):
         if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
             break
         low, f_low, high = high, f_high, (i + 1.0) / _PARTS
-        kappa, f_high = _pushed(law, multiplier, surface, step, high)
+        kappa, f_high = _pushed(law, multiplier, body, own, high)
     beta, found = high, f_high == 0.0
     if f_low == 0.0:
         beta, found = low, True
-        kappa, _f = _pushed(law, multiplier, surface, step, low)
+        kappa, _f = _pushed(law, multiplier, body, own, low)
     elif f_low * f_high < 0.0:
         for _i in range(_BETA_ITERATIONS):
             beta = illinois(low, f_low, high, f_high)
-            kappa, f = _pushed(law, multiplier, surface, step, beta)
+            kappa, f = _pushed(law, multiplier, body, own, beta)
             if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
                 found = True
                 break
             low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
     # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
     # identity requires along grad q(r_beta) meets it whatever beta is.
-    r, change = _balanced(law, multiplier, surface, step, beta, kappa)
-    return Reaction(r, _constraint(law, surface, step.r + step.p - r), found and change <= _NEARLY)
+    r, change = _balanced(law, multiplier, body, own, beta, kappa)
+    return Reaction(r, _constraint(law, body, r0 + p - r), found and change <= _NEARLY)
 
 
 @outlined

@@ -6,6 +6,7 @@ from ..kernel.gravity import Nothing, potential, weight
 from ..kernel.jit import by_type, inlined, select
 from ..kernel.vector import Vec, absolute, dot, square, total
 from ..surfaces import contract
+from ..surfaces.stroke import place_scale
 from . import regularisation as law_of
 
 # Units of round-off by which a contact that is solved may miss its energy.
@@ -16,7 +17,7 @@ class Budget(NamedTuple):
     """What the energy of a step is measured against."""
 
     over_mass: float  # 1/mass
-    energy: float  # of the particle at the start of the run, per mass
+    energy: float  # of the particle, per mass: that at the start of the run, with the work of walls since
     force: float  # that multipliers add to the springs, per mass
 
 
@@ -61,7 +62,7 @@ def energy_uncertainty(chain, law, over_mass, r, s):
     g = contract.gap_of(surface, contract.inner(surface, r))
     # 2 V/g, which is the force up to the factor (a + 1)/2
     force = law_of.stiffness(law, g) * select(g > 0.0, g, 0.0) * over_mass
-    here = force * dot(absolute(contract.gradient(surface, r)), s)
+    here = force * dot(absolute(contract.gradient(surface, r)), place_scale(surface, s))
     return here + energy_uncertainty(chain.rest, law, over_mass, r, s)
 
 
@@ -71,21 +72,22 @@ def _(chain, law, over_mass, r, s):
 
 
 @inlined
-def restored(law, chain, gravity, budget, ends):
+def restored(law, chain, after, gravity, budget, ends):
     """Factor of v after a contact step that restores the energy of the particle, and whether only round-off is missing.
 
     Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
     energy, and over many contacts the errors add up (measured: 2e-10 after 10 000 steps at dt sqrt(alpha/m) = 100).
     Where more than round-off is missing the factor is 1: that is an equation that was not solved, or a tolerance.
+    `chain` has the walls over the step, `after` those at its end.
     """
     r0, r1, v, h = ends
     speed2 = square(v)
-    stored = contact_energy(law, chain, budget.over_mass, r1)
+    stored = contact_energy(law, after, budget.over_mass, r1)
     missing = 2.0 * (budget.energy - potential(gravity, r1) - stored) - speed2
     # The magnitudes that set the round-off of the coordinates.
     s = absolute(r0) + absolute(r1) + h * absolute(v)
     uncertainty = energy_uncertainty(chain, law, budget.over_mass, r0, s)
-    uncertainty += energy_uncertainty(chain, law, budget.over_mass, r1, s)
+    uncertainty += energy_uncertainty(after, law, budget.over_mass, r1, s)
     uncertainty += speed2 + abs(budget.energy) + weight(gravity, s) + budget.force * total(s)
     balanced = abs(missing) <= _ROUND_OFF * uncertainty
     return 1.0 + select(balanced & (speed2 > 0.0), 0.5 * missing / speed2, 0.0), balanced

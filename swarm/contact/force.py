@@ -2,9 +2,11 @@
 
 from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, select
-from ..kernel.vector import ZERO, norm
+from ..kernel.vector import ZERO, dot, norm
 from ..surfaces import contract
+from ..surfaces.fold import Chain, length
 from . import regularisation as law_of
+from .laws import Moves
 
 # What the force needs of every wall.
 NEEDS = (contract.inner, contract.gap_of, contract.gap_slope, contract.inner_gradient)
@@ -49,3 +51,48 @@ def add_impulses(chain, law, factor, k, r, impulse, lane):
 @add_impulses.register(Nothing)
 def _(chain, law, factor, k, r, impulse, lane):
     pass
+
+
+@by_type
+def work(moving, chain, now, law, r):
+    """The sum of force.way of all walls: `chain` has them over the step, `now` when the particle is at r."""
+    return 0.0
+
+
+@work.register(Moves)
+def _(moving, chain, now, law, r):
+    return _work(chain, now, law, r)
+
+
+@by_type
+def _work(chain, now, law, r):
+    here = dot(force(Chain(now.first, None), law, r), contract.way(chain.first))
+    return here + _work(chain.rest, now.rest, law, r)
+
+
+@_work.register(Nothing)
+def _(chain, now, law, r):
+    return 0.0
+
+
+@by_type_outlined
+def add_works(moving, chain, now, law, factor, r, impulse, lane):
+    """Add `factor` times force.way of each wall to its row of work in `impulse`: their sum, as `work`."""
+    return 0.0
+
+
+@add_works.register(Moves)
+def _(moving, chain, now, law, factor, r, impulse, lane):
+    return _add_works(chain, now, law, factor, length(chain), r, impulse, lane)
+
+
+@by_type_outlined
+def _add_works(chain, now, law, factor, row, r, impulse, lane):
+    here = factor * dot(force(Chain(now.first, None), law, r), contract.way(chain.first))
+    impulse[row, lane] += here
+    return here + _add_works(chain.rest, now.rest, law, factor, row + 1, r, impulse, lane)
+
+
+@_add_works.register(Nothing)
+def _(chain, now, law, factor, row, r, impulse, lane):
+    return 0.0

@@ -102,15 +102,16 @@ def moves(laws):
     return False
 
 
-moves.register(Laws, lambda laws: _is_some(laws.moving))
+moves.register(Laws, lambda laws: is_moving(laws.moving))
 
 
 @by_type
-def _is_some(moving):
+def is_moving(moving):
+    """Whether there is `Moves`: a constant for the compiler."""
     return False
 
 
-_is_some.register(Moves, lambda moving: True)
+is_moving.register(Moves, lambda moving: True)
 moving.register(Laws, lambda laws: laws.moving)
 loses.register(Laws, lambda laws: is_given(laws.restitution) or is_given(laws.friction))
 restitution.register(Laws, lambda laws: laws.restitution)

@@ -15,6 +15,7 @@ from ..kernel.gravity import Gravity, Nothing, as_vector, potential
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined, select
 from ..kernel.vector import column, put, square
 from ..methods import contract as methods
+from ..particles import Contacts
 from ..status import Status
 from ..surfaces import flights, safe, strides
 from ..surfaces import fold as walls
@@ -113,7 +114,7 @@ def _rare(hard, method, chain, gravity, state, lanes, live):
     for i in range(live):
         if lanes.rows[HITS, i] > _most_hits(chain):
             put(state.position, 0, lanes.particle[i], column(lanes.rows, R, i))
-            _keep_time(chain, state, lanes, i)
+            _keep_time(chain, state.contacts, lanes, i)
             return Status.STALLED.value, i
     return Status.DONE.value, 0
 
@@ -128,13 +129,23 @@ _most_hits.register(Carried, lambda chain: 0.1 * MOST_HITS)
 
 
 @by_type
-def _keep_time(chain, state, lanes, i):
+def _keep_time(chain, contacts, lanes, i):
     """Keep when a particle is given up that walls have closed on."""
 
 
 @_keep_time.register(Carried)
-def _(chain, state, lanes, i):
-    state.contacts.left[lanes.particle[i]] = lanes.rows[LEFT, i]
+def _(chain, contacts, lanes, i):
+    _keep_left(contacts, lanes, i)
+
+
+@by_type
+def _keep_left(contacts, lanes, i):
+    """The same, where contacts may last."""
+
+
+@_keep_left.register(Contacts)
+def _(contacts, lanes, i):
+    contacts.left[lanes.particle[i]] = lanes.rows[LEFT, i]
 
 
 @inlined
@@ -160,27 +171,34 @@ def _marked(lanes, live):
 @inlined
 def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    _go(chain, gravity, method, lanes, live)
+    _go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
-        contact = methods.contact(method, at(chain, lane.left), gravity, lane, lanes.wall[i], found)
+        here = methods.walls_of(method, chain, lane.left)
+        contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
 
 
 @by_type
-def _go(chain, gravity, method, lanes, live):
-    """Every lane to its next contact, or to the end of the frame."""
+def _go(met, gravity, method, chain, lanes, live):
+    """Every lane to its next contact, or to the end of the frame. `met` are the walls whose first hits are found."""
     _fly(gravity, method, chain, lanes, live)
 
 
+@_go.register(Nothing)
+def _(met, gravity, method, chain, lanes, live):
+    for i in range(index(live)):
+        _flight(method, chain, gravity, lanes, i, flights.NEVER)
+
+
 @_go.register(Marched)
-def _(chain, gravity, method, lanes, live):
+def _(met, gravity, method, chain, lanes, live):
     rows = lanes.rows
     for i in range(index(live)):
         hit = safe.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
@@ -188,7 +206,7 @@ def _(chain, gravity, method, lanes, live):
 
 
 @_go.register(Strided)
-def _(chain, gravity, method, lanes, live):
+def _(met, gravity, method, chain, lanes, live):
     rows, course = lanes.rows, lanes.course
     for i in range(index(live)):
         strides.begin(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
@@ -217,21 +235,15 @@ def _fly(gravity, method, chain, lanes, live):
 def _(gravity, method, chain, lanes, live):
     rows = lanes.rows
     for i in range(index(live)):
-        hit = flights.NEVER
-        if methods.lands(method):
-            now = at(chain, rows[LEFT, i])
-            hit = flights.first_hit(now, gravity, column(rows, R, i), column(rows, V, i))
+        hit = flights.first_hit(at(chain, rows[LEFT, i]), gravity, column(rows, R, i), column(rows, V, i))
         _flight(method, chain, gravity, lanes, i, hit)
 
 
 @_fly.register(Gravity)
 def _(gravity, method, chain, lanes, live):
-    if methods.lands(method):
-        _fall(chain, gravity, lanes, live)
+    _fall(chain, gravity, lanes, live)
     for i in range(index(live)):
-        hit = flights.NEVER
-        if methods.lands(method):
-            hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
+        hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
         _flight(method, chain, gravity, lanes, i, hit)
 
 

@@ -11,6 +11,7 @@ from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, reaction_needs
+from ..contact.laws import is_moving
 from ..contact.records import Step
 from ..contact.reflection import CHORD_NEEDS
 from ..contact.touching import NEEDS as SLIDING_NEEDS
@@ -75,6 +76,8 @@ class AugmentedLagrangian(base.Method):
     Conserves: m v^2/2 - m G.r up to the tolerance where the loop converges; to round-off that does not grow for a
     tolerance at round-off, such as 1e-28. A gap below the round-off of the coordinates counts as 0. Order: 2 in dt away
     from impacts. Cost: sweeps times a scalar solve; the sweeps are in the observable "sweeps".
+    Walls may move without turning in fixed steps, which are those of the frame of each wall; steps that are cut at
+    impacts, and exact impacts in their place, know walls at rest only.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
 
     >>> AugmentedLagrangian(dt=0.025, penalty=1e4, exponent=1.0, gradient="mean-value")
@@ -102,6 +105,9 @@ class AugmentedLagrangian(base.Method):
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_laws("AugmentedLagrangian", scene)
+        base.check_motions("AugmentedLagrangian", scene)
+        if self.adaptive or self.on_unconverged == "impact":
+            self._require_rest(scene)
         if scene.gravity is not None and (self.adaptive or self.on_unconverged == "impact"):
             name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
             raise SceneError(
@@ -112,6 +118,16 @@ class AugmentedLagrangian(base.Method):
             base.check_crossing("dt", self.dt, scene, particles)
         else:
             fixed_step.check_solids(scene, particles, self.dt)
+
+    def _require_rest(self, scene: Scene) -> None:
+        """Raise a `SceneError` where a wall moves: steps that are cut at impacts, and exact ones, know none."""
+        for i, surface in enumerate(scene.surfaces):
+            if surface.motion is not None:
+                name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
+                raise SceneError(
+                    f"surfaces[{i}].motion must be None with {name} = {value}, whose impacts are with walls at rest, "
+                    f'got {surface.motion}; use fixed steps with on_unconverged="count", Penalty, or Impact'
+                )
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         # The reaction, the chord that starts the loop, and the exact impacts that may replace a contact
@@ -129,7 +145,8 @@ class AugmentedLagrangian(base.Method):
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
             _POLICIES[self.on_unconverged],
-            None if self.adaptive else fixed_step.longest_step(scene),
+            None if self.adaptive else fixed_step.longest_step(scene, self.dt),
+            fixed_step.moves(scene),
         )
 
     def too_fast(self, scene: Scene) -> str:
@@ -162,12 +179,17 @@ class AugmentedLagrangian(base.Method):
 
 @contract.constants.register(steps.Numbers)
 def _(method, mass, energy, v):
-    return 0.5 / mass, energy, 0.0
+    return 2.0 * energy, 0.5 / mass, 0.0
 
 
 @contract.own.register(steps.Numbers)
 def _(method, first, second, third):
     return fixed_step.Own(first, second, third)
+
+
+contract.dissipates.register(steps.Numbers, lambda method: is_moving(method.moving))
+# Of all walls, as in fixed_step.py.
+contract.walls_of.register(steps.Numbers, lambda method, chain, left: chain)
 
 
 @contract.most_sweeps.register(steps.Numbers)
@@ -183,8 +205,8 @@ def _free_step(gravity, lane, h):
 
 @contract.guess.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall):
-    cut = steps.step_of(method, lane.left)
-    kappa = contact_impulse.guess(chain, wall, cut.law, _free_step(gravity, lane, cut.h))
+    cut, over = steps.step_of(method, lane.left), fixed_step.over(method.dt, chain, lane.left)
+    kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
     touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
 
@@ -192,7 +214,8 @@ def _(method, chain, gravity, lane, wall):
 @contract.improve.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, solution, multiplier):
     cut, kappa = steps.step_of(method, lane.left), solution.kappa
-    newton = contact_impulse.improve(chain, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
+    over = fixed_step.over(method.dt, chain, lane.left)
+    newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
     return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
 
@@ -204,9 +227,10 @@ def _(method):
 @contract.first_multiplier.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, kappa):
     cut = steps.step_of(method, lane.left)
-    better, multiplier = uzawa.reflection(chain, wall, cut.law, _free_step(gravity, lane, cut.h))
+    over = fixed_step.over(method.dt, chain, lane.left)
+    better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
     use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-    limited = uzawa.has_limit(chain, wall, cut.law, lane.r)
+    limited = uzawa.has_limit(over, wall, cut.law, lane.r)
     return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, method.acceleration, uzawa.PLAIN)
 
 
@@ -221,32 +245,36 @@ def _(method, left, acceleration, multiplier, record, before):
 def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
     cut, kappa = steps.step_of(method, lane.left), solution.kappa
+    over, after = fixed_step.over(method.dt, chain, lane.left), fixed_step.after(method.dt, chain, lane.left)
     h, p = cut.h, displacement(gravity, lane.v, cut.h)
-    r1 = walls.push(chain, wall, lane.r, p, kappa)
-    g = walls.inner_gradient(chain, wall, lane.r, r1)
+    r1 = walls.push(over, wall, lane.r, p, kappa)
+    g = walls.inner_gradient(over, wall, lane.r, r1)
     f = 2.0 / h * kappa
+    work = contract.work_along(method.moving, over, wall, -f / h * g)
     v1 = accelerated(gravity, lane.v, h) - f * g
     given = abs(f) * norm(g)
 
-    alone = steps.is_alone(method, chain, wall, lane.r, r1, kappa)
-    solved = alone & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
+    alone = steps.is_alone(method, after, wall, lane.r, r1, kappa)
+    solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
     touching = wall >= 0.0
     step = (lane.left > 0.0) & touching & solved
-    budget = energies.Budget(2.0 * lane.own.over_mass, lane.own.energy, 1.0 / h * given)
-    factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, r1, v1, h))
-    new = step & steps.is_new(method, chain, lane.r)
+    budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
+    factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
+    new = step & steps.is_new(method, over, lane.r)
+    work = select(step, work, 0.0)
     # A step without contact: only fixed steps end here that way, just before one.
     loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
-    return contract.Contact(
+    found = contract.Contact(
         select(step, r1, select(loose, lane.r + p, kept(lane.r))),
         select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
         lane.left - select(step | loose, cut.used, 0.0),
         select(touching & (not solved), contract.HARD - wall, wall),
         select(step, given, 0.0),
         select(new, 1.0, 0.0),
-        0.0,
+        lane.own.twice_energy + 2.0 * work,
         False,
     )
+    return contract.worked(method.moving, found, work)
 
 
 # --- Several walls, nested solves, and loops that do not converge ----------------------------------------
@@ -255,7 +283,7 @@ def _(method, chain, gravity, lane, wall, solution):
 @contract.hard_pass.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, lanes, i):
     cut, record = steps.step_of(method, lane.left), lanes.record
-    h = cut.h
+    h, over, after = cut.h, fixed_step.over(method.dt, chain, lane.left), fixed_step.after(method.dt, chain, lane.left)
     if steps.is_blocked(method, chain, wall, lane.r, h * lane.v):
         record[uzawa.SWEEPS, i] = 0.0
         return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
@@ -263,18 +291,20 @@ def _(method, chain, gravity, lane, wall, lanes, i):
     if fixed_step.too_fast(method.longest, free.p):
         return fixed_step.refused(lane, Status.TOO_FAST.value)
     reactions = scratch((walls.length(chain), 4), np.float64)
-    end = uzawa.loop(method, cut.law, chain, free, reactions)
+    end = uzawa.loop(method, cut.law, over, free, reactions)
     record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
     record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
     if not end.converged and method.policy == IMPACT:
         return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
     if not end.converged and (method.policy == RAISE or not end.solved):
         return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
-    new = 1.0 if steps.is_new(method, chain, lane.r) else 0.0
+    new = 1.0 if steps.is_new(method, over, lane.r) else 0.0
     reaction = corner.total(reactions)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
     corner.add_impulses(reactions, h, lanes.impulse, i)
-    budget = energies.Budget(2.0 * lane.own.over_mass, lane.own.energy, 1.0 / h * (2.0 / h * norm(reaction)))
-    factor, _balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
-    left = lane.left - cut.used
-    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, 0.0, False), Status.DONE.value
+    work = corner.add_works(method.moving, over, 0, -2.0 / (h * h), reactions, lanes.impulse, i)
+    force = 1.0 / h * (2.0 / h * norm(reaction))
+    budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, force)
+    factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
+    left, twice_energy = lane.left - cut.used, lane.own.twice_energy + 2.0 * work
+    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, twice_energy, False), Status.DONE.value

@@ -8,12 +8,13 @@ from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import contract as surfaces
-from ..surfaces import required
+from ..surfaces import required, safe
+from ..surfaces.drive import drive_of
 
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 # The laws of a surface, and their values where there is none.
-_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "motion": None, "mass": None, "inertia": None}
+_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "mass": None, "inertia": None}
 
 
 @dataclass(frozen=True)
@@ -77,16 +78,38 @@ def check_surfaces(method: Method, scene: Scene) -> None:
 
 
 def check_laws(name: str, scene: Scene) -> None:
-    """Raise a `SceneError` if a surface has a law that a method of this name does not know: any but rigidity."""
+    """Raise a `SceneError` if a surface has a law that a method of this name does not know: any but a given motion."""
     for i, surface in enumerate(scene.surfaces):
         for law, without in _WITHOUT_LAWS.items():
             value = getattr(surface, law)
             if value != without:
                 came = f"{value:g}" if isinstance(value, float) else f"{value}"
                 raise SceneError(
-                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls at rest only, got "
+                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls only, got "
                     f"{came}; use Impact"
                 )
+
+
+def check_motions(name: str, scene: Scene) -> None:
+    """Raise a `SceneError` if a surface moves in a way that steps of a method of this name cannot follow."""
+    for i, surface in enumerate(scene.surfaces):
+        if surface.motion is not None and drive_of(surface, 0.0).turn is not None:
+            raise SceneError(
+                f"surfaces[{i}].motion must not turn the surface with {name}, got {surface.motion}: in the frame of a "
+                "wall that turns its step has no solution in closed form; use Impact, a Translation, Oscillation or "
+                "Path, or a rotation that leaves the surface as it is"
+            )
+    check_bends(scene)
+
+
+def check_bends(scene: Scene) -> None:
+    """Raise a `SceneError` if a surface moves so that it is met by safe steps, and does not bound its bend."""
+    for i, surface in enumerate(scene.surfaces):
+        if safe.lacks_bend(surface):
+            raise SceneError(
+                f"surfaces[{i}] ({type(surface).__name__}) must give contract.bend to move as {surface.motion} does: "
+                "hits of such walls are found by safe steps; register it, or use a Translation alone"
+            )
 
 
 def check_crossing(name: str, step: float | None, scene: Scene, particles: Particles) -> None:

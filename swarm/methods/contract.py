@@ -20,7 +20,9 @@ from ..contact.impulse import LoopRecord
 from ..contact.laws import Moves
 from ..contact.reflection import Turned
 from ..kernel.jit import by_type, by_type_outlined
-from ..kernel.vector import ZERO, Vec
+from ..kernel.vector import ZERO, Vec, dot
+from ..surfaces import fold as walls
+from ..surfaces.moving import at
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0
@@ -67,7 +69,7 @@ class Sweep(NamedTuple):
 class Contact(NamedTuple):
     """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
 
-    Where contacts may lose energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
+    Where contacts change the energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
     particles on walls, `lasts` says that another kernel decides what follows, at this wall.
     """
 
@@ -116,6 +118,17 @@ def work_of(contact):
 work_of.register(Worked, lambda contact: contact.work)
 
 
+@by_type
+def work_along(moving, chain, wall, force):
+    """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
+    return 0.0
+
+
+@work_along.register(Moves)
+def _(moving, chain, wall, force):
+    return dot(force, walls.way(chain, wall))
+
+
 # --- What a lane keeps -----------------------------------------------------------------------------------
 
 
@@ -133,7 +146,7 @@ def own(method, first, second, third):
 
 @by_type
 def dissipates(method):
-    """Whether contacts may lose energy: then the first constant is twice the energy per mass, and changes."""
+    """Whether contacts change the energy: then the first constant is twice the energy per mass, and changes."""
     return False
 
 
@@ -167,6 +180,15 @@ def sliding_tolerance(method):
     return 0.0
 
 
+@by_type
+def walls_of(method, chain, left):
+    """The walls of a scene as `contact` takes them, with so much of the frame left: those at this instant.
+
+    A method of steps takes all there are, to ask them over its step.
+    """
+    return at(chain, left)
+
+
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
@@ -191,6 +213,17 @@ def lands(method):
 @land.implies(lands)
 def _(method):
     return True
+
+
+@by_type
+def landed_on(method, chain):
+    """The walls whose first hits are found before, for `land`; None where the method finds its contacts by itself."""
+    return
+
+
+@land.implies(landed_on)
+def _(method, chain):
+    return chain
 
 
 # --- The unknown of a contact ----------------------------------------------------------------------------

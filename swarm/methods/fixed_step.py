@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import checks
 from ..contact.discrete_gradient import nested
+from ..contact.laws import Moves, is_moving
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
@@ -15,8 +16,11 @@ from ..kernel.vector import Vec, square
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
-from ..surfaces import flights
+from ..surfaces import flights, safe
 from ..surfaces import fold as walls
+from ..surfaces.drive import drive_of
+from ..surfaces.moving import at, during
+from ..surfaces.surface import Surface
 from . import base, contract
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
@@ -39,6 +43,7 @@ class SoftWalls(base.Method):
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_laws(type(self).__name__, scene)
+        base.check_motions(type(self).__name__, scene)
         check_solids(scene, particles, self.dt)
 
     def seldom_hard(self, scene: Scene) -> bool:
@@ -72,32 +77,52 @@ def check_arguments(method: Any) -> None:
         )
 
 
+def moves(scene: Scene) -> Moves | None:
+    """`Moves` as kernels take it, where a wall moves."""
+    return Moves(0.0) if scene.moves() else None
+
+
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
-    """Raise a `SceneError` where the fastest particle can jump over a solid in one step."""
-    step, longest = particles.fastest() * dt, longest_step(scene)
-    if longest is not None and step > longest:
+    """Raise a `SceneError` where the fastest particle can jump over a solid in one step, or a solid over it."""
+    longest, fastest = longest_step(scene, dt), particles.fastest()
+    if longest is not None and fastest * dt > longest:
+        thickness, i = _thinnest(scene, dt)
+        speed = fastest + _pace(scene.surfaces[i])
+        moved = "" if scene.surfaces[i].motion is None else ", as it moves"
         raise SceneError(
             f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
-            f"fastest flies {step:.3g} m, and {_thinnest(scene)}; use dt < {longest / particles.fastest():.2g} s, or "
-            "Impact"
+            f"fastest flies {speed * dt:.3g} m{moved}, and {_described(scene, i)}; use dt < {thickness / speed:.2g} s, "
+            "or Impact"
         )
 
 
-def longest_step(scene: Scene) -> float | None:
-    """The thickness of the thinnest solid [m], which no step may be longer than; None where there is no solid."""
-    solids = [2.0 * surface.size() for surface in scene.surfaces if surface.is_solid()]
-    return min(solids, default=None)
+def longest_step(scene: Scene, dt: float) -> float | None:
+    """How far a particle may fly in a step so that no solid is jumped over [m]; None where there is no solid."""
+    if not any(surface.is_solid() for surface in scene.surfaces):
+        return None
+    thickness, i = _thinnest(scene, dt)
+    return thickness - _pace(scene.surfaces[i]) * dt
 
 
-def _thinnest(scene: Scene) -> str:
-    solids = [(2.0 * surface.size(), i) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
-    thickness, i = min(solids)
-    return f"surfaces[{i}] ({type(scene.surfaces[i]).__name__}), {thickness:.3g} m thick"
+def _pace(surface: Surface) -> float:
+    """A bound of the speed with which a surface moves [m/s]."""
+    return 0.0 if surface.motion is None else drive_of(surface, 0.0).fastest
+
+
+def _thinnest(scene: Scene, dt: float) -> tuple[float, int]:
+    """The thickness [m] and the number of the solid that is jumped over first."""
+    solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
+    i, surface = min(solids, key=lambda one: (2.0 * one[1].size() - _pace(one[1]) * dt, one[0]))
+    return 2.0 * surface.size(), i
+
+
+def _described(scene: Scene, i: int) -> str:
+    return f"surfaces[{i}] ({type(scene.surfaces[i]).__name__}), {2.0 * scene.surfaces[i].size():.3g} m thick"
 
 
 def too_fast_failure(scene: Scene, dt: float) -> str:
     """The end of the sentence about a step that was longer than a solid is thick."""
-    return f"with dt = {dt:g} s and {_thinnest(scene)}; use a smaller dt, or Impact"
+    return f"with dt = {dt:g} s and {_described(scene, _thinnest(scene, dt)[1])}; use a smaller dt, or Impact"
 
 
 def whole_steps(name: str, duration: float, dt: float) -> float:
@@ -132,24 +157,54 @@ class Numbers(NamedTuple):
     longest: Any  # step that jumps over no solid [m], None where there is none
     factor: float  # of 1/mass in what a lane keeps
     form: Any  # of the discrete gradient, or an implicit rule, or None
+    moving: Any  # None, or `Moves` where a wall moves
 
 
 class Own(NamedTuple):
     """What a lane keeps."""
 
+    twice_energy: float  # per mass, at the start, and with the work of walls since
     over_mass: float  # the method's factor over the mass
-    energy: float  # per mass, at the start
     unused: float
 
 
 @contract.constants.register(Numbers)
 def _(method, mass, energy, v):
-    return method.factor / mass, energy, 0.0
+    return 2.0 * energy, method.factor / mass, 0.0
 
 
 @contract.own.register(Numbers)
 def _(method, first, second, third):
     return Own(first, second, third)
+
+
+contract.dissipates.register(Numbers, lambda method: is_moving(method.moving))
+# Of all walls: each part of a step asks for those that it needs.
+contract.walls_of.register(Numbers, lambda method, chain, left: chain)
+
+
+@inlined
+def before(dt, chain, left):
+    """The walls at the start of a step of length dt, with so many of the frame left."""
+    return at(chain, left * dt)
+
+
+@inlined
+def over(dt, chain, left):
+    """The walls over that step."""
+    return during(chain, left * dt, (left - 1.0) * dt)
+
+
+@inlined
+def after(dt, chain, left):
+    """The walls at the end of that step."""
+    return at(chain, (left - 1.0) * dt)
+
+
+@by_type
+def point_of(form):
+    """After what part of a step an implicit rule takes its force; the end for any other method."""
+    return 1.0
 
 
 # --- The way to a contact --------------------------------------------------------------------------------
@@ -177,14 +232,16 @@ def flight(method, chain, gravity, lane):
     """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
     dt = method.dt
     # One too many by round-off starts a contact 1e-16 deep: harmless.
-    steps = np.floor(flights.free_time(gravity, chain, lane.r, lane.v) * (1.0 / dt))
+    steps = np.floor(safe.free_time(chain, gravity, lane.r, lane.v, lane.left * dt) * (1.0 / dt))
     steps = select(steps < lane.left, steps, lane.left)
     t = steps * dt
     start = contract.Lane(
         lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
         lane.own,
     )  # fmt: skip
-    touched = walls.touched(chain, start.r, reach(method.form, dt, method.law, chain, gravity, start))
+    now = before(dt, chain, start.left)
+    to_point = during(chain, start.left * dt, (start.left - point_of(method.form)) * dt)
+    touched = walls.touched(to_point, start.r, reach(method.form, dt, method.law, now, gravity, start))
     # Several walls at once, or nested solves: the careful way.
     alone = (touched.number <= 1.0) & (not nested(method.form))
     wall = select(alone, touched.wall, contract.HARD - touched.wall)
@@ -196,35 +253,47 @@ def flight(method, chain, gravity, lane):
 
 
 class Taken(NamedTuple):
-    """A step of a lane: its end, whether it is the solution, its impulse per mass, and whether it starts an impact."""
+    """A step of a lane, which may be the solution or not, with the impulse and the work of the wall per mass."""
 
     r: Vec
     v: Vec
     solved: bool
     impulse: float
-    new: bool
+    new: bool  # whether it starts an impact
+    work: float
 
 
 @inlined
-def contact(lane, wall, taken):
+def contact(moving, lane, wall, taken):
     """The `Contact` of a lane that takes its step, or leaves it to the careful way, or is at the end of its frame."""
     touching = wall >= 0.0
     step = (lane.left > 0.0) & select(touching, taken.solved, wall > contract.HARD)
-    return contract.Contact(
+    work = select(step & touching, taken.work, 0.0)
+    found = contract.Contact(
         select(step, taken.r, kept(lane.r)),
         select(step, taken.v, kept(lane.v)),
         lane.left - select(step, 1.0, 0.0),
         select(touching & (not taken.solved), contract.HARD - wall, wall),
         select(step, taken.impulse, 0.0),
         select(step & taken.new, 1.0, 0.0),
-        0.0,
+        lane.own.twice_energy + 2.0 * work,
         False,
     )
+    return contract.worked(moving, found, work)
+
+
+class Careful(NamedTuple):
+    """A step against any number of walls, and their work per mass."""
+
+    r: Vec
+    v: Vec
+    solved: bool
+    work: float
 
 
 @by_type_outlined
 def careful_step(method, chain, gravity, lane, impulse, i):
-    """(r1, v1, whether that is the solution) of a step against any number of walls. Adds to impulse[wall, i]."""
+    """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
     raise NotImplementedError
 
 
@@ -232,10 +301,11 @@ def careful_step(method, chain, gravity, lane, impulse, i):
 def _(method, chain, gravity, lane, wall, lanes, i):
     if too_fast(method.longest, displacement(gravity, lane.v, method.dt)):
         return refused(lane, Status.TOO_FAST.value)
-    r, v, solved = careful_step(method, chain, gravity, lane, lanes.impulse, i)
-    new = select(walls.outside(chain, -1.0, lane.r), 0.0, 1.0)
-    status = Status.DONE.value if solved else Status.UNSOLVED.value
-    return contract.Contact(r, v, lane.left - 1.0, 0.0, 0.0, new, 0.0, False), status
+    step = careful_step(method, chain, gravity, lane, lanes.impulse, i)
+    new = select(walls.outside(before(method.dt, chain, lane.left), -1.0, lane.r), 0.0, 1.0)
+    status = Status.DONE.value if step.solved else Status.UNSOLVED.value
+    twice_energy = lane.own.twice_energy + 2.0 * step.work
+    return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
 
 
 @inlined

@@ -14,7 +14,7 @@ from ..kernel.jit import kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import flights, safe
+from ..surfaces import flights
 from . import base, contract
 from .chord import Chord
 
@@ -89,13 +89,7 @@ class Impact(base.Method):
             )
         if scene.reacts():
             _require_reacting(scene)
-        for i, surface in enumerate(scene.surfaces):
-            if safe.lacks_bend(surface):
-                raise SceneError(
-                    f"surfaces[{i}] ({type(surface).__name__}) must give contract.bend to move as "
-                    f"{surface.motion} does: hits of such walls are found by safe steps; register it, or use a "
-                    "Translation alone"
-                )
+        base.check_bends(scene)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()

@@ -27,6 +27,7 @@ class Midpoint(fixed_step.SoftWalls):
     that begins and ends: each changes the energy by what the force at the middle of a step misses. No stability limit.
     Order: 2 in dt between contacts. Cost: free steps, which it takes exactly, are jumped over in one evaluation; a
     contact step solves one scalar equation.
+    Walls may move without turning: the force is that of the walls at the middle of the step.
     Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.1.
 
     >>> Midpoint(dt=1e-3, penalty=-1.0)
@@ -51,6 +52,9 @@ def _(form, h, law, chain, gravity, lane):
     return 0.5 * h * accelerated(gravity, lane.v, 0.5 * h)
 
 
+fixed_step.point_of.register(MidpointRule, lambda form: 0.5)
+
+
 @implicit_rule.end.register(MidpointRule)
 def _(rule, h, law, chain, gravity, lane, point, push):
     # r1 = 2 rm - r0, v1 = v0 + h G - (4/h) kappa grad q(rm)
@@ -60,4 +64,7 @@ def _(rule, h, law, chain, gravity, lane, point, push):
 
 @implicit_rule.add_impulses.register(MidpointRule)
 def _(rule, method, chain, lane, reactions, impulse, i):
-    corner.add_impulses(reactions, 0.5 * method.dt, impulse, i)
+    h = method.dt
+    corner.add_impulses(reactions, 0.5 * h, impulse, i)
+    over = fixed_step.over(h, chain, lane.left)
+    return corner.add_works(method.moving, over, 0, -4.0 / (h * h), reactions, impulse, i)

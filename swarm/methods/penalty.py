@@ -39,6 +39,8 @@ class Penalty(fixed_step.SoftWalls):
     Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
     look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
     edge of a solid that is shorter than |v| dt.
+    Walls may move without turning: the step is that of the frame of each wall, and with the energy less the work of the
+    walls it conserves the same. Where walls move in any way but uniformly, free steps are jumped over in several parts.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
@@ -60,7 +62,8 @@ class Penalty(fixed_step.SoftWalls):
     def numbers(self, scene: Scene) -> "PenaltyNumbers":
         # h^2/(2m) of equation (K) in contact/impulse.py
         factor, form = 0.5 * self.dt * self.dt, form_of(self.gradient)
-        return PenaltyNumbers(self.dt, self.law(), fixed_step.longest_step(scene), factor, form)
+        longest = fixed_step.longest_step(scene, self.dt)
+        return PenaltyNumbers(self.dt, self.law(), longest, factor, form, fixed_step.moves(scene))
 
 
 class PenaltyNumbers(fixed_step.Numbers):
@@ -83,7 +86,8 @@ def _(method, chain):
 
 @contract.guess.register(PenaltyNumbers)
 def _(method, chain, gravity, lane, wall):
-    kappa = contact_impulse.guess(chain, wall, method.law, _step(method, gravity, lane))
+    over = fixed_step.over(method.dt, chain, lane.left)
+    kappa = contact_impulse.guess(over, wall, method.law, _step(method, gravity, lane))
     touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
 
@@ -91,7 +95,8 @@ def _(method, chain, gravity, lane, wall):
 @contract.improve.register(PenaltyNumbers)
 def _(method, chain, gravity, lane, wall, solution, multiplier):
     kappa, unsolved = solution.kappa, solution.unsolved
-    newton = contact_impulse.improve(chain, wall, method.law, None, _step(method, gravity, lane), kappa)
+    over = fixed_step.over(method.dt, chain, lane.left)
+    newton = contact_impulse.improve(over, wall, method.law, None, _step(method, gravity, lane), kappa)
     return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
 
 
@@ -99,22 +104,24 @@ def _(method, chain, gravity, lane, wall, solution, multiplier):
 def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
     h, kappa = method.dt, solution.kappa
+    over, after = fixed_step.over(h, chain, lane.left), fixed_step.after(h, chain, lane.left)
     step = _step(method, gravity, lane)
     touching = wall >= 0.0
-    r1 = select(touching, walls.push(chain, wall, step.r, step.p, kappa), step.r + step.p)
+    r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
     # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-    g = walls.inner_gradient(chain, wall, step.r, r1)
+    g = walls.inner_gradient(over, wall, step.r, r1)
     f = select(touching, 2.0 / h * kappa, 0.0)
     v1 = accelerated(gravity, lane.v, h) - f * g
+    work = contract.work_along(method.moving, over, wall, -f / h * g)
 
     # A push into another wall, or an equation that is not solved yet: the careful way.
-    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, lane.own.energy, 0.0)
-    factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
-    solved = balanced & (not solution.unsolved) & walls.pushes(chain, wall, kappa)
-    solved = solved & (not walls.outside(chain, wall, r1))
-    new = touching & (not walls.outside(chain, -1.0, lane.r))
-    taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new)
-    return fixed_step.contact(lane, wall, taken)
+    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0)
+    factor, balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(step.r, r1, v1, h))
+    solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
+    solved = solved & (not walls.outside(after, wall, r1))
+    new = touching & (not walls.outside(over, -1.0, lane.r))
+    taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
+    return fixed_step.contact(method.moving, lane, wall, taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
@@ -123,10 +130,12 @@ def _(method, chain, gravity, lane, wall, solution):
 @fixed_step.careful_step.register(PenaltyNumbers)
 def _(method, chain, gravity, lane, impulse, i):
     h, step = method.dt, _step(method, gravity, lane)
+    over, after = fixed_step.over(h, chain, lane.left), fixed_step.after(h, chain, lane.left)
     reactions = scratch((walls.length(chain), 4), np.float64)
-    r1, solved = corner.hold(method.form, method.law, None, chain, step, reactions)
+    r1, solved = corner.hold(method.form, method.law, None, over, step, reactions)
     corner.add_impulses(reactions, h, impulse, i)
+    work = corner.add_works(method.moving, over, 0, -2.0 / (h * h), reactions, impulse, i)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
-    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, lane.own.energy, 0.0)
-    factor, balanced = energies.restored(method.law, chain, gravity, budget, energies.Ends(step.r, r1, v1, h))
-    return r1, v1 * factor, solved and balanced
+    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0)
+    factor, balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(step.r, r1, v1, h))
+    return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)

@@ -12,6 +12,7 @@ from ..contact import uzawa
 from ..contact.discrete_gradient import nested
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
+from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
 from ..kernel.vector import square
 from ..status import Status
@@ -39,6 +40,7 @@ class Numbers(NamedTuple):
     acceleration: float
     policy: int
     longest: Any  # step that jumps over no solid [m], None where there is none
+    moving: Any  # None, or `Moves` where a wall moves, in fixed steps
 
 
 class FixedSteps(Numbers):
@@ -71,7 +73,7 @@ def is_new(method, chain, r):
 
 @by_type
 def is_alone(method, chain, wall, r0, r1, kappa):
-    """Whether no other wall has a part in the step, which then one lane can do alone."""
+    """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
     raise NotImplementedError
 
 
@@ -90,7 +92,7 @@ def as_impacts(method, chain, lane, cut, wall, lanes, i):
 @outlined
 def _first_energy(lane):
     """The energy at the start of the run, if it is that up to round-off, else that of now."""
-    now, first = square(lane.v), 2.0 * lane.own.energy
+    now, first = square(lane.v), lane.own.twice_energy
     speed2 = first if abs(first - now) <= _ROUND_OFF * now else now
     return Energy(speed2, 0.5 / speed2)
 
@@ -118,6 +120,17 @@ def _(method, chain, wall, r0, r1, kappa):
 
 @as_impacts.register(FixedSteps)
 def _(method, chain, lane, cut, wall, lanes, i):
+    return _in_one_step(method.moving, chain, lane, cut, lanes, i)
+
+
+@by_type_outlined
+def _in_one_step(moving, chain, lane, cut, lanes, i):
+    """The same; walls that move are refused before the run."""
+    return fixed_step.refused(lane, Status.UNCONVERGED.value)
+
+
+@_in_one_step.register(Nothing)
+def _(moving, chain, lane, cut, lanes, i):
     energy, r, v = _first_energy(lane), lane.r, lane.v
     remaining, hits = cut.h, 0.0
     for _i in range(_MOST_BOUNCES):

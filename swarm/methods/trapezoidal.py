@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..contact import corner, implicit
-from ..contact.force import add_impulses, force
+from ..contact.force import add_impulses, add_works, force
 from ..kernel.gravity import accelerated, displacement
 from ..scene import Scene
 from . import fixed_step, implicit_rule
@@ -28,6 +28,7 @@ class Trapezoidal(fixed_step.SoftWalls):
     not that of a contact that begins and ends. No stability limit for linear problems. Order: 2 in dt between contacts.
     Cost: free steps, which it takes exactly, are jumped over in one evaluation; a contact step solves one scalar
     equation.
+    Walls may move without turning: each force is that of the walls at its time.
     Source: Newmark 1959; Hairer, Lubich & Wanner, Geometric Numerical Integration, VI.8.
 
     >>> Trapezoidal(dt=1e-3, penalty=-1.0)
@@ -61,6 +62,11 @@ def _(rule, h, law, chain, gravity, lane, point, push):
 
 @implicit_rule.add_impulses.register(TrapezoidalRule)
 def _(rule, method, chain, lane, reactions, impulse, i):
-    corner.add_impulses(reactions, method.dt, impulse, i)
+    h, law, moving = method.dt, method.law, method.moving
+    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
+    corner.add_impulses(reactions, h, impulse, i)
     # h/(2m) |F0|
-    add_impulses(chain, method.law, 2.0 * lane.own.over_mass / method.dt, 0, lane.r, impulse, i)
+    factor = 2.0 * lane.own.over_mass / h
+    add_impulses(before, law, factor, 0, lane.r, impulse, i)
+    work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
+    return work + corner.add_works(moving, over, 0, -2.0 / (h * h), reactions, impulse, i)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..contact.force import NEEDS as FORCE_NEEDS
-from ..contact.force import add_impulses, force
+from ..contact.force import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import inlined
 from ..kernel.vector import Vec, norm
@@ -32,6 +32,7 @@ class Verlet(fixed_step.SoftWalls):
     the energy grows without bound. Order: 2 in dt between contacts, 1 across the corner of the force at the wall. Cost:
     free steps, which it takes exactly, are jumped over in one evaluation; two forces a contact step. Penetration:
     |v| sqrt(m/alpha), more where it is unstable.
+    Walls may move without turning: each force is that of the walls at its time.
     Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, I.1.4.
 
     >>> Verlet(dt=0.0, penalty=1e4)
@@ -43,7 +44,8 @@ class Verlet(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *FORCE_NEEDS
 
     def numbers(self, scene: Scene) -> "VerletNumbers":
-        return VerletNumbers(self.dt, self.law(), fixed_step.longest_step(scene), 0.5 * self.dt, None)
+        longest, moving = fixed_step.longest_step(scene, self.dt), fixed_step.moves(scene)
+        return VerletNumbers(self.dt, self.law(), longest, 0.5 * self.dt, None, moving)
 
 
 class VerletNumbers(fixed_step.Numbers):
@@ -54,29 +56,34 @@ class VerletNumbers(fixed_step.Numbers):
 
 
 class VerletStep(NamedTuple):
-    """r1, v1 and what the walls add to the velocity, h (F0 + F1)/(2m)."""
+    """r1, v1, what the walls add to the velocity, h (F0 + F1)/(2m), and their work per mass."""
 
     r: Vec
     v: Vec
     kick: Vec
+    work: float
 
 
 @inlined
 def _step(method, chain, gravity, lane):
     """The step of a lane."""
     h, over_mass = method.dt, lane.own.over_mass
-    f0 = force(chain, method.law, lane.r)
+    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
+    after = fixed_step.after(h, chain, lane.left)
+    f0 = force(before, method.law, lane.r)
     # h^2/(2m) F0
     r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
-    kick = over_mass * (f0 + force(chain, method.law, r1))
-    return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick)
+    kick = over_mass * (f0 + force(after, method.law, r1))
+    given = work(method.moving, over, before, method.law, lane.r) + work(method.moving, over, after, method.law, r1)
+    return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
 
 
 @contract.contact.register(VerletNumbers)
 def _(method, chain, gravity, lane, wall, solution):
     step = _step(method, chain, gravity, lane)
-    new = (wall >= 0.0) & (not walls.outside(chain, -1.0, lane.r))
-    return fixed_step.contact(lane, wall, fixed_step.Taken(step.r, step.v, True, norm(step.kick), new))
+    new = (wall >= 0.0) & (not walls.outside(fixed_step.before(method.dt, chain, lane.left), -1.0, lane.r))
+    taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
+    return fixed_step.contact(method.moving, lane, wall, taken)
 
 
 # --- Several walls at once -------------------------------------------------------------------------------
@@ -84,7 +91,11 @@ def _(method, chain, gravity, lane, wall, solution):
 
 @fixed_step.careful_step.register(VerletNumbers)
 def _(method, chain, gravity, lane, impulse, i):
-    step = _step(method, chain, gravity, lane)
-    add_impulses(chain, method.law, lane.own.over_mass, 0, lane.r, impulse, i)
-    add_impulses(chain, method.law, lane.own.over_mass, 0, step.r, impulse, i)
-    return step.r, step.v, True
+    step, over_mass, h = _step(method, chain, gravity, lane), lane.own.over_mass, method.dt
+    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
+    after = fixed_step.after(h, chain, lane.left)
+    add_impulses(before, method.law, over_mass, 0, lane.r, impulse, i)
+    add_impulses(after, method.law, over_mass, 0, step.r, impulse, i)
+    work = add_works(method.moving, over, before, method.law, over_mass / h, lane.r, impulse, i)
+    work += add_works(method.moving, over, after, method.law, over_mass / h, step.r, impulse, i)
+    return fixed_step.Careful(step.r, step.v, True, work)

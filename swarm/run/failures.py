@@ -20,9 +20,8 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
         place = state.position[:, particle]
         wall = int(np.argmax(scene.distances_outside(place[:, None], moment)[:, 0]))
         sentence += f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
-        if scene.moves():
+        if scene.moves() and state.contacts is not None:
             # The kernel leaves there when it was.
-            assert state.contacts is not None
             sentence += f" at {moment - state.contacts.left[particle]:.9g} s: walls that move have closed on it"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"

@@ -161,6 +161,18 @@ def carry(surface, r):
 
 
 @by_type
+def way(surface):
+    """The displacement of the wall in a step."""
+    return ZERO
+
+
+@by_type
+def end_inner(surface, r):
+    """The inner function at the end of a step, where the wall may be elsewhere."""
+    return inner(surface, r)
+
+
+@by_type
 def pace(surface):
     """A time in which the motion of the wall changes little [s]; infinite where it does not change."""
     return math.inf

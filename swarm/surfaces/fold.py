@@ -133,6 +133,7 @@ acceleration = of_wall(contract.acceleration, ZERO)
 carry = of_wall(contract.carry, ZERO)
 mean_velocity = of_wall(contract.mean_velocity, ZERO)
 pace = of_wall(contract.pace, 0.0)
+way = of_wall(contract.way, ZERO)
 unit_normal = of_wall(contract.unit_normal, ZERO)
 settle = of_wall(contract.settle, ZERO)
 distance = of_wall(contract.distance, 0.0)
@@ -207,7 +208,7 @@ def touched(chain, r, p):
 def _(chain, r, p):
     surface = chain.first
     before = contract.level_of(surface, contract.inner(surface, r))
-    after = contract.level_of(surface, contract.inner(surface, r + p))
+    after = contract.level_of(surface, contract.end_inner(surface, r + p))
     contact = (before > 0.0) | (after > 0.0)
     rest = touched(chain.rest, r, p)
     later = select(rest.number > 0.0, rest.wall + 1.0, -1.0)

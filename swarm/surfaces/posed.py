@@ -176,7 +176,7 @@ _of(lambda f: lambda surface, q: f(surface.body, q), contract.gap_of, contract.l
 _of(lambda f: lambda surface, q0, q1: f(surface.body, q0, q1), contract.gap_slope)
 _of(
     lambda f: lambda surface, r: f(surface.body, own_place(surface, r)),
-    contract.phi, contract.inner, contract.distance, contract.gap_scale,
+    contract.phi, contract.inner, contract.distance,
 )  # fmt: skip
 _of(
     lambda f: lambda surface, r: out(surface.pose.turn, f(surface.body, own_place(surface, r))),

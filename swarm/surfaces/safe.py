@@ -7,13 +7,13 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import by_type, by_type_outlined, outlined, select
 from ..kernel.vector import ZERO
 from ..motion import Guide
-from . import contract
+from . import contract, flights
 from .drive import drive_of
 from .flights import NEVER, Hit, hit, sooner
 from .fold import Chain
 from .moving import Marched, Moving, at
 from .posed import Drifting, Posed
-from .relative import Framed, bounds_of, flight_of, motion_of
+from .relative import Framed, bounds_of, flight_of, motion_of, seen_at
 from .rising import safe_step
 from .rotation import Rotated
 from .surface import Surface
@@ -135,6 +135,51 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.body)
     own = safe_step.dispatch(type(wall)) is safe_step.dispatch(object)
     return own and contract.bend.dispatch(type(wall)) is contract.bend.dispatch(object)
+
+
+# --- Free time -------------------------------------------------------------------------------------------
+
+
+@by_type
+def free_time(chain, gravity, r, v, left):
+    """A time during which a flight surely stays admissible, with so much of the frame left [s].
+
+    0 for a particle that is in contact now.
+    """
+    return flights.free_time(gravity, at(chain, left), r, v)
+
+
+@free_time.register(Marched)
+def _(chain, gravity, r, v, left):
+    return _free_of_all(at(chain, left), gravity, r, v)
+
+
+@by_type
+def _free_of_all(chain, gravity, r, v):
+    return math.inf
+
+
+@_free_of_all.register(Chain)
+def _(chain, gravity, r, v):
+    here, other = _free_of(chain.first, gravity, r, v), _free_of_all(chain.rest, gravity, r, v)
+    return select(other < here, other, here)
+
+
+@by_type
+def _free_of(surface, gravity, r, v):
+    """The free time of one wall."""
+    return flights.free_time(gravity, Chain(surface, None), r, v)
+
+
+_free_of.register(Drifting, lambda surface, gravity, r, v: flights.free_time(gravity, Chain(surface, None), r, v))
+
+
+@_free_of.register(Posed)
+def _(surface, gravity, r, v):
+    # One safe step: of a flight of many steps the next one begins nearer to the wall.
+    seen = seen_at(surface.drive, flight_of(r, v, accelerated(gravity, ZERO, 1.0), surface.left), 0.0)
+    step = safe_step(surface.body, surface.drive, seen, surface.left)
+    return select(step.level > 0.0, 0.0, step.time)
 
 
 # --- First hits ------------------------------------------------------------------------------------------

@@ -1,10 +1,14 @@
-"""A wall that moves, over one step: what it takes along, how fast in the mean, and the normal of the step."""
+"""A wall that moves, over one step: what it takes along, how fast in the mean, and the step in its frame.
+
+In the frame of a wall that is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by rho1 - rho0 =
+r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
+"""
 
 import math
 
 from ..kernel.angle import sine_and_versine
 from ..kernel.jit import by_type, inlined, select
-from ..kernel.vector import ZERO, Vec, cross, dot, norm
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
 from . import contract
 from .drive import Rows, Track, Turn, tracked, turned
 from .fold import Chain
@@ -84,6 +88,69 @@ def _(surface, r0, r1, h):
     drive, middle = surface.drive, -0.5 * (surface.left + surface.after)
     moved = drive.velocity + _mean_of_swings(drive.swings, middle, h) + _mean_of_track(drive.track, middle, h)
     return moved + _mean_of_turn(drive.turn, surface, r0, r1, h)
+
+
+# --- The step in its frame -------------------------------------------------------------------------------
+
+contract.way.register(Posed, lambda surface: surface.end.shift - surface.pose.shift)
+contract.end_inner.register(Posed, lambda surface, r: contract.inner(surface.body, own_end(surface, r)))
+
+
+@contract.gap_scale.register(Posed)
+def _(surface, r):
+    # A place in the frame has the round-off of the displacement too.
+    own = own_place(surface, r)
+    moved = times(contract.gradient(surface.body, own), surface.pose.shift)
+    return contract.gap_scale(surface.body, own) + total(absolute(moved))
+
+
+@by_type
+def place_scale(surface, s):
+    """What the round-off of a place in the frame of a wall is relative to, from that of its coordinates."""
+    return s
+
+
+place_scale.register(Posed, lambda surface, s: s + absolute(surface.pose.shift))
+
+
+@inlined
+def _free(surface, p):
+    """A free displacement in the frame of the wall."""
+    return p - contract.way(surface)
+
+
+@contract.push.register(Posed)
+def _(surface, r0, p, kappa):
+    return surface.end.shift + contract.push(surface.body, own_place(surface, r0), _free(surface, p), kappa)
+
+
+@contract.rise.register(Posed)
+def _(surface, r0, p, kappa):
+    return contract.rise(surface.body, own_place(surface, r0), _free(surface, p), kappa)
+
+
+@contract.resolve.register(Posed)
+def _(surface, r, strength):
+    return surface.pose.shift + contract.resolve(surface.body, own_place(surface, r), strength)
+
+
+@contract.chord_guess.register(Posed)
+def _(surface, r, p):
+    return contract.chord_guess(surface.body, own_place(surface, r), _free(surface, p))
+
+
+@contract.chord_improve.register(Posed)
+def _(surface, r, p, kappa):
+    return contract.chord_improve(surface.body, own_place(surface, r), _free(surface, p), kappa)
+
+
+@by_type
+def framed(surface, r, p):
+    """What a step is asked of: the surface at rest in its frame, and the step's start and free displacement there."""
+    return surface, r, p
+
+
+framed.register(Posed, lambda surface, r, p: (surface.body, own_place(surface, r), _free(surface, p)))
 
 
 @by_type
