@@ -158,6 +158,9 @@ class AugmentedLagrangian(base.Method):
     def span(self, name: str, duration: float) -> float:
         return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)
 
+    def instant(self, moment: float) -> float:
+        return moment if self.adaptive else fixed_step.whole_time(moment, self.dt)
+
     def law(self) -> Any:
         return law_of.regularisation(self.penalty, self.exponent)
 

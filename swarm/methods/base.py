@@ -40,6 +40,10 @@ class Method:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
         return duration
 
+    def instant(self, moment: float) -> float:
+        """The time of the method when a frame ends at `moment` [s]: where walls that move are then."""
+        return moment
+
     def is_rigid(self) -> bool:
         """Whether a particle outside its walls by more than round-off is an error rather than wall compliance."""
         return False

@@ -55,6 +55,9 @@ class SoftWalls(base.Method):
     def span(self, name: str, duration: float) -> float:
         return whole_steps(name, duration, self.dt)
 
+    def instant(self, moment: float) -> float:
+        return whole_time(moment, self.dt)
+
     def law(self) -> Any:
         return regularisation(self.penalty, self.exponent)
 
@@ -138,6 +141,11 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
             f"{duration / dt:.6g} steps"
         )
     return float(steps)
+
+
+def whole_time(moment: float, dt: float) -> float:
+    """The time of the steps until a moment [s], which they may miss a little: no wall must jump where frames meet."""
+    return round(moment / dt) * dt
 
 
 def of_steps(scene: Scene) -> tuple[Any, ...]:

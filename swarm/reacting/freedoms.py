@@ -72,7 +72,7 @@ class Falling(Posed):
     """A wall at one instant of a free motion with a constant acceleration, or none."""
 
 
-_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf)
+_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0)
 
 
 @contract.first_hit.register(Falling)
@@ -143,14 +143,14 @@ def _(freedom, walls, t):
     most = math.sqrt(square(away) + square(speed))
     bounds = rate * most, rate * rate * most, rate * rate * rate * most
     swings = Chain(Swing(away, speed, rate), None)
-    return Drive(found.shift, ZERO, swings, None, None, None, ZERO, bounds[0], bounds[1], bounds[2], math.inf)
+    return Drive(found.shift, ZERO, swings, None, None, None, ZERO, bounds[0], bounds[1], bounds[2], math.inf, 0.0)
 
 
 @drive_of.register(Hinged)
 def _(freedom, walls, t):
     rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, t).turn
     turning = Turn(turn.x, turn.y, turn.z, freedom.axis, rate)
-    return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf)
+    return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0)
 
 
 @by_type

@@ -206,7 +206,7 @@ class Run:
 
     def _move_walls(self, moment: float) -> None:
         """The walls of the frame that ends at a moment [s]."""
-        self._moment = moment
+        self._moment = moment = self._method.instant(moment)
         if self._scene.moves():
             self._chain = self._scene.chain(moment)
             faces = self._scene.open_faces(moment)

@@ -61,6 +61,9 @@ class Drive(NamedTuple):
     hardest: float  # bound of |d''| [m/s^2]
     jerk: float  # bound of |d'''| [m/s^3]
     pace: float  # a time in which it changes little [s]
+    late: (
+        float  # its fastest speed times the time [m]: the round-off of its place from frame to frame is relative to it
+    )
 
 
 class Pose(NamedTuple):
@@ -125,7 +128,8 @@ def drive_of(surface: Surface, moment: float) -> Drive:
                 turn = Turn(x, y, z, _vector(axis), one.rate)
     shift = motions.pose(surface.motion, moment).shift
     fastest += math.hypot(*velocity)
-    return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, fastest, hardest, jerk, pace)
+    bounds = fastest, hardest, jerk, pace, fastest * moment
+    return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
 
 
 def _vector(values: Any) -> Vec:

@@ -98,10 +98,11 @@ contract.end_inner.register(Posed, lambda surface, r: contract.inner(surface.bod
 
 @contract.gap_scale.register(Posed)
 def _(surface, r):
-    # A place in the frame has the round-off of the displacement too.
+    # A place in the frame has the round-off of the displacement and of the time too.
     own = own_place(surface, r)
-    moved = times(contract.gradient(surface.body, own), surface.pose.shift)
-    return contract.gap_scale(surface.body, own) + total(absolute(moved))
+    gradient, late = contract.gradient(surface.body, own), surface.drive.late
+    moved = total(absolute(times(gradient, surface.pose.shift))) + late * total(absolute(gradient))
+    return contract.gap_scale(surface.body, own) + moved
 
 
 @by_type
@@ -110,7 +111,10 @@ def place_scale(surface, s):
     return s
 
 
-place_scale.register(Posed, lambda surface, s: s + absolute(surface.pose.shift))
+@place_scale.register(Posed)
+def _(surface, s):
+    late = surface.drive.late
+    return s + absolute(surface.pose.shift) + Vec(late, late, late)
 
 
 @inlined
