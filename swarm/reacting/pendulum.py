@@ -94,7 +94,7 @@ def _(freedom, walls, t):
 @drive_of.register(Pendulum)
 def _(freedom, walls, t):
     spin = angle_at(freedom, walls, t).rate * freedom.axis
-    return Drive(ZERO, ZERO, None, None, None, spin, freedom.center, 0.0, 0.0, 0.0, math.inf)
+    return Drive(ZERO, ZERO, None, None, None, spin, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0)
 
 
 @posed.register(Pendulum)
@@ -162,7 +162,7 @@ def swaying(freedom, body, walls, flight, longest):
     # Of A^T x: theta'' x, and theta''' x + 3 theta'' (x' + theta' x)
     hard, jerk = stiffness * arm, stiffness * (4.0 * fastest * arm + 3.0 * speed)
     turn = Turn(ZERO, ZERO, ZERO, freedom.axis, fastest)
-    bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, freedom.center, 0.0, hard, jerk, math.inf)
+    bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, freedom.center, 0.0, hard, jerk, math.inf, 0.0)
     return Swaying(body, bounds, freedom, walls, flight.time)
 
 

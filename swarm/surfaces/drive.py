@@ -61,9 +61,7 @@ class Drive(NamedTuple):
     hardest: float  # bound of |d''| [m/s^2]
     jerk: float  # bound of |d'''| [m/s^3]
     pace: float  # a time in which it changes little [s]
-    late: (
-        float  # its fastest speed times the time [m]: the round-off of its place from frame to frame is relative to it
-    )
+    late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
 
 
 class Pose(NamedTuple):
