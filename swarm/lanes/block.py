@@ -11,18 +11,15 @@ import numpy as np
 
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
-from ..kernel.gravity import Gravity, Nothing, as_vector, potential
+from ..kernel.gravity import Nothing, potential
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined, select
 from ..kernel.vector import column, put, square
 from ..methods import contract as methods
 from ..particles import Contacts
 from ..status import Status
-from ..surfaces import flights, safe, strides
 from ..surfaces import fold as walls
-from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.moving import Carried, Marched, Strided, at
+from ..surfaces.moving import Carried, at
 from .arrays import (
-    EIGHT,
     HITS,
     LANES,
     LEFT,
@@ -42,14 +39,13 @@ from .arrays import (
 from .arrays import (
     heat as book_heat,
 )
+from .fly import go, marked_lanes, put_end
 from .solve import solution, solve
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
 # After so many passes all lanes are looked at for that.
 _LOOK = 4096
-# Safe steps to walls in any motion that all lanes take in a pass after the first.
-STRIDES = 3
 # Passes of a call of `advance_block` that is never halted.
 NEVER = 2**63 - 1
 
@@ -93,7 +89,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if not (some_arrived or some_hard):
             continue
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
-        for k in range(_marked(lanes, live) - 1, -1, -1):
+        for k in range(marked_lanes(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
             retire(method, chain, lanes, lane, share)
             following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
@@ -149,29 +145,9 @@ def _(contacts, lanes, i):
 
 
 @inlined
-def _marked(lanes, live):
-    """How many lanes are marked; which, is in `order`.
-
-    Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
-    one were an eighth of the time of a frame with 75 impacts.
-    """
-    marked, order, some, count = lanes.marked, lanes.order, lanes.some, index(0)
-    eights = 0
-    for k in range((live + EIGHT - 1) // EIGHT):
-        some[eights] = k
-        eights += lanes.eights[k] != 0
-    for k in range(eights):
-        first = EIGHT * some[k]
-        for lane in range(first, min(first + EIGHT, live)):
-            order[count] = lane
-            count += index(marked[lane])
-    return int(count)
-
-
-@inlined
 def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    _go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
+    go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
@@ -183,96 +159,6 @@ def _pass(method, chain, gravity, share, lanes, live):
         arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
-
-
-@by_type
-def _go(met, gravity, method, chain, lanes, live):
-    """Every lane to its next contact, or to the end of the frame. `met` are the walls whose first hits are found."""
-    _fly(gravity, method, chain, lanes, live)
-
-
-@_go.register(Nothing)
-def _(met, gravity, method, chain, lanes, live):
-    for i in range(index(live)):
-        _flight(method, chain, gravity, lanes, i, flights.NEVER)
-
-
-@_go.register(Marched)
-def _(met, gravity, method, chain, lanes, live):
-    rows = lanes.rows
-    for i in range(index(live)):
-        hit = safe.first_hit(chain, gravity, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
-        _flight(method, chain, gravity, lanes, i, hit)
-
-
-@_go.register(Strided)
-def _(met, gravity, method, chain, lanes, live):
-    rows, course = lanes.rows, lanes.course
-    for i in range(index(live)):
-        strides.begin(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i])
-    for i in range(index(live)):
-        strides.stride(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i], True)
-    for _stride in range(STRIDES):
-        for i in range(index(live)):
-            strides.stride(chain, gravity, course, i, column(rows, R, i), column(rows, V, i), rows[LEFT, i], False)
-    for i in range(index(live)):
-        _flight(method, chain, gravity, lanes, i, strides.end(course, i))
-
-
-@by_type
-def _fly(gravity, method, chain, lanes, live):
-    """Every lane to its next contact, or to the end of the frame.
-
-    A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
-    an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
-    and contact in one loop 3.6, first hit and flight 3.3 (an ellipsoid 4.4, 3.9). The safe steps of a fall in one loop
-    110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
-    a particle: the angular momentum in a sphere drifted five times as fast.)
-    """
-
-
-@_fly.register(Nothing)
-def _(gravity, method, chain, lanes, live):
-    rows = lanes.rows
-    for i in range(index(live)):
-        hit = flights.first_hit(at(chain, rows[LEFT, i]), gravity, column(rows, R, i), column(rows, V, i))
-        _flight(method, chain, gravity, lanes, i, hit)
-
-
-@_fly.register(Gravity)
-def _(gravity, method, chain, lanes, live):
-    _fall(chain, gravity, lanes, live)
-    for i in range(index(live)):
-        hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
-        _flight(method, chain, gravity, lanes, i, hit)
-
-
-@inlined
-def _fall(chain, gravity, lanes, live):
-    """The course of every lane to its first hit, by safe steps."""
-    rows, course, marked = lanes.rows, lanes.course, lanes.marked
-    for i in range(index(live)):
-        now = at(chain, rows[LEFT, i])
-        flights.begin_fall(now, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
-    for _step in range(SAFE_STEPS):
-        for i in range(index(live)):
-            flights.step_fall(at(chain, rows[LEFT, i]), course, 0, i)
-    # The few that need more, one by one: a flight in two parts would look like a short one.
-    for i in range(index(live)):
-        marked[i] = _needs_more(chain, lanes, i)
-    for k in range(_marked(lanes, live)):
-        lane = lanes.order[k]
-        for _step in range(MORE_STEPS):
-            flights.step_fall(at(chain, rows[LEFT, lane]), course, 0, lane)
-            if not _needs_more(chain, lanes, lane):
-                break
-
-
-@inlined
-def _needs_more(chain, lanes, i):
-    """Whether more safe steps may find a hit in this frame."""
-    hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
-    return (hit.wall < 0.0) & (hit.time < lanes.rows[LEFT, i])
 
 
 @by_type
@@ -303,35 +189,15 @@ def _(thermal, method, chain, gravity, share, lanes, live):
 
 
 @inlined
-def _flight(method, chain, gravity, lanes, i, hit):
-    """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
-    lane = lane_of(method, lanes.rows, i)
-    if methods.lands(method):
-        end = methods.land(method, chain, gravity, lane, hit)
-    else:
-        end = methods.flight(method, chain, gravity, lane)
-    _put(lanes, i, end)
-    lanes.wall[i] = end.wall
-
-
-@inlined
 def _end(method, chain, lanes, i, contact):
     """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
-    _put(lanes, i, contact)
+    put_end(lanes, i, contact)
     _count(method, lanes, i, contact)
     _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
     add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
     lanes.wall[i] = contact.wall
     hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
     return contact.lasts | (not (contact.left > 0.0)), hard
-
-
-@inlined
-def _put(lanes, i, end):
-    """Where a lane is at the end of a flight or a contact, and how much of its frame is left."""
-    put(lanes.rows, R, i, end.r)
-    put(lanes.rows, V, i, end.v)
-    lanes.rows[LEFT, i] = end.left
 
 
 @inlined
@@ -419,7 +285,7 @@ def _(hard, method, chain, gravity, lanes, live):
         if lanes.wall[i] <= methods.HARD:
             lane = lane_of(method, lanes.rows, i)
             contact, status = methods.hard_pass(method, chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
-            _put(lanes, i, contact)
+            put_end(lanes, i, contact)
             _count(method, lanes, i, contact)
             if lanes.rows[HITS, i] > hard.most_hits:
                 status = Status.STALLED.value
