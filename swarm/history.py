@@ -88,8 +88,12 @@ def contact_history(
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
-    if scene.moves():
-        raise SceneError("scene must have no wall that moves: a contact step knows walls at rest only")
+    for i, surface in enumerate(scene.surfaces):
+        if surface.motion is not None or surface.reacts():
+            raise SceneError(
+                f"surfaces[{i}] must be at rest, without motion, mass and inertia, for a single contact step, got "
+                f"{surface}; use simulate"
+            )
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")

@@ -7,9 +7,13 @@ import pytest
 
 import swarm
 from swarm.motion import led
+from swarm.motion.given import Sum
 
 START = np.array([0.3, -0.2, 0.7])
 TIMES = np.linspace(0.0, 7.0, 101)
+FIRST, SPIN = swarm.Translation((1.0, 2.0, -3.0)), swarm.Rotation((0.0, 0.0, 1.0), 1.0, (0.0, 0.0, 0.0))
+ZEROS = ((0.0, 0.0, 0.0),) * 3
+BENT = swarm.Path((0.0, 1.0), ZEROS[:2])
 
 
 def test_translation():
@@ -69,6 +73,35 @@ def test_early_motion_has_all_digits():
         (lambda: swarm.Rotation((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0)), ["axis", "direction"]),
         (lambda: swarm.Rotation((0.0, 0.0, 1.0), "fast", (0.0, 0.0, 0.0)), ["rate", "'fast'"]),
         (lambda: swarm.Rotation((0.0, 0.0, 1.0), 1.0, None), ["center", "three numbers"]),
+        (lambda: swarm.Rotation((0.0, 0.0, 1.0), -1e200, (0.0, 0.0, 0.0)), ["|rate|", "at most 1e+100", "got 1e+200"]),
+        (lambda: swarm.Path((0.0, 2.0, 1.0), ZEROS), ["times must ascend", "times[1] = 2 before times[2] = 1"]),
+        (lambda: swarm.Path((0.0, 1.0, 1.0), ZEROS), ["times must ascend", "times[1] = 1 before times[2] = 1"]),
+        (lambda: swarm.Path((0.0,), ZEROS[:1]), ["times", "at least two numbers", "got 1"]),
+        (lambda: swarm.Path(0.0, ZEROS), ["times", "at least two numbers", "an array of shape ()"]),
+        (lambda: swarm.Path("012", ZEROS), ["times must be an array of numbers", "got str"]),
+        (lambda: swarm.Path((0.0, math.nan, 1.0), ZEROS), ["times[1] must be a finite number", "got nan"]),
+        (lambda: swarm.Path((0.0, 1.0, 1e200), ZEROS), ["|times[2]|", "at most 1e+100", "got 1e+200"]),
+        (lambda: swarm.Path((0.0, 1.0), ZEROS), ["positions must be one for each of the 2 times", "got 3"]),
+        (lambda: swarm.Path((0.0, 1.0), 5.0), ["positions must be three numbers for each", "got 5.0"]),
+        (lambda: swarm.Path((0.0, 1.0), ((0, 0, 0), (0, 0))), ["positions[1] must be three numbers", "got 2"]),
+        (lambda: swarm.Path((0.0, 1.0), ((0, 0, 0), (0, math.inf, 0))), ["positions[1][1]", "finite", "got inf"]),
+        (lambda: swarm.Path((0.0, 1e-90), ((0, 0, 0), (1e20, 0, 0))), ["times must be so far apart", "1e-90 s at"]),
+        (lambda: Sum(()), ["at least one", "got ()"]),
+        (lambda: Sum((FIRST, 3.0)), ["a sum must have motions as its parts", "3.0"]),
+        (lambda: FIRST + swarm.Guide((1.0, 0.0, 0.0)), ["at most 0 Guide, got 1", "give it alone"]),
+        (lambda: Sum((FIRST + SPIN, SPIN)), ["at most 1 Rotation, got 2", "about one axis their rates add up"]),
+        (lambda: sum([BENT, FIRST, BENT]), ["at most 1 Path, got 2", "their displacements add up"]),
+        (lambda: swarm.Sphere(1.0, motion=[BENT, BENT]), ["motion: a sum of motions", "at most 1 Path, got 2"]),
+        (lambda: swarm.Sphere(1.0, motion=[]), ["motion must be None, swarm.Translation", "got []"]),
+        (lambda: swarm.Sphere(1.0, motion="translation"), ["motion must be None", "got 'translation'"]),
+        (
+            lambda: swarm.Body([(0, 0, 0), (1, 0, 0)], 1.0, guides=[(0, swarm.Plane((0, 0, 1), motion=FIRST))]),
+            ["guides[0][1] must have no motion", "anchors lead points"],
+        ),
+        (
+            lambda: swarm.Body([(0, 0, 0), (1, 0, 0)], 1.0, cavities=[(swarm.Sphere(2.0, mass=1.0), 0, 1)]),
+            ["cavities[0][0] must have no motion", "moves with its carrier"],
+        ),
     ],
 )
 def test_errors_name_the_argument(build, parts):

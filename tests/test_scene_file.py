@@ -1,12 +1,14 @@
 """Scene files: what they may contain, and the error sentence for everything else."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 
 import swarm
-from swarm import scene_file
+from swarm import scene_file, tables
 from swarm.bodies.elastic import block
 from swarm.bodies.table import table_of
 
@@ -29,6 +31,21 @@ every = 0.5
 
 
 SPHERE = 'kind = "sphere"\nradius = 0.5'
+FALLS = "{ kind = 'translation', velocity = [0, 0, -1] }"
+BENDS = "{ kind = 'path', times = [0, 1, 3], positions = [[0, 0, 0], [0, 0, 1], [0, 1, 0]] }"
+TURNS = "{ kind = 'rotation', axis = [0, 0, 2], rate = 3, center = [0, 0, 1] }"
+SWINGS = "{ kind = 'oscillation', amplitude = [0, 0, 0.1], frequency = 2, phase = 0.5 }"
+MOTIONS = {
+    FALLS: swarm.Translation((0.0, 0.0, -1.0)),
+    BENDS: swarm.Path((0.0, 1.0, 3.0), ((0, 0, 0), (0, 0, 1), (0, 1, 0))),
+    TURNS: swarm.Rotation((0.0, 0.0, 2.0), 3.0, (0.0, 0.0, 1.0)),
+    SWINGS: swarm.Oscillation((0.0, 0.0, 0.1), 2.0, 0.5),
+    SWINGS.replace(", phase = 0.5", ""): swarm.Oscillation((0.0, 0.0, 0.1), 2.0),
+    f"[{SWINGS}]": swarm.Oscillation((0.0, 0.0, 0.1), 2.0, 0.5),
+    f"[{FALLS}, {SWINGS}, {TURNS}]": swarm.Translation((0.0, 0.0, -1.0))
+    + swarm.Oscillation((0.0, 0.0, 0.1), 2.0, 0.5)
+    + swarm.Rotation((0.0, 0.0, 2.0), 3.0, (0.0, 0.0, 1.0)),
+}
 
 
 def formula(phi):
@@ -56,6 +73,16 @@ def test_laws_of_walls_and_their_seed(tmp_path):
     assert job.scene.surfaces == (swarm.Sphere(0.5, friction=0.25, temperature=300.0, accommodation=0.5),)
     assert job.run.seed == 2**64 - 1
     assert read(tmp_path, GOOD).run.seed == 0
+
+
+@pytest.mark.parametrize("text", MOTIONS)
+def test_motions_of_walls(tmp_path, text):
+    """And back into a file, from which the same scene is read."""
+    job = read(tmp_path, GOOD.replace("radius = 0.5", f"radius = 0.5\nmotion = {text}"))
+    (surface,) = job.scene.surfaces
+    assert surface == swarm.Sphere(0.5, motion=MOTIONS[text])
+    again = tomli_w.dumps({**tomllib.loads(GOOD), **tables.scene_table(job.scene)})
+    assert read(tmp_path, again).scene == job.scene
 
 
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
@@ -136,6 +163,36 @@ def test_shipped_scenes_are_read(path):
             "radius = 0.5",
             'radius = 0.5\nmotion = { kind = "translation", velocity = [0, 0, 1], speed = 1.0 }',
             r"surface\[0\]\.motion\.speed: unknown key, expected 'velocity'",
+        ),
+        (
+            "radius = 0.5",
+            "radius = 0.5\nmotion = { velocity = [0, 0, 1] }",
+            r"surface\[0\]\.motion\.kind: expected one of 'translation', .*, got nothing",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "translation", velocity = [0, 0] }',
+            r"surface\[0\]\.motion\.velocity must be three numbers, got 2",
+        ),
+        (
+            "radius = 0.5",
+            f"radius = 0.5\nmotion = [{FALLS}, {{ kind = 'rotation', axis = [0, 0, 1], rate = inf, center = [0, 0, 0] }}]",
+            r"surface\[0\]\.motion\[1\]\.rate must be a finite number, got inf",
+        ),
+        (
+            "radius = 0.5",
+            f"radius = 0.5\nmotion = [{BENDS}, {FALLS}, {BENDS}]",
+            r"surface\[0\]\.motion: a sum of motions must have at most 1 Path, got 2",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "path", times = [0, 1], positions = [[0, 0, 0]] }',
+            r"surface\[0\]\.motion\.positions must be one for each of the 2 times, got 1",
+        ),
+        (
+            "radius = 0.5",
+            "radius = 0.5\nmotion = 3.0",
+            r"surface\[0\]\.motion must be None, swarm.Translation.*got 3\.0",
         ),
         (
             "radius = 0.5",

@@ -52,6 +52,20 @@ def test_sliding_and_wall_heat_are_told(path):
     assert told["energy_drift"] == 0.0
 
 
+def test_the_work_of_walls_is_told(tmp_path, path):
+    """A piston that comes with u gives a particle of mass m and speed v the work 2 m u (v + u)."""
+    assert summary.numbers(path)["wall_work"] == []
+    ends = swarm.Plane((-1, 0, 0), 1.0), swarm.Plane((1, 0, 0), 1.0, motion=swarm.Translation((-0.5, 0.0, 0.0)))
+    scene, start = swarm.Scene(ends), swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 2.0)
+    file = tmp_path / "piston.h5"
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=file, compile="never")
+    rows, told = summary.of_trajectory(file), summary.numbers(file)
+    assert rows["wall work"] == summary.of_result(result, None)["wall work"] == "3 J from surfaces[1]"
+    assert rows["energy drift"].startswith("0.0e+00")
+    assert told["wall_work"] == [0.0, 3.0]
+    assert told["energy_drift"] == 0.0
+
+
 def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
     """And the heat of each thermal surface as a power."""
     drawn = {}

@@ -285,4 +285,9 @@ def _smooth(name: str, surface: Any) -> Surface:
         raise SceneError(
             f"{name} must be a surface without edges, got {surface!r} of {walls} walls; give one for each wall"
         )
+    if surface.motion is not None or surface.reacts():
+        raise SceneError(
+            f"{name} must have no motion, mass or inertia, got {surface!r}; a cavity moves with its carrier, and "
+            "anchors lead points"
+        )
     return surface

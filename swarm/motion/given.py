@@ -52,11 +52,12 @@ class Led(NamedTuple):
 class Given:
     """A motion that is given; motions add up: `Translation(...) + Rotation(...)`."""
 
-    # How many of its kind a sum may have.
+    # How many of its kind a sum may have, and what there is for more.
     most: ClassVar[float] = math.inf
+    instead: ClassVar[str] = ""
 
     def __add__(self, other: "Given") -> "Sum":
-        return Sum((*parts_of(self), *parts_of(other)))
+        return Sum((self, other)) if isinstance(other, Given) else NotImplemented
 
     def __radd__(self, other: Any) -> "Given":
         return self if other == 0 else NotImplemented
@@ -143,6 +144,7 @@ class Rotation(Given):
     rate: float
     center: Vector
     most: ClassVar[float] = 1
+    instead: ClassVar[str] = "about one axis their rates add up to that of a single one"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", axis_of(self.axis))
@@ -168,7 +170,7 @@ class Sum(Given):
             centre of a rotation moves with the displacements.
 
     Raises:
-        SceneError: two rotations, two paths, or a guide.
+        SceneError: no part, one that is no motion, two rotations, two paths, or a guide.
 
     >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
     >>> len(both.parts)
@@ -178,10 +180,16 @@ class Sum(Given):
     parts: tuple[Given, ...]
 
     def __post_init__(self) -> None:
-        for kind in {type(one) for one in self.parts}:
-            count = sum(isinstance(one, kind) for one in self.parts)
+        parts = tuple(part for one in self.parts for part in parts_of(one))
+        if not parts or not all(isinstance(one, Given) for one in parts):
+            raise SceneError(f"a sum must have motions as its parts, at least one, got {self.parts!r:.200}")
+        object.__setattr__(self, "parts", parts)
+        for kind in dict.fromkeys(map(type, parts)):
+            count = sum(isinstance(one, kind) for one in parts)
             if count > kind.most:
-                raise SceneError(f"a sum of motions must have at most {kind.most} {kind.__name__}, got {count}")
+                raise SceneError(
+                    f"a sum of motions must have at most {kind.most} {kind.__name__}, got {count}; {kind.instead}"
+                )
 
 
 def parts_of(motion: Any) -> tuple[Any, ...]:

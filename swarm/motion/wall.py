@@ -1,6 +1,7 @@
 """Motions of walls: along a path, of several at once, along a guide; and what a scene file says of them."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass
 from typing import Any, ClassVar
 
@@ -33,20 +34,25 @@ class Path(Given):
     times: tuple[float, ...]
     positions: tuple[Vector, ...]
     most: ClassVar[float] = 1
+    instead: ClassVar[str] = "their displacements add up to those of a single one"
 
     def __post_init__(self) -> None:
-        times = checks.array("times", self.times)
-        if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0.0).all():
-            wrong = np.flatnonzero(~(np.diff(times) > 0.0)) if times.ndim == 1 else np.empty(0)
-            came = f"{times[wrong[0]]:g} before {times[wrong[0] + 1]:g}" if wrong.size else f"the shape {times.shape}"
-            raise SceneError(f"times must be at least two, ascending, got {came}")
-        if not np.isfinite(times).all():
-            raise SceneError(f"times must be finite, got {times[~np.isfinite(times)][0]:g}")
-        if isinstance(self.positions, (str, bytes)) or len(self.positions) != times.size:
-            raise SceneError(f"positions must be one for each of the {times.size} times, got {len(self.positions)}")
-        object.__setattr__(self, "times", tuple(times.tolist()))
+        times = _times(self.times)
+        object.__setattr__(self, "times", times)
+        if isinstance(self.positions, (str, bytes)) or not isinstance(self.positions, Iterable):
+            raise SceneError(f"positions must be three numbers for each of the times, got {self.positions!r:.200}")
         places = tuple(vector_of(f"positions[{k}]", place) for k, place in enumerate(self.positions))
+        if len(places) != len(times):
+            raise SceneError(f"positions must be one for each of the {len(times)} times, got {len(places)}")
         object.__setattr__(self, "positions", places)
+        with np.errstate(all="ignore"):
+            large = ~(np.abs(self.cubics()) <= checks.LARGEST).all(axis=(0, 1))
+        if large.any():
+            k = int(large.argmax())
+            raise SceneError(
+                f"times must be so far apart that the coefficients of the spline are at most {checks.LARGEST:g}, got "
+                f"{times[k]:g} s at {places[k]} and {times[k + 1]:g} s at {places[k + 1]}"
+            )
 
     def cubics(self) -> Floats:
         """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""
@@ -95,6 +101,7 @@ class Guide(Given):
     speed: float = 0.0
     stiffness: float = 0.0
     most: ClassVar[float] = 0
+    instead: ClassVar[str] = "impacts move the wall along it and nothing else does; give it alone"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", axis_of(self.axis))
@@ -131,8 +138,8 @@ KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def parts_of_wall(value: Any) -> "WallMotion | None":
-    """`value` as the motion of a wall: None, a motion, its table, or a list of several.
+def parts_of_wall(value: Any, where: str = "motion") -> "WallMotion | None":
+    """`value` as the motion of a wall: None, a motion, its table, or a list of several; errors say where it is.
 
     Raises:
         SceneError: it is none of these.
@@ -140,26 +147,53 @@ def parts_of_wall(value: Any) -> "WallMotion | None":
     if value is None or isinstance(value, WallMotion):
         return value
     if isinstance(value, Mapping):
-        kind = checks.one_of("motion.kind", value.get("kind"), KINDS)
-        given = {key: part for key, part in value.items() if key != "kind"}
-        names = list(KINDS[kind].__dataclass_fields__)
-        for key in given:
-            if key not in names:
-                raise SceneError(
-                    f"motion.{key}: unknown key, expected {checks.listed(names)}{checks.closest(key, names)}"
-                )
-        for name in names:
-            if name not in given and KINDS[kind].__dataclass_fields__[name].default is MISSING:
-                raise SceneError(
-                    f"motion.{name}: expected a value where kind is '{kind}', got nothing; add {name} = ..."
-                )
-        return KINDS[kind](**given)  # type: ignore[no-any-return]
+        return _of_table(value, where)
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
-        parts = [part for one in value for part in parts_of(parts_of_wall(one))]
-        return parts[0] if len(parts) == 1 else Sum(tuple(parts))
+        parts = [parts_of_wall(one, f"{where}[{k}]") for k, one in enumerate(value)]
+        try:
+            return parts[0] if len(parts) == 1 else Sum(tuple(parts))  # type: ignore[arg-type]
+        except SceneError as error:
+            raise SceneError(f"{where}: {error}") from None
     raise SceneError(
-        f"motion must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got {value!r}"
+        f"{where} must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got "
+        f"{value!r:.200}"
     )
+
+
+def _of_table(table: Mapping[str, Any], where: str) -> "WallMotion":
+    """The motion that a table describes."""
+    if "kind" not in table:
+        raise SceneError(f"{where}.kind: expected one of {checks.listed(KINDS)}, got nothing")
+    kind = checks.one_of(f"{where}.kind", table["kind"], KINDS)
+    given = {key: part for key, part in table.items() if key != "kind"}
+    fields = KINDS[kind].__dataclass_fields__
+    for key in given:
+        if key not in fields:
+            raise SceneError(
+                f"{where}.{key}: unknown key, expected {checks.listed(fields)}{checks.closest(key, fields)}"
+            )
+    for name, field in fields.items():
+        if name not in given and field.default is MISSING:
+            raise SceneError(f"{where}.{name}: expected a value where kind is '{kind}', got nothing; add {name} = ...")
+    try:
+        return KINDS[kind](**given)  # type: ignore[no-any-return]
+    except SceneError as error:
+        raise SceneError(f"{where}.{error}") from None
+
+
+def _times(value: ArrayLike) -> tuple[float, ...]:
+    """`value` as the times of a path."""
+    times = checks.array("times", value)
+    if times.ndim != 1 or times.size < 2:
+        came = f"{times.size}" if times.ndim == 1 else f"an array of shape {times.shape}"
+        raise SceneError(f"times must be a list of at least two numbers, got {came}")
+    parts = [checks.number(f"times[{k}]", part) for k, part in enumerate(times.tolist())]
+    for k, part in enumerate(parts):
+        checks.magnitude(f"|times[{k}]|", abs(part))
+    for k, (one, other) in enumerate(itertools.pairwise(parts)):
+        if not one < other:
+            raise SceneError(f"times must ascend, got times[{k}] = {one:g} before times[{k + 1}] = {other:g}")
+    return tuple(parts)
 
 
 def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: float | None) -> None:

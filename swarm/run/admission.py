@@ -137,7 +137,7 @@ def _require_paths(scene: Scene, until: float) -> None:
             if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
-                    f"{one.times[-1]:g}"
+                    f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
                 )
 
 
@@ -169,7 +169,7 @@ def _require_inside(scene: Scene, particles: Particles) -> None:
         raise SceneError(
             f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first "
             f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
-            f"({type(scene.surfaces[wall]).__name__})"
+            f"({type(scene.surfaces[wall]).__name__}){'' if scene.surfaces[wall].motion is None else ', as it is at 0 s'}"
         )
 
 

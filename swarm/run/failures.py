@@ -22,7 +22,8 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
         sentence += f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
         if scene.moves() and state.contacts is not None:
             # The kernel leaves there when it was.
-            sentence += f" at {moment - state.contacts.left[particle]:.9g} s: walls that move have closed on it"
+            found = moment - state.contacts.left[particle]
+            sentence += f" at {found:.9g} s: walls that move have closed on it; end the run before"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
     multipliers = state.multipliers

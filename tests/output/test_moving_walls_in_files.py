@@ -5,7 +5,7 @@ import pytest
 
 import swarm
 from swarm.motion import pose
-from swarm.output import playback
+from swarm.output import drawing, playback, plots, sheet
 from swarm.output.shapes import shapes_of
 from swarm.surfaces.rotation import matrix
 
@@ -88,6 +88,37 @@ def test_the_recording_moves_them(run):
                 expected = (before - places[0]) @ (now @ first.T).T + places[1]
                 assert after == pytest.approx(expected, abs=1e-6)
     assert np.abs(seen["wall_position"][-1] - seen["wall_position"][0]).max() > 0.01
+
+
+def test_pictures_show_the_walls_of_their_time(run, tmp_path, monkeypatch):
+    """The contact sheet of several frames, and the plot of the last one."""
+    folder, scene, result = run
+    seen, drawn, draw = result.observables, [], drawing.particles
+    monkeypatch.setattr(
+        drawing,
+        "particles",
+        lambda axes, *rest: drawn.append([wires for _solid, wires in rest[2]]) or draw(axes, *rest),
+    )
+    held = playback.Playback(folder / "run.rrd")
+    sheet.draw(held, tmp_path / "sheet.png", [0.0, 0.5, 1.0], False)
+    for k, wires in zip((0, 2, 4), drawn, strict=True):
+        for (_solid, curves), shown in zip(held.wires_at(k), wires, strict=True):
+            np.testing.assert_array_equal(np.vstack(shown), np.vstack(curves))
+    for wall in range(len(drawn[0])):
+        i = int(held._walls[wall].rpartition("/")[2].partition("_")[0])
+        way = np.abs(np.vstack(drawn[2][wall]) - np.vstack(drawn[0][wall])).max()
+        stays = (seen["wall_position"][0, i] == seen["wall_position"][-1, i]).all()
+        stays &= (seen["wall_orientation"][0, i] == seen["wall_orientation"][-1, i]).all()
+        assert (way == 0.0) == stays
+    with swarm.load(folder / "run.h5") as trajectory:
+        plots.draw(trajectory, tmp_path / "run.png")
+    still = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1]) if scene.reacts() else scene
+    for i, wires in enumerate(drawn[3]):
+        if wires:
+            off = np.abs(still.distances_outside(np.vstack(wires).T, 1.0)[i])
+            assert np.median(off) <= 2e-3
+    assert (tmp_path / "sheet.png").stat().st_size > 20_000
+    assert (tmp_path / "run.png").stat().st_size > 20_000
 
 
 def test_shapes_are_where_the_walls_are(run):

@@ -14,6 +14,7 @@ from swarm.output import colours, playback, recording, sheet, viewer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 METHOD = swarm.Impact()
+DRIFT = swarm.Translation((0.1, 0.0, 0.0))
 FRAMES = 41
 
 
@@ -135,7 +136,7 @@ def test_energy_errors_as_colours(tmp_path):
     told = values(deep, 1.1 * start.velocity)
     np.testing.assert_allclose(10.0**told, np.abs(after - before) / (0.5 + 0.5), rtol=1e-9)
     assert (scale.low, scale.high) == (-16.0, -6.0)
-    for law in ({"restitution": 0.9}, {"friction": 0.1}, {"temperature": 300.0}):
+    for law in ({"restitution": 0.9}, {"friction": 0.1}, {"temperature": 300.0}, {"motion": DRIFT}, {"mass": 1.0}):
         with pytest.raises(swarm.SceneError, match="record_color must be 'speed'"):
             colours.colouring("energy-error", swarm.Scene([swarm.Sphere(0.5, **law)]), METHOD, start)
 
