@@ -176,7 +176,7 @@ def test_shipped_scenes_are_read(path):
         ),
         (
             "radius = 0.5",
-            f"radius = 0.5\nmotion = [{FALLS}, {{ kind = 'rotation', axis = [0, 0, 1], rate = inf, center = [0, 0, 0] }}]",
+            f"radius = 0.5\nmotion = [{FALLS}, {TURNS.replace('rate = 3', 'rate = inf')}]",
             r"surface\[0\]\.motion\[1\]\.rate must be a finite number, got inf",
         ),
         (

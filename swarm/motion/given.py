@@ -184,7 +184,7 @@ class Sum(Given):
         if not parts or not all(isinstance(one, Given) for one in parts):
             raise SceneError(f"a sum must have motions as its parts, at least one, got {self.parts!r:.200}")
         object.__setattr__(self, "parts", parts)
-        for kind in dict.fromkeys(map(type, parts)):
+        for kind in dict.fromkeys(type(one) for one in parts):
             count = sum(isinstance(one, kind) for one in parts)
             if count > kind.most:
                 raise SceneError(

@@ -78,7 +78,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: _speed(velocity)
     if scene.laws() is not None:
         raise SceneError(
-            "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature or a motion, "
+            "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature, a motion "
             "or a mass, got 'energy-error': energy that walls dissipate or give is not an error"
         )
     before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)

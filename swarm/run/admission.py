@@ -166,10 +166,11 @@ def _require_inside(scene: Scene, particles: Particles) -> None:
         distances = scene.distances_outside(point)[:, 0]
         wall = int(np.argmax(np.where(np.isnan(distances), np.inf, distances)))
         phi = float(scene.surfaces[wall].phi(point)[0])
+        when = "" if scene.surfaces[wall].motion is None else ", as it is at 0 s"
         raise SceneError(
             f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first "
             f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
-            f"({type(scene.surfaces[wall]).__name__}){'' if scene.surfaces[wall].motion is None else ', as it is at 0 s'}"
+            f"({type(scene.surfaces[wall]).__name__}){when}"
         )
 
 
