@@ -7,6 +7,7 @@ T V^(2/3) is constant; without them only the motion along the piston is compress
 """
 
 import argparse
+import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,8 +26,8 @@ class Compressed(NamedTuple):
 
     volume: np.ndarray  # over that of the start
     temperature: np.ndarray  # over that of the start, of all directions
-    along: float  # of the direction of the piston alone, at the end
-    error: np.ndarray  # standard error of the temperature; between the ends by a straight line
+    error: np.ndarray  # its standard error
+    along: tuple[float, float]  # temperature of the direction of the piston at the end, and its standard error
     balance: float  # of energy and work, over the energy
     impacts: int
 
@@ -46,20 +47,26 @@ def run(count: int, speed: float, frames: int = 20, balls: bool = True) -> Compr
     scene = vessel(speed, balls)
     gas = swarm.fill(scene, count, temperature=TEMPERATURE, seed=1)
     until = (1.0 - LEFT) * LENGTH / speed
-    result = swarm.simulate(scene, gas, swarm.Impact(), until=until, every=until / frames)
-    seen, start, end = result.observables, 0.5 * gas.velocity**2, 0.5 * result.particles.velocity**2
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "piston.h5"
+        result = swarm.simulate(
+            scene, gas, swarm.Impact(), until=until, every=until / frames, trajectory=file, precision="float64"
+        )
+        with swarm.load(file) as trajectory:
+            energies = [0.5 * trajectory.frame(k).velocity ** 2 for k in range(len(trajectory))]
+    seen, start = result.observables, energies[0]
     free = (2.0 * HALF) ** 2 * LENGTH - (len(BALLS) * 4.0 / 3.0 * np.pi * RADIUS**3 if balls else 0.0)
     volume = 1.0 - (2.0 * HALF) ** 2 * speed * seen["time"] / free
-    energy = seen["kinetic_energy"] / seen["kinetic_energy"][0]
-    along = float(end[2].sum() / start[2].sum())
-    # Of a ratio of two means over the same particles, R = <e1>/<e0>: the spread of e1 - R e0
-    before, after = start.sum(axis=0), end.sum(axis=0)
-    spread = (after - energy[-1] * before).std() / after.mean() / np.sqrt(count)
+    ratio, error = np.transpose([growth(start.sum(axis=0), now.sum(axis=0)) for now in energies])
     kept = seen["total_energy"] - seen["wall_work"].sum(axis=1)
     balance = float(np.abs(kept - kept[0]).max() / seen["total_energy"].max())
-    # None at the start, all of it at the end
-    error = spread * energy * np.linspace(0.0, 1.0, len(energy))
-    return Compressed(volume, energy, along, error, balance, int(seen["impacts"][-1]))
+    return Compressed(volume, ratio, error, growth(start[2], energies[-1][2]), balance, int(seen["impacts"][-1]))
+
+
+def growth(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+    """The ratio R = <e1>/<e0> of means over the same particles, and its standard error by the spread of e1 - R e0."""
+    ratio = after.mean() / before.mean()
+    return float(ratio), float((after - ratio * before).std() / before.mean() / np.sqrt(len(before)))
 
 
 def draw(found: Compressed, file: Path) -> None:
@@ -68,13 +75,13 @@ def draw(found: Compressed, file: Path) -> None:
 
     with page(file, "A slow piston and a gas without collisions", 1, 2, (8.0, 3.2)) as axes:
         law = found.volume ** (-2.0 / 3.0)
-        axes[0].plot(found.volume, law, color=GREY, label="V^(-2/3)")
+        axes[0].plot(found.volume, law, color=GREY, label="$V^{-2/3}$")
         axes[0].errorbar(found.volume, found.temperature, found.error, fmt=".", color=BLUE, label="gas")
         axes[0].set(xlabel="volume, over that of the start", ylabel="temperature, over that of the start")
         axes[0].legend()
         axes[1].errorbar(found.volume, found.temperature / law - 1.0, found.error / law, fmt=".", color=RED)
         axes[1].axhline(0.0, color=GREY, linewidth=0.8)
-        axes[1].set(xlabel="volume, over that of the start", ylabel="T V^(2/3) - 1")
+        axes[1].set(xlabel="volume, over that of the start", ylabel="$T V^{2/3} - 1$, with standard errors")
 
 
 def main() -> None:

@@ -21,8 +21,8 @@ def test_a_slow_piston_heats_its_gas_by_the_adiabatic_law():
     assert np.abs(mixed.temperature / law - 1.0)[-1] <= 3.0 * (mixed.error / law)[-1] <= 0.03
     # The spheres take some of the volume, so that it shrinks by more than the length.
     assert mixed.volume[-1] < piston.LEFT
-    assert straight.along * piston.LEFT**2 == pytest.approx(1.0, abs=5e-3)
-    assert straight.temperature[-1] == pytest.approx((2.0 + straight.along) / 3.0, rel=0.05)
+    assert straight.along[0] * piston.LEFT**2 == pytest.approx(1.0, abs=5e-3)
+    assert straight.temperature[-1] == pytest.approx((2.0 + straight.along[0]) / 3.0, rel=0.05)
     for found in (mixed, straight):
         assert found.impacts > 10_000
         assert found.balance <= 1e-13
