@@ -28,7 +28,7 @@ _PRESSED, _INSTANT = 1e-12, 1e-9
 _SHARPEST = 1e-7
 _EPSILON = 2.220446049250313e-16
 # Walls within this part of the scene's size hold a particle together.
-_TOUCH = 1e-10
+TOUCH = 1e-10
 
 
 class Particle(NamedTuple):
@@ -247,7 +247,7 @@ def _(held, rules, chain, gravity, wall, p):
 def careful(rules, chain, gravity, wall, p, impulse):
     """A short step of a particle that several walls hold, as a `Landing`. Adds to impulse[:, 0]."""
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
-    contacts = touching.Contacts(None, rules.laws, shortest, _TOUCH * rules.size)
+    contacts = touching.Contacts(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
         contacts, chain, gravity, wall, touching.Moving(p.r, p.v, p.left), _energy(p.twice), impulse, 0
     )
@@ -257,7 +257,7 @@ def careful(rules, chain, gravity, wall, p, impulse):
 def settles(rules, chain, gravity, p, held):
     """Whether a slow particle is where several walls carry its weight together; `held` is of `are_carried`."""
     slow = square(p.v) <= GRAZING * GRAZING * own_speed2(p)
-    return slow and touching.are_carried(chain, gravity, p.r, p.v, _TOUCH * rules.size, held)
+    return slow and touching.are_carried(chain, gravity, p.r, p.v, TOUCH * rules.size, held)
 
 
 @inlined

@@ -172,7 +172,9 @@ def careful_block(method, chain, gravity, share):
         if following == stop:
             return Status.DONE.value, 0, drawn
         _step(method, chain, gravity, share, following)
-        if share.state.contacts.short_steps[following] > _MOST_SHORT_STEPS:
+        contacts = share.state.contacts
+        closed = _have_closed(chain, method, column(share.state.position, 0, following), contacts.left[following])
+        if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:
             return Status.STALLED.value, following, drawn
         following += 1
 
@@ -206,7 +208,8 @@ def _step(method, chain, gravity, share, i):
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
-    if not wall_laws.moves(method.laws) and events.settles(method, chain, gravity, p, held):
+    now = at(chain, left)
+    if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
         _rest(method, chain, gravity, share, i, p, held)
         return
     contacts.short_steps[i] += 1.0
@@ -215,7 +218,7 @@ def _step(method, chain, gravity, share, i):
         state.impulse[s, i] += impulses[s, 0] * state.mass[i]
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
-    u = wall_velocity(wall_laws.moving(method.laws), at(chain, left), contacts.met[i], r)
+    u = wall_velocity(wall_laws.moving(method.laws), now, contacts.met[i], r)
     given_work = given(u, end.v - v)
     _book(chain, state, i, contacts.met[i], p.twice, end.twice_energy, given_work, wall_laws.loses(method.laws))
     contacts.sliding[i] += end.used
@@ -224,3 +227,18 @@ def _step(method, chain, gravity, share, i):
     contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
     share.phase[i] = phase
     share.pending[phase] += 1
+
+
+@by_type_outlined
+def _have_closed(chain, method, r, left):
+    """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
+    return False
+
+
+@_have_closed.register(Carried)
+def _(chain, method, r, left):
+    now = at(chain, left)
+    for i in range(walls.length(chain)):
+        if walls.distance(now, float(i), r) > events.TOUCH * method.size:
+            return True
+    return False

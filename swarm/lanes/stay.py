@@ -1,9 +1,14 @@
-"""What rests on walls that move: it goes with them as long as friction, or a balance of forces, holds it there."""
+"""What rests where walls move: it goes with its wall as long as friction, or a balance of forces, holds it there.
 
-from ..contact import hold
+Until then another wall may come, and strike it.
+"""
+
+from typing import NamedTuple
+
+from ..contact import crossing, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
-from ..contact.events import ARRIVED, EDGE, HELD
+from ..contact.events import ARRIVED, EDGE, EVENT, HELD
 from ..contact.projection import ALLOWED
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import by_type, by_type_outlined, outlined
@@ -15,6 +20,15 @@ from .compose import KEEP, LEFT, PRESS, SCALE2, SLOWEST, TWICE, WALL, A, R, V, p
 
 # Halvings of the interval in which a wall lets a particle go that rests on it.
 _HALVINGS = 60
+# Steps in the search for another wall that comes: where none is met after so many, it is too near to be told.
+_MOST_STEPS = 10_000
+
+
+class Clear(NamedTuple):
+    """Until when no other wall is met, and the wall that is met then, or -1."""
+
+    time: float
+    wall: float
 
 
 @by_type
@@ -37,14 +51,16 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
     r, v = column(rows, R, i), column(rows, V, i)
     now = at(chain, left)
-    u = walls.velocity(now, first, r)
-    if square(v - u) > SLOWEST * rows[SCALE2, i] or not _rests(kind, method, now, gravity, lanes, i, r):
+    u, slowest = walls.velocity(now, first, r), SLOWEST * rows[SCALE2, i]
+    moves_on = square(v - u) > slowest or _rubs(kind, methods.laws(method), now, lanes, i, r, slowest)
+    if moves_on or not _rests(kind, method, now, gravity, lanes, i, r):
         return phase_of(kind)
-    pace, low, high = walls.pace(now, first), 0.0, 0.0
+    pace, low, high, met = _pace(now), 0.0, 0.0, -1.0
     pressed, pressed_second = 0.0, 0.0
-    while low < left:
+    while low < left and met < 0.0:
         step = min(pace, left - low)
-        high = left if low + step >= left else low + step
+        clear = _clear(kind, method, chain, lanes, i, low, left if low + step >= left else low + step)
+        high = clear.time
         middle = 0.5 * (low + high)
         if not (
             _rests_later(kind, method, chain, gravity, lanes, i, middle)
@@ -59,9 +75,9 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
         )
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
-        low = high
+        low, met = high, clear.wall
     end = low
-    if low < left:
+    if low < left and met < 0.0:
         start = low
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
@@ -90,11 +106,72 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     state.contacts.sliding[lanes.particle[i]] += end
     if not after > 0.0:
         return ARRIVED
+    if met >= 0.0:
+        state.contacts.met[lanes.particle[i]] = met
+        put(rows, R, i, walls.settle(then, met, r1))
+        return EVENT
     held = hold.of_lane(kind, first, rows[WALL + 1, i])
     force = slides.force(methods.laws(method), held, then, gravity, r1, v1)
     put(rows, A, i, force.acceleration)
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
     return phase_of(kind)
+
+
+@by_type
+def _rubs(kind, laws, now, lanes, i, r, slowest):
+    """Whether the second wall has friction and slips on a lane that moves with the first one."""
+    return False
+
+
+@_rubs.register(hold.Two)
+def _(kind, laws, now, lanes, i, r, slowest):
+    second = lanes.rows[WALL + 1, i]
+    slip = column(lanes.rows, V, i) - walls.velocity(now, second, r)
+    return wall_laws.number_of(wall_laws.friction(laws), second) > 0.0 and square(slip) > slowest
+
+
+@outlined
+def _pace(now):
+    """The shortest pace of all walls."""
+    shortest = walls.pace(now, 0.0)
+    for k in range(1, walls.length(now)):
+        shortest = min(shortest, walls.pace(now, float(k)))
+    return shortest
+
+
+@outlined
+def _clear(kind, method, chain, lanes, i, low, high):
+    """`Clear` of a lane that moves with its first wall, from one time to another."""
+    rows, left = lanes.rows, lanes.rows[LEFT, i]
+    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    time, step, met = low, high - low, -1.0
+    for _k in range(_MOST_STEPS):
+        end = high if time + step >= high else time + step
+        start, then = at(chain, left - time), at(chain, left - end)
+        path, near = _way(chain, lanes, i, time, end), crossing.near(method, column(rows, R, i))
+        if not crossing.meets(start, then, 0.0, held, path, near):
+            if end == high:
+                return Clear(high, -1.0)
+            time, step = end, 2.0 * step
+            continue
+        found = crossing.arrival(chain, 0.0, held, path, near, left - time)
+        met = found.wall
+        if found.time == 0.0 or not time < end:
+            break
+        step = (end - time) * min(found.time, 0.5)
+    # A path that no wall is found on, however short, is clear of them.
+    return Clear(time, met) if met >= 0.0 else Clear(high, -1.0)
+
+
+@outlined
+def _way(chain, lanes, i, start, end):
+    """The way of a lane that moves with its first wall, from one time to another."""
+    rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
+    r = column(rows, R, i)
+    r0 = walls.carry(during(chain, left, left - start), first, r)
+    r1 = walls.carry(during(chain, left, left - end), first, r)
+    v0, v1 = walls.velocity(at(chain, left - start), first, r0), walls.velocity(at(chain, left - end), first, r1)
+    return crossing.Path(r0, v0, r1, v1, end - start)
 
 
 @outlined
