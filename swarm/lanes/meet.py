@@ -237,8 +237,7 @@ def _have_closed(chain, method, r, left):
 
 @_have_closed.register(Carried)
 def _(chain, method, r, left):
-    now = at(chain, left)
+    now, deepest = at(chain, left), 0.0
     for i in range(walls.length(chain)):
-        if walls.distance(now, float(i), r) > events.TOUCH * method.size:
-            return True
-    return False
+        deepest = max(deepest, walls.distance(now, float(i), r))
+    return deepest > events.TOUCH * method.size

@@ -76,9 +76,8 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
         low, met = high, clear.wall
-    end = low
+    end = start = low
     if low < left and met < 0.0:
-        start = low
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
             if _rests_later(kind, method, chain, gravity, lanes, i, middle):
