@@ -111,7 +111,7 @@ def test_a_ceiling_that_closes_on_what_rests_is_told(tmp_path):
     """It does not pass it: the run ends with where and when."""
     lid = swarm.Plane((0.0, 0.0, 1.0), 0.25, restitution=0.0, motion=swarm.Translation((0.0, 0.0, -0.5)))
     with pytest.raises(swarm.RunError) as caught:
-        run([floor(), lid], 1.0, trajectory=tmp_path / "run.h5")
+        run([floor(), lid], 1.0, every=0.2, trajectory=tmp_path / "run.h5")
     told = re.search(r"particle 0: .* it is at \(0\.5, 0, 0\) m, .* at ([\d.]+) s: walls that move", str(caught.value))
     assert told is not None, str(caught.value)
     # It is told after the short step in which it happens.
