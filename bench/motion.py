@@ -48,7 +48,7 @@ def pistons(quick: bool) -> list[Row]:
 
 def accelerator(quick: bool) -> list[Row]:
     """Fermi's accelerator: in 50 digits, and its bound."""
-    amplitude, speed, impacts = 0.01, 8.0, 20 if quick else 500
+    amplitude, speed, impacts = 0.01, 8.0, 20 if quick else 501
     until, wanted = fermi.in_fifty_digits(speed, amplitude, impacts)
     swing = swarm.Oscillation((amplitude, 0.0, 0.0), fermi.FREQUENCY)
     walls = [swarm.Plane((-1, 0, 0), 0.0), swarm.Plane((1, 0, 0), fermi.LENGTH, motion=swing)]
@@ -74,7 +74,7 @@ def uniform(quick: bool) -> list[Row]:
     shift = np.array(DRIFT.velocity)[:, None]
     for name, made in cavities.items():
         start = swarm.fill(made(None), 20, speed=1.0, seed=3)
-        until = 5.0 if quick else 30.0
+        until = 5.0 if quick else 36.0
         here = _run(made(None), start, until)
         there = _run(made(DRIFT), swarm.Particles(start.position, start.velocity + shift), until)
         off = np.abs(there.particles.position - until * shift - here.particles.position).max()
