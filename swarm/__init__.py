@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         Quadric,
         Slab,
         Sphere,
+        Spheres,
         Torus,
     )  # fmt: skip
 
@@ -63,7 +64,7 @@ _HOMES = {
     "run.simulation": ("Result", "simulate"),
     "surfaces": (
         "Box", "Capsule", "Cone", "Cylinder", "Ellipsoid", "Formula", "OwnSurface", "Paraboloid", "Plane", "Quadric",
-        "Slab", "Sphere", "Torus",
+        "Slab", "Sphere", "Spheres", "Torus",
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -72,7 +73,7 @@ __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory",
     "Cylinder", "Ellipsoid", "FileError", "Formula", "Frame", "Guide", "Impact", "Midpoint", "Oscillation",
     "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation",
-    "RunError", "Scene", "SceneError", "Slab", "Sphere", "Strain", "SwarmError", "Torus", "Trajectory",
+    "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError", "Torus", "Trajectory",
     "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell",
     "elastic", "fill", "load", "place", "rigid", "simulate", "tetrahedron",
 ]  # fmt: skip

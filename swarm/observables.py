@@ -15,6 +15,8 @@ from .particles import Floats, State
 from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
+from .surfaces.fields.members import deepest
+from .surfaces.fold import Field
 from .surfaces.moving import at
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
@@ -30,6 +32,12 @@ def penetration(chain, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
     distance = surfaces.distance(chain.first, r)
     other = penetration(chain.rest, r)
+    return select(distance > other, distance, other)
+
+
+@penetration.register(Field)
+def _(chain, r):
+    distance, other = deepest(chain.first, r), penetration(chain.rest, r)
     return select(distance > other, distance, other)
 
 

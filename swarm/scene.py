@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from . import motion as motions
-from .contact.laws import Laws, Moves, Thermal
+from .contact.laws import Laws, Moves, Span, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.fold import Chain
+from .surfaces.fields.many import Many
+from .surfaces.fold import Chain, Field
 from .surfaces.moving import Carried, carried
 from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
@@ -108,7 +109,7 @@ class Scene:
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity)
 
-    def chain(self, moment: float = 0.0) -> Chain | Carried | None:
+    def chain(self, moment: float = 0.0) -> Chain | Field | Carried | None:
         """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
         return carried(self.surfaces, moment)
 
@@ -126,18 +127,20 @@ class Scene:
         )
         return None if laws == (None, None, None, None) else laws
 
-    def _of_walls(self, values: list[Any], neutral: Any) -> Chain | None:
+    def _of_walls(self, values: list[Any], neutral: Any) -> Chain | Span | None:
         """The value of the owner of every wall as a chain, None where all are neutral."""
         if all(value == neutral for value in values):
             return None
-        chain = None
+        chain: Chain | Span | None = None
         for i in reversed(self.owners()):
-            chain = Chain(values[i], chain)
+            surface = self.surfaces[i]
+            chain = Span(values[i], float(len(surface)), chain) if isinstance(surface, Many) else Chain(values[i], chain)
         return chain
 
     def owners(self) -> list[int]:
-        """The surface that each wall of the chain belongs to."""
-        return [i for i, surface in enumerate(self.surfaces) for _wall in surface.walls()]
+        """The surface that each wall of the chain belongs to, a field for one wall."""
+        owners = [i for i, surface in enumerate(self.surfaces) for _wall in surface.walls()]
+        return sorted(owners, key=lambda i: not isinstance(self.surfaces[i], Many))
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, select
+from ..kernel.jit import by_type, inlined, select
 from ..surfaces.fold import Chain
 
 
@@ -13,6 +13,18 @@ class Laws(NamedTuple):
     friction: Any  # None, or a Chain of one mu a wall
     thermal: Any  # None, or a Chain of one `Thermal` a wall
     moving: Any  # None, or `Moves` where a wall moves
+
+
+class Span(NamedTuple):
+    """In a chain of numbers, one that holds for so many walls."""
+
+    first: Any
+    count: float
+    rest: Any
+
+
+# What the chain of a law is that some wall has.
+Given = Chain | Span
 
 
 class Moves(NamedTuple):
@@ -39,15 +51,18 @@ def _(chain, wall):
     return select(wall == 0.0, chain.first, number_of(chain.rest, wall - 1.0))
 
 
+@number_of.register(Span)
+def _(chain, wall):
+    return select(wall < chain.count, chain.first, number_of(chain.rest, wall - chain.count))
+
+
 @by_type
 def is_given(chain):
     """Whether any wall has this law: a constant for the compiler."""
     return False
 
 
-@is_given.register(Chain)
-def _(chain):
-    return True
+is_given.register(Given, lambda chain: True)
 
 
 @by_type
@@ -58,8 +73,16 @@ def thermal_of(chain, wall):
 
 @thermal_of.register(Chain)
 def _(chain, wall):
-    here, other = wall == 0.0, thermal_of(chain.rest, wall - 1.0)
-    first = chain.first
+    return _either(wall == 0.0, chain.first, thermal_of(chain.rest, wall - 1.0))
+
+
+@thermal_of.register(Span)
+def _(chain, wall):
+    return _either(wall < chain.count, chain.first, thermal_of(chain.rest, wall - chain.count))
+
+
+@inlined
+def _either(here, first, other):
     return Thermal(select(here, first.energy, other.energy), select(here, first.accommodation, other.accommodation))
 
 
@@ -138,9 +161,7 @@ def _e(chain, wall):
     return 1.0
 
 
-@_e.register(Chain)
-def _(chain, wall):
-    return number_of(chain, wall)
+_e.register(Given, lambda chain, wall: number_of(chain, wall))
 
 
 @by_type

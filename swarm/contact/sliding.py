@@ -100,7 +100,7 @@ def slow(friction, held, chain, gravity, r, motion, h):
     return Slowed(motion[0], 0.0)
 
 
-@slow.register(walls.Chain)
+@slow.register(wall_laws.Given)
 def _(friction, held, chain, gravity, r, motion, h):
     v, towards, u = motion
     slip = relative(u, v)
@@ -160,7 +160,7 @@ def direction(friction, v, a):
     return ZERO
 
 
-@direction.register(walls.Chain)
+@direction.register(wall_laws.Given)
 def _(friction, v, a):
     moving = square(v) > 0.0
     way = either(moving, v, a)

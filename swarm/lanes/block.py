@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..contact import laws as wall_laws
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
 from ..kernel.gravity import Nothing, potential
@@ -166,7 +167,7 @@ def _exchange_heat(thermal, method, chain, gravity, share, lanes, live):
     """The impacts on thermal walls that accommodate their particles."""
 
 
-@_exchange_heat.register(walls.Chain)
+@_exchange_heat.register(wall_laws.Given)
 def _(thermal, method, chain, gravity, share, lanes, live):
     rows, state = lanes.rows, share.state
     for i in range(index(live)):
@@ -178,12 +179,12 @@ def _(thermal, method, chain, gravity, share, lanes, live):
             left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:
                 before, after = rows[OWN, i], square(left.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, int(wall), before, after - left.work)
+                book_heat(state, p, walls.row(chain, wall), before, after - left.work)
                 add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
                 put(rows, V, i, left.v)
                 rows[OWN, i] = after
                 rows[HITS, i] += 1.0
-                lanes.impulse[int(wall), i] += left.impulse
+                lanes.impulse[walls.row(chain, wall), i] += left.impulse
                 # The contact is done, unless a wall at 0 K holds the particle.
                 lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 
@@ -218,6 +219,11 @@ def _add_impulse(chain, impulse, lane, wall, given):
 @_add_impulse.register(walls.Chain)
 def _(chain, impulse, lane, wall, given):
     _add_of(chain.rest, chain, impulse, lane, wall, given)
+
+
+@_add_impulse.register(walls.Field)
+def _(chain, impulse, lane, wall, given):
+    _add_to(chain, impulse, 0, lane, wall, given)
 
 
 @_add_impulse.register(Carried)
@@ -260,6 +266,13 @@ def _add_to(chain, impulse, row, lane, wall, given):
 def _(chain, impulse, row, lane, wall, given):
     impulse[row, lane] += select(wall == 0.0, given, 0.0)
     _add_to(chain.rest, impulse, row + 1, lane, wall - 1.0, given)
+
+
+@_add_to.register(walls.Field)
+def _(chain, impulse, row, lane, wall, given):
+    count = walls.count(chain.first)
+    impulse[row, lane] += select((wall >= 0.0) & (wall < count), given, 0.0)
+    _add_to(chain.rest, impulse, row + 1, lane, select(wall < count, -1.0, wall - count), given)
 
 
 @_add_to.register(Nothing)

@@ -6,8 +6,10 @@ from ..kernel.vector import column, put
 from ..methods import contract as methods
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
+from ..surfaces.fold import Field
 from ..surfaces.moving import Marched, Strided, at
 from .arrays import EIGHT, LEFT, R, V, lane_of
+from .seek import hit_of_lane, seek
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
@@ -23,6 +25,13 @@ def go(met, gravity, method, chain, lanes, live):
 def _(met, gravity, method, chain, lanes, live):
     for i in range(index(live)):
         _flight(method, chain, gravity, lanes, i, flights.NEVER)
+
+
+@go.register(Field)
+def _(met, gravity, method, chain, lanes, live):
+    seek(chain, 0.0, gravity, lanes, live)
+    for i in range(index(live)):
+        _flight(method, chain, gravity, lanes, i, hit_of_lane(lanes, i))
 
 
 @go.register(Marched)

@@ -94,7 +94,7 @@ def _exchange_heat(thermal, method, chain, gravity, share, i):
     return False
 
 
-@_exchange_heat.register(walls.Chain)
+@_exchange_heat.register(wall_laws.Given)
 def _(thermal, method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)

@@ -11,6 +11,7 @@ run.
 # First, so that what follows from `bend` and from `hessian` is registered with them.
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
+from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes import rotated as _rotated  # noqa: F401
@@ -41,6 +42,7 @@ __all__ = [
     "Quadric",
     "Slab",
     "Sphere",
+    "Spheres",
     "Surface",
     "Torus",
 ]
@@ -58,4 +60,5 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "quadric": Quadric,
     "slab": Slab,
     "formula": Formula,
+    "spheres": Spheres,
 }

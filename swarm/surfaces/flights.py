@@ -7,7 +7,7 @@ from ..kernel.gravity import Gravity, Nothing, as_vector
 from ..kernel.jit import by_type, inlined, select
 from . import contract
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Chain, outside
+from .fold import Chain, Field, count, outside
 
 
 class Hit(NamedTuple):
@@ -58,7 +58,26 @@ def _(chain, gravity, r, v):
     return sooner(time, found, first_hit(chain.rest, gravity, r, v))
 
 
+@first_hit.register(Field)
+def _(chain, gravity, r, v):
+    return soonest(field_hit(chain.first, gravity, r, v), first_hit(chain.rest, gravity, r, v), count(chain.first))
+
+
 first_hit.register(Nothing, lambda chain, gravity, r, v: NEVER)
+
+
+@by_type
+def field_hit(members, gravity, r, v):
+    """The first `Hit` of a free flight with the bodies of a field, or how far it is surely free."""
+    raise NotImplementedError
+
+
+@inlined
+def soonest(hit, later, before):
+    """The sooner one of two hits, the second with a wall that has so many more walls before it."""
+    first = hit.time <= later.time
+    behind = select(later.wall < 0.0, -1.0, later.wall + before)
+    return Hit(select(first, hit.time, later.time), select(first, hit.wall, behind))
 
 
 @inlined

@@ -1,6 +1,7 @@
 """All walls of a scene at once: the functions of one surface, folded over the chain of its walls.
 
-A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes.
+A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes. Fields come before
+all other walls: whether a scene has one is the type of its chain.
 """
 
 import inspect
@@ -21,22 +22,73 @@ class Chain(NamedTuple):
     rest: Any
 
 
-def chain_of(surfaces: Sequence[Surface]) -> Chain | None:
-    """The walls of `surfaces` as a chain, in their order."""
-    chain = None
-    for wall in reversed([wall for surface in surfaces for wall in surface.walls()]):
+class Field(NamedTuple):
+    """The same with many walls of one kind in the place of the first: each of them has a number."""
+
+    first: Any
+    rest: Any
+
+
+def chain_of(surfaces: Sequence[Surface]) -> Chain | Field | None:
+    """The walls of `surfaces` as a chain, in their order, fields first."""
+    return chained([wall for surface in surfaces for wall in surface.walls()])
+
+
+def chained(walls: Sequence[Any]) -> Chain | Field | None:
+    """These walls as a chain, in their order, fields first."""
+    fields = [wall for wall in walls if is_field(wall)]
+    chain: Chain | Field | None = None
+    for wall in reversed([wall for wall in walls if not is_field(wall)]):
         chain = Chain(wall, chain)
+    for wall in reversed(fields):
+        chain = Field(wall, chain)
     return chain
 
 
 @by_type
+def is_field(wall):
+    """Whether these are the numbers of many walls."""
+    return False
+
+
+@by_type
 def length(chain):
-    """How many walls there are: a constant for the compiler."""
+    """How many walls there are, a field for one of them: a constant for the compiler."""
     raise NotImplementedError
 
 
 length.register(Chain, lambda chain: 1 + length(chain.rest))
+length.register(Field, lambda chain: 1 + length(chain.rest))
 length.register(Nothing, lambda chain: 0)
+
+
+@by_type
+def count(members):
+    """How many walls a field has."""
+    raise NotImplementedError
+
+
+@by_type
+def member(members, wall):
+    """One of them, as a surface."""
+    raise NotImplementedError
+
+
+@by_type
+def outside_of_any(members, wall, r):
+    """Whether a point is in any body of a field but the one with this number."""
+    raise NotImplementedError
+
+
+@by_type
+def row(chain, wall):
+    """The row in which it is booked what this wall gives: a field has one."""
+    return int(wall)
+
+
+@row.register(Field)
+def _(chain, wall):
+    return select(wall < count(chain.first), 0, 1 + row(chain.rest, wall - count(chain.first)))
 
 
 # --- A function of one wall ------------------------------------------------------------------------------
@@ -63,6 +115,12 @@ def _of_wall_0(function: Any, neutral: Any) -> Any:
         here = (wall == 0.0) | (length(chain) == 1)
         return select(here, function(chain.first), fold(chain.rest, wall - 1.0))
 
+    @fold.register(Field)
+    def _(chain, wall):
+        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        other = fold(chain.rest, wall - count(chain.first))
+        return select(here, function(member(chain.first, wall)), other)
+
     fold.register(Nothing, lambda chain, wall: neutral)
 
     return fold
@@ -77,6 +135,12 @@ def _of_wall_1(function: Any, neutral: Any) -> Any:
     def _(chain, wall, a):
         here = (wall == 0.0) | (length(chain) == 1)
         return select(here, function(chain.first, a), fold(chain.rest, wall - 1.0, a))
+
+    @fold.register(Field)
+    def _(chain, wall, a):
+        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        other = fold(chain.rest, wall - count(chain.first), a)
+        return select(here, function(member(chain.first, wall), a), other)
 
     fold.register(Nothing, lambda chain, wall, a: neutral)
 
@@ -93,6 +157,12 @@ def _of_wall_2(function: Any, neutral: Any) -> Any:
         here = (wall == 0.0) | (length(chain) == 1)
         return select(here, function(chain.first, a, b), fold(chain.rest, wall - 1.0, a, b))
 
+    @fold.register(Field)
+    def _(chain, wall, a, b):
+        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        other = fold(chain.rest, wall - count(chain.first), a, b)
+        return select(here, function(member(chain.first, wall), a, b), other)
+
     fold.register(Nothing, lambda chain, wall, a, b: neutral)
 
     return fold
@@ -108,6 +178,12 @@ def _of_wall_3(function: Any, neutral: Any) -> Any:
         here = (wall == 0.0) | (length(chain) == 1)
         return select(here, function(chain.first, a, b, c), fold(chain.rest, wall - 1.0, a, b, c))
 
+    @fold.register(Field)
+    def _(chain, wall, a, b, c):
+        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        other = fold(chain.rest, wall - count(chain.first), a, b, c)
+        return select(here, function(member(chain.first, wall), a, b, c), other)
+
     fold.register(Nothing, lambda chain, wall, a, b, c: neutral)
 
     return fold
@@ -122,6 +198,12 @@ def _of_wall_4(function: Any, neutral: Any) -> Any:
     def _(chain, wall, a, b, c, d):
         here = (wall == 0.0) | (length(chain) == 1)
         return select(here, function(chain.first, a, b, c, d), fold(chain.rest, wall - 1.0, a, b, c, d))
+
+    @fold.register(Field)
+    def _(chain, wall, a, b, c, d):
+        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        other = fold(chain.rest, wall - count(chain.first), a, b, c, d)
+        return select(here, function(member(chain.first, wall), a, b, c, d), other)
 
     fold.register(Nothing, lambda chain, wall, a, b, c, d: neutral)
 
@@ -169,6 +251,11 @@ def outside(chain, wall, r):
 def _(chain, wall, r):
     here = contract.level_of(chain.first, contract.inner(chain.first, r)) > 0.0
     return (here & (wall != 0.0)) | outside(chain.rest, wall - 1.0, r)
+
+
+@outside.register(Field)
+def _(chain, wall, r):
+    return outside_of_any(chain.first, wall, r) | outside(chain.rest, wall - count(chain.first), r)
 
 
 outside.register(Nothing, lambda chain, wall, r: False)

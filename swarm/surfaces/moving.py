@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ..kernel.jit import by_type
 from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of, pose
-from .fold import Chain, length
+from .fold import Chain, chained, length
 from .posed import Drifting, Posed
 from .surface import Surface
 
@@ -53,9 +53,7 @@ length.register(Carried, lambda chain: length(chain.walls))
 def carried(surfaces: tuple[Surface, ...], moment: float) -> Chain | Carried | None:
     """The walls of a scene in the frame that ends at a moment [s]."""
     of_surfaces = [_walls_of(surface, moment) for surface in surfaces]
-    chain = None
-    for wall in reversed([wall for walls in of_surfaces for wall in walls]):
-        chain = Chain(wall, chain)
+    chain = chained([wall for walls in of_surfaces for wall in walls])
     if chain is None or all(surface.motion is None for surface in surfaces):
         return chain
     marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]

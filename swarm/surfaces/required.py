@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import SceneError
 from . import contract, march, newton
+from .fields.members import Members
 from .fold import Chain
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
@@ -59,6 +60,9 @@ def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[An
     """Whose numbers the functions of a wall are asked of, and which: those of a turned body, and of a solid's parts."""
     if isinstance(wall, Rotated):
         yield from _asked_of(wall.body, asked)
+        return
+    if isinstance(wall, Members):
+        yield from _asked_of(wall.like, asked)
         return
     yield wall, asked
     if isinstance(wall, SolidNumbers):

@@ -1,0 +1,179 @@
+"""A uniform grid of cells around many bodies, and which of them reach into each."""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.gravity import Gravity, Nothing
+from ...kernel.jit import Array, by_type, inlined, select
+from ...kernel.vector import Vec, vec
+from ..course import rise_time
+
+# A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
+# is what comes nearer to it than twice that.
+_MARGIN = 1e-6
+# Cells for each body: a flight through more of them looks at fewer bodies in each.
+_CELLS_EACH = 1.0
+# An endless direction is one cell of this width, and a body without end has bounds beyond half of it.
+_ENDLESS = 1e200
+# Pairs of bodies and cells that are looked at together.
+_BATCH = 4_000_000
+
+
+Reaches = Callable[[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
+
+
+class Grid(NamedTuple):
+    """Cells from `low` on, numbered along z first; the one after the last stands for all that is outside."""
+
+    low: Vec
+    width: Vec
+    inverse: Vec  # 1/width
+    margin: Vec
+    shape: Vec  # how many cells along x, y, z
+    first: Array  # int64, where the entries of a cell begin
+    entries: Array  # int32, the bodies
+
+
+class Cell(NamedTuple):
+    """The cell of a point: its number, its place along x, y, z, and whether it is one of the grid."""
+
+    number: int
+    place: Vec
+    inside: bool
+
+
+# --- Where a flight is -----------------------------------------------------------------------------------
+
+
+@inlined
+def cell_of(grid, r):
+    """The `Cell` of a point."""
+    n, d = grid.shape, r - grid.low
+    x, y, z = np.floor(d.x * grid.inverse.x), np.floor(d.y * grid.inverse.y), np.floor(d.z * grid.inverse.z)
+    inside = (x >= 0.0) & (x < n.x) & (y >= 0.0) & (y < n.y) & (z >= 0.0) & (z < n.z)
+    return Cell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
+
+
+@inlined
+def until_next(gravity, grid, cell, r, v):
+    """When a flight is beyond the wall of its cell; from outside, a time before which it does not come into the grid."""
+    p, n = cell.place, grid.shape
+    x = _along(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
+    y = _along(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)
+    z = _along(gravity, 2, (grid.low.z, grid.width.z, grid.margin.z, n.z), p.z, r.z, v.z)
+    leaves = select(y.leaves < x.leaves, y.leaves, x.leaves)
+    enters = select(y.enters > x.enters, y.enters, x.enters)
+    leaves, enters = select(z.leaves < leaves, z.leaves, leaves), select(z.enters > enters, z.enters, enters)
+    return select(cell.inside, leaves, enters)
+
+
+class Passage(NamedTuple):
+    """When a flight leaves its layer of cells, and before when it does not come into the grid, in one direction."""
+
+    leaves: float
+    enters: float
+
+
+@by_type
+def _along(gravity, axis, cells, place, x, v):
+    """The `Passage` along one axis, with (low, width, margin, how many) of its layers."""
+    raise NotImplementedError
+
+
+@_along.register(Nothing)
+def _(gravity, axis, cells, place, x, v):
+    low, width, margin, count = cells
+    ahead = v > 0.0
+    edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
+    face = select(place < 0.0, low + margin, low + count * width - margin)
+    comes = (select(place < 0.0, 1.0, -1.0) * v) > 0.0
+    return Passage(
+        select(v != 0.0, (edge - x) / v, np.inf),
+        select((place >= 0.0) & (place < count), 0.0, select(comes, (face - x) / v, np.inf)),
+    )
+
+
+@_along.register(Gravity)
+def _(gravity, axis, cells, place, x, v):
+    low, width, margin, count = cells
+    b, a = 0.5 * v, 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
+    above = rise_time(x - (low + (place + 1.0) * width + margin), b, a)
+    below = rise_time(low + place * width - margin - x, -b, -a)
+    sign, face = select(place < 0.0, 1.0, -1.0), select(place < 0.0, low + margin, low + count * width - margin)
+    comes = rise_time(sign * (x - face), sign * b, sign * a)
+    return Passage(
+        select(above < below, above, below),
+        select((place >= 0.0) & (place < count), 0.0, comes),
+    )
+
+
+# --- How it is made --------------------------------------------------------------------------------------
+
+
+def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reaches) -> Grid:
+    """The grid of bodies with these bounds (3, n).
+
+    Args:
+        low, high: corners of the bounds of each body, infinite where it has no end [m].
+        reaches: which of so many bodies may have a point in common with the boxes that have these corners (3, pairs).
+    """
+    corner, shape, width = _cells(low, high)
+    margin = _MARGIN * width
+    last = shape.astype(np.int64) - 1
+    begins, ends = (
+        np.clip(np.floor((edge - corner[:, None]) / width[:, None]), 0, last[:, None]).astype(np.int64)
+        for edge in (low - 2.0 * margin[:, None], high + 2.0 * margin[:, None])
+    )
+    cells, bodies = [], []
+    for body, place in _pairs(begins, ends):
+        near = corner[:, None] + place * width[:, None] - 2.0 * margin[:, None]
+        far = corner[:, None] + (place + 1) * width[:, None] + 2.0 * margin[:, None]
+        there = reaches(body, near, far)
+        cells.append(((place[0] * shape[1] + place[1]) * shape[2] + place[2])[there].astype(np.int64))
+        bodies.append(body[there].astype(np.int32))
+    of_cell, of_body = np.concatenate(cells), np.concatenate(bodies)
+    order = np.argsort(of_cell, kind="stable")
+    first = np.zeros(int(shape.prod()) + 2, np.int64)
+    np.cumsum(np.bincount(of_cell, minlength=first.size - 1), out=first[1:])
+    rows = (vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape))
+    # A kernel that looks for nothing looks at the first entry.
+    return Grid(*rows, first, of_body[order] if of_body.size else np.zeros(1, np.int32))
+
+
+def _cells(
+    low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The corner of the grid, how many cells it has along each axis, and how wide they are."""
+    first, last = low.min(axis=1), high.max(axis=1)
+    endless = ~((first > -0.5 * _ENDLESS) & (last < 0.5 * _ENDLESS))
+    extent = np.where(endless, 1.0, last - first)
+    each = extent[~endless].prod() / (_CELLS_EACH * low.shape[1])
+    side = each ** (1.0 / max(1, (~endless).sum()))
+    shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
+    # A little wider than the bodies, so that a flight from outside comes in before it meets one.
+    room = 4.0 * _MARGIN * extent
+    width = np.where(endless, _ENDLESS, (extent + 2.0 * room) / shape)
+    return np.where(endless, -0.5 * _ENDLESS, first - room), shape, width
+
+
+def _pairs(
+    begins: NDArray[np.int64], ends: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Bodies and the places (3, pairs) of the cells from the first to the last of each, in batches."""
+    counts = ends - begins + 1
+    number = counts.prod(axis=0)
+    stops = np.cumsum(number)
+    start = 0
+    while start < number.size:
+        done = stops[start - 1] if start else 0
+        stop = max(start + 1, int(np.searchsorted(stops, done + _BATCH, side="right")))
+        some = np.arange(start, stop)
+        body = np.repeat(some, number[start:stop])
+        k = np.arange(body.size) - np.repeat(stops[start:stop] - number[start:stop] - done, number[start:stop])
+        along_z, along_y = counts[2, body], counts[1, body]
+        place = np.stack([k // (along_z * along_y), k // along_z % along_y, k % along_z]) + begins[:, body]
+        yield body, place
+        start = stop

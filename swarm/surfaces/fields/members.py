@@ -1,0 +1,259 @@
+"""Many bodies of one kind as kernels take them: their numbers in one table, and the grid that finds the next one."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.gravity import Nothing
+from ...kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
+from ...kernel.vector import Vec, column, put
+from .. import contract, flights, fold
+from ..fold import Chain
+from ..rotation import Rotated
+from ..shapes.capsule import CapsuleNumbers
+from ..shapes.ellipsoid import EllipsoidNumbers
+from ..shapes.quadratic import QuadricNumbers
+from ..shapes.slab import AlongX, AlongY, AlongZ, SlabNumbers
+from ..shapes.solid import SolidNumbers
+from ..shapes.sphere import SphereNumbers
+from .grid import Grid, cell_of, until_next
+
+
+class Members(NamedTuple):
+    """The bodies of a field: solids, outside of all of which is admissible."""
+
+    like: Any  # the numbers of one of them, which say of what kind they are
+    table: Array  # (members, width) the numbers of each
+    grid: Grid
+
+
+@inlined
+def member(members, m):
+    """The numbers of one body."""
+    return gathered(members.like, members.table, m, 0)
+
+
+@by_type
+def gathered(like, table, m, k):
+    """What is like that, from row m of a table, from column k on."""
+    return table[m, k]
+
+
+@by_type
+def width(like):
+    """How many columns it takes: a constant for the compiler."""
+    return 1
+
+
+def written(like: Any) -> list[float]:
+    """The columns of one body."""
+    if like is None:
+        return []
+    return [number for part in like for number in written(part)] if isinstance(like, tuple) else [float(like)]
+
+
+def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
+    """The table of bodies, each the numbers of a wall, all of one kind."""
+    return np.array([written(body) for body in bodies])
+
+
+# --- As walls of a chain ---------------------------------------------------------------------------------
+
+fold.is_field.register(Members, lambda wall: True)
+fold.count.register(Members, lambda members: float(members.table.shape[0]))
+
+
+@fold.member.register(Members)
+def _(members, wall):
+    last = members.table.shape[0] - 1.0
+    return member(members, index(int(select(wall < 0.0, 0.0, select(wall > last, last, wall)))))
+
+
+@fold.outside_of_any.register(Members)
+def _(members, wall, r):
+    return _is_in_any(members, wall, r)
+
+
+@outlined
+def _is_in_any(members, wall, r):
+    grid = members.grid
+    cell = index(cell_of(grid, r).number)
+    for k in range(grid.first[cell], grid.first[cell + 1]):
+        m = grid.entries[k]
+        body = member(members, index(m))
+        if contract.level_of(body, contract.inner(body, r)) > 0.0 and float(m) != wall:
+            return True
+    return False
+
+
+@outlined
+def deepest(members, r):
+    """The largest distance outside of the admissible side of any body."""
+    grid, most = members.grid, -math.inf
+    cell = index(cell_of(grid, r).number)
+    for k in range(grid.first[cell], grid.first[cell + 1]):
+        most = max(most, contract.distance(member(members, index(grid.entries[k])), r))
+    return most
+
+
+@flights.field_hit.register(Members)
+def _(members, gravity, r, v):
+    return _first_hit(members, gravity, r, v)
+
+
+@outlined
+def _first_hit(members, gravity, r, v):
+    """The first hit in the cell of a particle, or when it is in another one."""
+    grid = members.grid
+    cell = cell_of(grid, r)
+    found, number = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), index(cell.number)
+    for k in range(grid.first[number], grid.first[number + 1]):
+        m = grid.entries[k]
+        time, hits = flights.hit(gravity, member(members, index(m)), r, v)
+        if time < found.time:
+            found = flights.Hit(time, select(hits, float(m), -1.0))
+    return found
+
+
+# --- Which is near ---------------------------------------------------------------------------------------
+
+
+@kernel
+def nearest(members, points, found):
+    """The gradient and phi, in the rows of `found`, of the body with the least phi near each of the points (3, N)."""
+    grid = members.grid
+    cells = max(grid.shape.x, max(grid.shape.y, grid.shape.z))
+    for i in range(points.shape[1]):
+        r = column(points, 0, i)
+        place = cell_of(grid, r).place
+        center = Vec(_within(place.x, grid.shape.x), _within(place.y, grid.shape.y), _within(place.z, grid.shape.z))
+        best, which, last, shell = math.inf, 0, cells, 0.0
+        while shell <= last:
+            phi, m = _least_in_shell(members, r, center, shell)
+            # What is one shell farther may be nearer still.
+            if phi < math.inf and which == 0:
+                last = min(last, shell + 1.0)
+            if phi < best:
+                best, which = phi, m + 1
+            shell += 1.0
+        put(found, 0, i, contract.gradient(member(members, index(which - 1)), r))
+        found[3, i] = best
+
+
+@inlined
+def _within(place, count):
+    return min(max(place, 0.0), count - 1.0)
+
+
+@inlined
+def _around(place, shell, count):
+    return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
+
+
+@outlined
+def _least_in_shell(members, r, center, shell):
+    """The least phi in the cells that are `shell` cells away from one, and whose it is."""
+    grid, best, which = members.grid, math.inf, 0
+    for x in _around(center.x, shell, grid.shape.x):
+        for y in _around(center.y, shell, grid.shape.y):
+            for z in _around(center.z, shell, grid.shape.z):
+                if max(abs(x - center.x), max(abs(y - center.y), abs(z - center.z))) < shell:
+                    continue
+                number = index((x * grid.shape.y + y) * grid.shape.z + z)
+                for k in range(grid.first[number], grid.first[number + 1]):
+                    m = grid.entries[k]
+                    phi = contract.phi(member(members, index(m)), r)
+                    if phi < best:
+                        best, which = phi, m
+    return best, which
+
+
+# --- What bodies are made of -----------------------------------------------------------------------------
+
+gathered.register(Nothing, lambda like, table, m, k: None)
+width.register(Nothing, lambda like: 0)
+gathered.register(Vec, lambda like, table, m, k: Vec(table[m, k], table[m, k + 1], table[m, k + 2]))
+width.register(Vec, lambda like: 3)
+gathered.register(AlongX, lambda like, table, m, k: AlongX(1.0))
+gathered.register(AlongY, lambda like, table, m, k: AlongY(1.0))
+gathered.register(AlongZ, lambda like, table, m, k: AlongZ(1.0))
+
+
+@gathered.register(SphereNumbers)
+def _(like, table, m, k):
+    return SphereNumbers(
+        Vec(table[m, k], table[m, k + 1], table[m, k + 2]),
+        table[m, k + 3], table[m, k + 4], table[m, k + 5], table[m, k + 6],
+    )  # fmt: skip
+
+
+width.register(SphereNumbers, lambda like: 7)
+
+
+@gathered.register(CapsuleNumbers)
+def _(like, table, m, k):
+    return CapsuleNumbers(
+        Vec(table[m, k], table[m, k + 1], table[m, k + 2]),
+        table[m, k + 3], table[m, k + 4], table[m, k + 5], table[m, k + 6],
+    )  # fmt: skip
+
+
+width.register(CapsuleNumbers, lambda like: 7)
+
+
+@inlined
+def _quadric(like, table, m, k):
+    """The fields of a quadric."""
+    tilt = k + 6 + width(like.b)
+    return (
+        gathered(like.center, table, m, k), gathered(like.a, table, m, k + 3), gathered(like.b, table, m, k + 6),
+        table[m, tilt], table[m, tilt + 1], table[m, tilt + 2],
+    )  # fmt: skip
+
+
+gathered.register(QuadricNumbers, lambda like, table, m, k: QuadricNumbers(*_quadric(like, table, m, k)))
+gathered.register(EllipsoidNumbers, lambda like, table, m, k: EllipsoidNumbers(*_quadric(like, table, m, k)))
+width.register(QuadricNumbers, lambda like: 9 + width(like.b))
+
+
+@gathered.register(SlabNumbers)
+def _(like, table, m, k):
+    n = k + width(like.normal)
+    return SlabNumbers(
+        gathered(like.normal, table, m, k), table[m, n], table[m, n + 1], table[m, n + 2], table[m, n + 3]
+    )
+
+
+width.register(SlabNumbers, lambda like: width(like.normal) + 4)
+
+
+@gathered.register(Rotated)
+def _(like, table, m, k):
+    n = k + width(like.body)
+    return Rotated(
+        gathered(like.body, table, m, k),
+        gathered(like.x, table, m, n), gathered(like.y, table, m, n + 3), gathered(like.z, table, m, n + 6),
+    )  # fmt: skip
+
+
+width.register(Rotated, lambda like: width(like.body) + 9)
+
+
+@gathered.register(Chain)
+def _(like, table, m, k):
+    return Chain(gathered(like.first, table, m, k), gathered(like.rest, table, m, k + width(like.first)))
+
+
+width.register(Chain, lambda like: width(like.first) + width(like.rest))
+
+
+@gathered.register(SolidNumbers)
+def _(like, table, m, k):
+    n = k + width(like.parts)
+    return SolidNumbers(gathered(like.parts, table, m, k), table[m, n], table[m, n + 1])
+
+
+width.register(SolidNumbers, lambda like: width(like.parts) + 2)
