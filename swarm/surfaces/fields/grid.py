@@ -33,7 +33,7 @@ class Grid(NamedTuple):
     inverse: Vec  # 1/width
     margin: Vec
     shape: Vec  # how many cells along x, y, z
-    first: Array  # int64, where the entries of a cell begin
+    first: Array  # int32, where the entries of a cell begin
     entries: Array  # int32, the bodies
 
 
@@ -136,7 +136,7 @@ def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reache
         bodies.append(body[there].astype(np.int32))
     of_cell, of_body = np.concatenate(cells), np.concatenate(bodies)
     order = np.argsort(of_cell, kind="stable")
-    first = np.zeros(int(shape.prod()) + 2, np.int64)
+    first = np.zeros(int(shape.prod()) + 2, np.int32)
     np.cumsum(np.bincount(of_cell, minlength=first.size - 1), out=first[1:])
     rows = (vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape))
     # A kernel that looks for nothing looks at the first entry.

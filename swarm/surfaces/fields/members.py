@@ -21,6 +21,9 @@ from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereNumbers
 from .grid import Grid, cell_of, until_next
 
+# Bytes of a line of the cache.
+_LINE = 64
+
 
 class Members(NamedTuple):
     """The bodies of a field: solids, outside of all of which is admissible."""
@@ -48,16 +51,27 @@ def width(like):
     return 1
 
 
-def written(like: Any) -> list[float]:
+def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
+    """The table of bodies, each the numbers of a wall, all of one kind."""
+    return aligned(np.array([_written(body) for body in bodies]))
+
+
+def _written(like: Any) -> list[float]:
     """The columns of one body."""
     if like is None:
         return []
-    return [number for part in like for number in written(part)] if isinstance(like, tuple) else [float(like)]
+    if isinstance(like, SphereNumbers):
+        return [*like.center, like.radius]
+    return [number for part in like for number in _written(part)] if isinstance(like, tuple) else [float(like)]
 
 
-def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
-    """The table of bodies, each the numbers of a wall, all of one kind."""
-    return np.array([written(body) for body in bodies])
+def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A copy of a table that begins with a line of the cache."""
+    memory = np.empty(rows.nbytes + _LINE, np.uint8)
+    first = -memory.ctypes.data % _LINE
+    copy = memory[first : first + rows.nbytes].view(np.float64).reshape(rows.shape)
+    copy[:] = rows
+    return copy
 
 
 # --- As walls of a chain ---------------------------------------------------------------------------------
@@ -184,13 +198,13 @@ gathered.register(AlongZ, lambda like, table, m, k: AlongZ(1.0))
 
 @gathered.register(SphereNumbers)
 def _(like, table, m, k):
-    return SphereNumbers(
-        Vec(table[m, k], table[m, k + 1], table[m, k + 2]),
-        table[m, k + 3], table[m, k + 4], table[m, k + 5], table[m, k + 6],
-    )  # fmt: skip
+    # Four numbers of it are half a line of the cache; the others follow from them.
+    radius = table[m, k + 3]
+    center = Vec(table[m, k], table[m, k + 1], table[m, k + 2])
+    return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
 
 
-width.register(SphereNumbers, lambda like: 7)
+width.register(SphereNumbers, lambda like: 4)
 
 
 @gathered.register(CapsuleNumbers)

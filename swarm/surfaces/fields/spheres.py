@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..shapes.sphere import SphereNumbers
 from .many import Floats, Many, bodies, lengths
-from .members import gathered
+from .members import aligned, gathered
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -50,8 +50,7 @@ class Spheres(Many):
         return np.asarray((off**2).sum(axis=0) <= self.radii[bodies] ** 2)
 
     def table(self) -> tuple[Any, Floats]:
-        r = self.radii
-        columns = np.column_stack([self.centers, r, r**2, -1.0 / r, np.full(len(r), -1.0)])
+        columns = aligned(np.column_stack([self.centers, self.radii]))
         return gathered(_LIKE, columns, 0, 0), columns
 
 
