@@ -134,7 +134,9 @@ class Scene:
         chain: Chain | Span | None = None
         for i in reversed(self.owners()):
             surface = self.surfaces[i]
-            chain = Span(values[i], float(len(surface)), chain) if isinstance(surface, Many) else Chain(values[i], chain)
+            chain = (
+                Span(values[i], float(len(surface)), chain) if isinstance(surface, Many) else Chain(values[i], chain)
+            )
         return chain
 
     def owners(self) -> list[int]:

@@ -3,10 +3,12 @@
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, inlined, outlined
-from ..kernel.vector import Vec, dot
+from ..kernel.jit import by_type, index, inlined, outlined
+from ..kernel.vector import Vec, dot, highest, lowest, square
 from ..surfaces import contract
 from ..surfaces import fold as walls
+from ..surfaces.fields.grid import block_of, in_block, size_of
+from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried, at
 from ..surfaces.posed import rising, straight_hit
 from .hold import is_held_by
@@ -41,6 +43,40 @@ def meets(chain, ends, number, held, path, near):
 def _(chain, ends, number, held, path, near):
     here = _may_meet(chain.first, ends.first, path, near) & (not is_held_by(held, number))
     return here | meets(chain.rest, ends.rest, number + 1.0, held, path, near)
+
+
+@meets.register(walls.Field)
+def _(chain, ends, number, held, path, near):
+    here = _meets_one(chain.first, number, held, path, near)
+    return here | meets(chain.rest, ends.rest, number + walls.count(chain.first), held, path, near)
+
+
+@outlined
+def _meets_one(members, number, held, path, near):
+    """The same of the bodies of a field that has so many walls before it."""
+    grid = members.grid
+    # A step without a solution has no end.
+    if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
+        return True
+    block = _block_of(grid, path, near)
+    for k in range(size_of(block)):
+        cell = index(in_block(grid, block, k))
+        for entry in range(grid.first[cell], grid.first[cell + 1]):
+            m = grid.entries[entry]
+            body = member(members, index(m))
+            if (not is_held_by(held, number + m)) and _may_meet(body, body, path, near):
+                return True
+    return False
+
+
+@inlined
+def _block_of(grid, path, near):
+    """The cells that the control points of a step reach into."""
+    third = path.h / 3.0
+    a, b = path.r0 + third * path.v0, path.r1 - third * path.v1
+    low, high = lowest(lowest(path.r0, a), lowest(b, path.r1)), highest(highest(path.r0, a), highest(b, path.r1))
+    room = Vec(near, near, near)
+    return block_of(grid, low - room, high + room)
 
 
 meets.register(type(None), lambda chain, ends, number, held, path, near: False)
@@ -98,6 +134,28 @@ def _(chain, number, held, path, near, left):
     if time <= later.time:
         return Arrival(time, number)
     return later
+
+
+@arrival.register(walls.Field)
+def _(chain, number, held, path, near, left):
+    later = arrival(chain.rest, number + walls.count(chain.first), held, path, near, left)
+    return _first_of(chain.first, number, held, path, near, later)
+
+
+@outlined
+def _first_of(members, number, held, path, near, later):
+    """The first of that and of what a step meets of a field that has so many walls before it."""
+    grid, found = members.grid, later
+    block = _block_of(grid, path, near)
+    for k in range(size_of(block)):
+        cell = index(in_block(grid, block, k))
+        for entry in range(grid.first[cell], grid.first[cell + 1]):
+            m = grid.entries[entry]
+            if not is_held_by(held, number + m):
+                time = _deep_after(member(members, index(m)), path, near)
+                if time < found.time or (time == found.time and number + m < found.wall):
+                    found = Arrival(time, number + m)
+    return found
 
 
 arrival.register(type(None), lambda chain, number, held, path, near, left: Arrival(math.inf, -1.0))

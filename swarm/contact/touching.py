@@ -61,9 +61,10 @@ class Landing(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """The walls that a sliding particle touches, one entry each."""
+    """The walls near a sliding particle, one entry each."""
 
-    touched: Any  # whether
+    number: Any  # of the wall
+    touched: Any  # whether it is
     normal: Any  # (3, walls): unit normal of the step
     held: Any  # what the wall takes of the velocity
     depth: Any  # signed distance outside
@@ -83,13 +84,14 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
     for _blow in range(_BLOWS):
         bounce = reflection.exact(method.laws, chain, gravity, met, r, w, now)
         w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
-        given[int(met)] += bounce.impulse
+        given[walls.row(chain, met)] += bounce.impulse
         following = flights.first_hit(chain, gravity, r, w)
         if following.time >= method.shortest or following.wall < 0.0:
-            end = reflection.Stepped(r, w, 0.0, given[int(wall)])
+            row = walls.row(chain, wall)
+            end = reflection.Stepped(r, w, 0.0, given[row])
             if met == wall:
                 end = _stepped(method.contact_step, chain, gravity, wall, flight, now, end)
-                given[int(wall)] = end.impulse
+                given[row] = end.impulse
             for i in range(given.size):
                 impulse[i, lane] += given[i]
             return Landing(end.r, end.v, end.used, now.twice)
@@ -113,15 +115,16 @@ def _(contact_step, chain, gravity, wall, flight, energy, reflected):
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
-    laws, r, count, moving = method.laws, flight.r, walls.length(chain), wall_laws.moving(method.laws)
+    laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
     carried, chain = chain, at(chain, flight.left)
-    touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
-    _depths(chain, 0, r, depth)
+    count = walls.count_near(chain, r)
+    number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
+    walls.list_near(chain, 0, 0.0, r, number)
+    _depths(chain, number, r, depth)
     for i in range(count):
-        touched[i] = depth[i] >= -method.touch
-    touched[int(wall)] = True
+        touched[i] = depth[i] >= -method.touch or number[i] == wall
     normal, held, given = scratch((3, count), np.float64), scratch(count, np.float64), scratch(count, np.float64)
-    touch = Touch(touched, normal, held, depth, _frame_of(moving, chain, touched, r))
+    touch = Touch(number, touched, normal, held, depth, _frame_of(moving, chain, number, touched, r))
     v, twice_energy = _landed(laws, chain, touch, given, r, relative(touch.frame, flight.v), energy.twice)
     straight = not wall_laws.moves(laws) and _goes_straight(chain, gravity, touch, r, v)
     h = flight.left if straight else min(method.shortest, flight.left)
@@ -136,25 +139,25 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
-        impulse[i, lane] += given[i] + 2.0 * touch.held[i]
+        impulse[walls.row(chain, number[i]), lane] += given[i] + 2.0 * touch.held[i]
     return Landing(r, w, h, twice_energy)
 
 
 @by_type_outlined
-def _frame_of(moving, chain, touched, r):
+def _frame_of(moving, chain, number, touched, r):
     """A velocity with which all touched walls move along their normals, or None where no wall moves."""
     return
 
 
 @_frame_of.register(wall_laws.Moves)
-def _(moving, chain, touched, r):
+def _(moving, chain, number, touched, r):
     u = ZERO
     # One wall after the other, as in Kaczmarz' method
     for _sweep in range(_SWEEPS):
         for i in range(touched.size):
             if touched[i]:
-                n = walls.unit_normal(chain, float(i), r)
-                u = u + dot(walls.velocity(chain, float(i), r) - u, n) * n
+                n = walls.unit_normal(chain, number[i], r)
+                u = u + dot(walls.velocity(chain, number[i], r) - u, n) * n
     return u
 
 
@@ -178,10 +181,15 @@ def _unhindered(chain, gravity, touch, r, v, h, near):
     u = ZERO
     for cut in range(_CUTS):
         u = velocity_along(chain, touch, r, accelerated(gravity, v, 0.5 * h), h)
+        # Until then none but the near walls are met.
+        alone = walls.until_others(chain, r, from_relative(touch.frame, u))
+        if alone < h:
+            h = alone
+            continue
         following, other = h, -1
         for i in range(touch.touched.size):
             if not touch.touched[i]:
-                time, _found = flights.hit_of(chain, None, float(i), r, from_relative(touch.frame, u))
+                time, _found = flights.hit_of(chain, None, touch.number[i], r, from_relative(touch.frame, u))
                 if time < following:
                     following, other = time, i
         if other < 0:
@@ -201,35 +209,34 @@ def _settled(chain, wall, touch, r):
     Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
     where the particle is outside would lean inwards, and let it fall by the last place again and again.
     """
-    _depths(chain, 0, r, touch.depth)
+    _depths(chain, touch.number, r, touch.depth)
     for i in range(touch.touched.size):
-        holds = i == int(wall) and touch.held[i] > 0.0
+        holds = touch.number[i] == wall and touch.held[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
-            r = walls.settle(chain, float(i), r)
+            r = walls.settle(chain, touch.number[i], r)
     return r
 
 
 @outlined
-def inside(chain, r, outside):
-    """A point that is no more than round-off outside of the walls, moved until it is not; `outside` is written to."""
+def inside(chain, r):
+    """A point that is no more than round-off outside of the walls, moved until it is not."""
+    count = walls.count_near(chain, r)
+    number, outside = scratch(count, np.float64), scratch(count, np.float64)
+    walls.list_near(chain, 0, 0.0, r, number)
     for _sweep in range(_SWEEPS):
-        _depths(chain, 0, r, outside)
+        _depths(chain, number, r, outside)
         i = np.argmax(outside)
         if outside[i] <= _EPSILON * total(absolute(r)):
             break
-        r = walls.settle(chain, float(i), r)
+        r = walls.settle(chain, number[i], r)
     return r
 
 
-@by_type_outlined
-def _depths(chain, k, r, into):
-    """Signed distance outside of every wall into `into`."""
-
-
-@_depths.register(walls.Chain)
-def _(chain, k, r, into):
-    into[k] = contract.distance(chain.first, r)
-    _depths(chain.rest, k + 1, r, into)
+@outlined
+def _depths(chain, number, r, into):
+    """Signed distance outside of walls into `into`."""
+    for i in range(number.size):
+        into[i] = walls.distance(chain, number[i], r)
 
 
 @by_type_outlined
@@ -246,9 +253,9 @@ def _landed(laws, chain, touch, given, r, v, twice_energy):
 def _(laws, chain, touch, given, r, v, twice_energy):
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
-        lossy[i] = touch.touched[i] and reflection.bounciness(laws, float(i)) < 2.0
+        lossy[i] = touch.touched[i] and reflection.bounciness(laws, touch.number[i]) < 2.0
         if lossy[i]:
-            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
+            put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r))
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u
     return u, twice_energy - square(v - u)
@@ -261,7 +268,7 @@ def velocity_along(chain, touch, r, w, h):
     for _sweep in range(_SWEEPS):
         for i in range(touch.touched.size):
             if touch.touched[i]:
-                put(touch.normal, 0, i, _normal(chain, float(i), r, r1))
+                put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r1))
         u = project(touch.touched, touch.normal, touch.held, w)
         before, r1 = r1, r + h * u
         if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
@@ -289,7 +296,7 @@ def _goes_straight(chain, gravity, touch, r, v):
     g = accelerated(gravity, ZERO, 1.0)
     for i in range(touch.touched.size):
         if touch.touched[i]:
-            put(touch.normal, 0, i, _normal(chain, float(i), r, r))
+            put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r))
     falling = project(touch.touched, touch.normal, touch.held, g)
     if not moves(g) or largest(falling) > ALLOWED * largest(g):
         return False
@@ -297,7 +304,12 @@ def _goes_straight(chain, gravity, touch, r, v):
     for i in range(touch.touched.size):
         if touch.touched[i] and abs(along(touch.normal, i, v)) > ALLOWED * speed:
             return False
-    return speed == 0.0 or _flat(chain, touch.touched, 0)
+    if speed == 0.0:
+        return True
+    for i in range(touch.touched.size):
+        if touch.touched[i] and not walls.flat(chain, touch.number[i]):
+            return False
+    return True
 
 
 @outlined
@@ -306,32 +318,26 @@ def are_carried(chain, gravity, r, v, near, held):
 
     `held` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
     """
-    count = walls.length(chain)
-    touched, normal, depth = scratch(count, np.bool_), scratch((3, count), np.float64), scratch(count, np.float64)
-    _depths(chain, 0, r, depth)
+    count = walls.count_near(chain, r)
+    number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
+    normal, taken = scratch((3, count), np.float64), scratch(count, np.float64)
+    walls.list_near(chain, 0, 0.0, r, number)
+    _depths(chain, number, r, depth)
     several = 0
     for i in range(count):
         touched[i] = depth[i] >= -near
         several += touched[i]
         if touched[i]:
-            put(normal, 0, i, walls.unit_normal(chain, float(i), r))
+            put(normal, 0, i, walls.unit_normal(chain, number[i], r))
     g = accelerated(gravity, ZERO, 1.0)
     # v as a sum over the normals: what goes into the walls, then what goes away from them, and again.
     sign, rest = 1.0, v
     for _sweep in range(_SWEEPS):
-        rest = sign * project(touched, normal, held[0], sign * rest)
+        rest = sign * project(touched, normal, taken, sign * rest)
         for i in range(count):
-            held[1, i] += sign * held[0, i]
+            held[1, walls.row(chain, number[i])] += sign * taken[i]
         sign = -sign
-    return several > 1 and moves(g) and largest(project(touched, normal, held[0], g)) <= ALLOWED * largest(g)
-
-
-@by_type
-def _flat(chain, touched, k):
-    """Whether every touched wall is flat."""
-    return True
-
-
-@_flat.register(walls.Chain)
-def _(chain, touched, k):
-    return (contract.flat(chain.first) or not touched[k]) and _flat(chain.rest, touched, k + 1)
+    falling = project(touched, normal, taken, g)
+    for i in range(count):
+        held[0, walls.row(chain, number[i])] += taken[i]
+    return several > 1 and moves(g) and largest(falling) <= ALLOWED * largest(g)

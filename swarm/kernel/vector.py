@@ -145,6 +145,18 @@ def largest(a):
 
 
 @inlined
+def lowest(a, b):
+    """The smaller one of each two components."""
+    return Vec(min(a.x, b.x), min(a.y, b.y), min(a.z, b.z))
+
+
+@inlined
+def highest(a, b):
+    """The larger one of each two components."""
+    return Vec(max(a.x, b.x), max(a.y, b.y), max(a.z, b.z))
+
+
+@inlined
 def either(condition, a, b):
     """`select` of vectors."""
     return Vec(select(condition, a.x, b.x), select(condition, a.y, b.y), select(condition, a.z, b.z))

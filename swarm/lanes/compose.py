@@ -280,13 +280,13 @@ def _(friction, fine, v, scale2):
 
 
 @inlined
-def account(method, state, lanes, i):
+def account(method, chain, state, lanes, i):
     """What a step that is taken gives to the state."""
     rows, p = lanes.rows, lanes.particle[i]
     if not lanes.unsolved[i]:
         return
     state.contacts.sliding[p] += rows[H, i]
-    push(state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
+    push(chain, state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
     rows[TRIALS, i] = 0.0
     if wall_laws.is_given(methods.friction(method)):
         lose(state, lanes, i, rows[WORK, i])
@@ -294,12 +294,12 @@ def account(method, state, lanes, i):
 
 
 @inlined
-def push(state, lanes, i, first, second):
+def push(chain, state, lanes, i, first, second):
     """Impulses per mass to the walls that hold a lane."""
     rows, p = lanes.rows, lanes.particle[i]
-    state.impulse[int(rows[WALL, i]), p] += first * state.mass[p]
+    state.impulse[walls.row(chain, rows[WALL, i]), p] += first * state.mass[p]
     if rows[WALL + 1, i] >= 0.0:
-        state.impulse[int(rows[WALL + 1, i]), p] += second * state.mass[p]
+        state.impulse[walls.row(chain, rows[WALL + 1, i]), p] += second * state.mass[p]
 
 
 @by_type

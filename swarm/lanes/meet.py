@@ -63,7 +63,7 @@ def _decide(method, chain, gravity, share, i):
         found = events.meet(method, One(first), chain, gravity, wall, p)
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
-    state.impulse[int(wall), i] += found.impulse * state.mass[i]
+    state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
     if found.impulse > 0.0:
         state.impacts[i] += 1
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
@@ -103,12 +103,12 @@ def _(thermal, method, chain, gravity, share, i):
     if not left.happens:
         return False
     before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, int(wall), before, after - left.work)
+    book_heat(state, i, walls.row(chain, wall), before, after - left.work)
     _book_work(chain, state, i, wall, left.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
-    state.impulse[int(wall), i] += left.impulse * state.mass[i]
+    state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.phase[i] = FLYING
     share.pending[FLYING] += 1
@@ -126,8 +126,8 @@ def _spare(moving, chain, state, i, found, wall):
     else:
         edge = Two(found.wall, found.other)
         taken = split_at(edge, chain, drift(moving, edge, chain, r), r, turned)
-        state.impulse[int(found.other), i] += taken.c * state.mass[i]
-    state.impulse[int(found.wall), i] += taken.b * state.mass[i]
+        state.impulse[walls.row(chain, found.other), i] += taken.c * state.mass[i]
+    state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
 
 
 @inlined
@@ -190,7 +190,7 @@ def _rest(method, chain, gravity, share, i, p, held):
         state.impulse[s, i] += (held[0, s] * p.left + taken) * state.mass[i]
     if loses:
         # Round-off that its walls have gathered, which nothing takes back from now on
-        r = touching.inside(chain, p.r, held[0])
+        r = touching.inside(chain, p.r)
         put(state.position, 0, i, r)
         _lose(state, i, p.twice, 2.0 * potential(gravity, r))
         put(state.velocity, 0, i, ZERO)

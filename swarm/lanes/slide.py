@@ -88,7 +88,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         compose(kind, method, chain, gravity, lanes, live)
         end_steps(kind, method, chain, gravity, lanes, live)
         for i in range(live):
-            account(method, share.state, lanes, i)
+            account(method, chain, share.state, lanes, i)
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
@@ -178,10 +178,10 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
         contacts.sliding[p] += left
-        contacts.phase[p], contacts.load[int(rows[WALL, i]), p] = ARRIVED, force.n
+        contacts.phase[p], contacts.load[walls.row(chain, rows[WALL, i]), p] = ARRIVED, force.n
         if rows[WALL + 1, i] >= 0.0:
-            contacts.load[int(rows[WALL + 1, i]), p] = force.m
-        push(state, lanes, i, force.n * left, force.m * left)
+            contacts.load[walls.row(chain, rows[WALL + 1, i]), p] = force.m
+        push(chain, state, lanes, i, force.n * left, force.m * left)
         rows[LEFT, i] = 0.0
         return ARRIVED
     return phase_of(kind)
@@ -298,7 +298,7 @@ def _take(kind, method, chain, gravity, state, lanes, i):
     rows[LEFT, i], rows[CUT, i] = rows[LEFT, i] - rows[H, i], np.inf
     rows[TWICE, i] = twice_after(wall_laws.moving(methods.laws(method)), rows[TWICE, i] - rows[WORK, i], lanes.after[i])
     lanes.unsolved[i] = True
-    account(method, state, lanes, i)
+    account(method, chain, state, lanes, i)
     return _set_going(kind, method, chain, gravity, state, lanes, i)
 
 

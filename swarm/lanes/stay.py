@@ -100,7 +100,7 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     rows[TWICE, i], rows[LEFT, i], rows[KEEP, i] = twice, after, 0.0
     put(rows, R, i, r1)
     put(rows, V, i, v1)
-    push(state, lanes, i, pressed, pressed_second)
+    push(chain, state, lanes, i, pressed, pressed_second)
     work(moving, state, lanes, i, given, 0.0)
     state.contacts.sliding[lanes.particle[i]] += end
     if not after > 0.0:

@@ -7,7 +7,7 @@ from ..kernel.gravity import Gravity, Nothing, as_vector
 from ..kernel.jit import by_type, inlined, select
 from . import contract
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Chain, Field, count, outside
+from .fold import Chain, Field, count, member, outside
 
 
 class Hit(NamedTuple):
@@ -162,6 +162,14 @@ def _(chain, gravity, wall, r, v):
     time, found = hit(gravity, chain.first, r, v)
     other, found_other = hit_of(chain.rest, gravity, wall - 1.0, r, v)
     here = wall == 0.0
+    return select(here, time, other), (here & found) | ((not here) & found_other)
+
+
+@hit_of.register(Field)
+def _(chain, gravity, wall, r, v):
+    time, found = hit(gravity, member(chain.first, wall), r, v)
+    other, found_other = hit_of(chain.rest, gravity, wall - count(chain.first), r, v)
+    here = wall < count(chain.first)
     return select(here, time, other), (here & found) | ((not here) & found_other)
 
 

@@ -57,6 +57,43 @@ def cell_of(grid, r):
     return Cell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
 
 
+class Block(NamedTuple):
+    """Cells from one place on, so many along x, y, z."""
+
+    x: int
+    y: int
+    z: int
+    along_x: int
+    along_y: int
+    along_z: int
+
+
+@inlined
+def block_of(grid, low, high):
+    """The cells of the grid that a box with these corners reaches into."""
+    first, last = cell_of(grid, low).place, cell_of(grid, high).place
+    x, y, z = int(max(first.x, 0.0)), int(max(first.y, 0.0)), int(max(first.z, 0.0))
+    return Block(
+        x, y, z,
+        int(min(last.x, grid.shape.x - 1.0)) - x + 1,
+        int(min(last.y, grid.shape.y - 1.0)) - y + 1,
+        int(min(last.z, grid.shape.z - 1.0)) - z + 1,
+    )  # fmt: skip
+
+
+@inlined
+def size_of(block):
+    """How many cells a block has."""
+    return max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)
+
+
+@inlined
+def in_block(grid, block, k):
+    """The number of cell k of a block."""
+    x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
+    return int(((block.x + x) * grid.shape.y + block.y + y) * grid.shape.z + block.z + z)
+
+
 @inlined
 def until_next(gravity, grid, cell, r, v):
     """When a flight is beyond the wall of its cell; from outside, a time before which it does not come into the grid."""
@@ -159,9 +196,7 @@ def _cells(
     return np.where(endless, -0.5 * _ENDLESS, first - room), shape, width
 
 
-def _pairs(
-    begins: NDArray[np.int64], ends: NDArray[np.int64]
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+def _pairs(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Bodies and the places (3, pairs) of the cells from the first to the last of each, in batches."""
     counts = ends - begins + 1
     number = counts.prod(axis=0)

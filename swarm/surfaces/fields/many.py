@@ -37,7 +37,10 @@ class Many(Surface):
     def __repr__(self) -> str:
         """Their kind and number, and the laws of their wall."""
         laws = [f for f in fields(self) if f.kw_only and getattr(self, f.name) != f.default]
-        return ", ".join([f"{type(self).__name__}(<{len(self)}>", *(f"{f.name}={getattr(self, f.name)!r}" for f in laws)]) + ")"
+        return (
+            ", ".join([f"{type(self).__name__}(<{len(self)}>", *(f"{f.name}={getattr(self, f.name)!r}" for f in laws)])
+            + ")"
+        )
 
     # --- For kernels -------------------------------------------------------------------------------------
 

@@ -103,6 +103,26 @@ def _is_in_any(members, wall, r):
     return False
 
 
+@fold.count_in_cell.register(Members)
+def _(members, r):
+    cell = index(cell_of(members.grid, r).number)
+    return int(members.grid.first[cell + 1] - members.grid.first[cell])
+
+
+@fold.list_in_cell.register(Members)
+def _(members, k, before, r, into):
+    cell = index(cell_of(members.grid, r).number)
+    first, stop = members.grid.first[cell], members.grid.first[cell + 1]
+    for i in range(first, stop):
+        into[k + i - first] = before + members.grid.entries[i]
+    return int(stop - first)
+
+
+@fold.until_next_cell.register(Members)
+def _(members, r, v):
+    return until_next(None, members.grid, cell_of(members.grid, r), r, v)
+
+
 @outlined
 def deepest(members, r):
     """The largest distance outside of the admissible side of any body."""
@@ -162,11 +182,6 @@ def _within(place, count):
     return min(max(place, 0.0), count - 1.0)
 
 
-@inlined
-def _around(place, shell, count):
-    return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
-
-
 @outlined
 def _least_in_shell(members, r, center, shell):
     """The least phi in the cells that are `shell` cells away from one, and whose it is."""
@@ -176,13 +191,18 @@ def _least_in_shell(members, r, center, shell):
             for z in _around(center.z, shell, grid.shape.z):
                 if max(abs(x - center.x), max(abs(y - center.y), abs(z - center.z))) < shell:
                     continue
-                number = index((x * grid.shape.y + y) * grid.shape.z + z)
+                number = index(int((x * grid.shape.y + y) * grid.shape.z + z))
                 for k in range(grid.first[number], grid.first[number + 1]):
                     m = grid.entries[k]
                     phi = contract.phi(member(members, index(m)), r)
                     if phi < best:
                         best, which = phi, m
     return best, which
+
+
+@inlined
+def _around(place, shell, count):
+    return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
 
 
 # --- What bodies are made of -----------------------------------------------------------------------------
