@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from .errors import SceneError
 from .kernel.gravity import Gravity
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.fields.many import Many
+from .surfaces.fields.grouped import Order, chain_in, members_of, order_of
+from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.moving import Carried, carried
 from .surfaces.surface import SIDES, Box, HalfSpace, Surface
@@ -76,7 +78,7 @@ class Scene:
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         object.__setattr__(self, "surfaces", surfaces)
-        walls = len(self.owners())
+        walls = self.order.compiled(surfaces)
         if walls > MOST_WALLS:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all, got {walls} of {len(surfaces)} surfaces: each "
@@ -111,7 +113,9 @@ class Scene:
 
     def chain(self, moment: float = 0.0) -> Chain | Field | Carried | None:
         """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
-        return carried(self.surfaces, moment)
+        if self.moves():
+            return carried(self.surfaces, moment)
+        return chain_in(self.order, self.surfaces, self._groups)
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""
@@ -132,17 +136,23 @@ class Scene:
         if all(value == neutral for value in values):
             return None
         chain: Chain | Span | None = None
-        for i in reversed(self.owners()):
-            surface = self.surfaces[i]
-            chain = (
-                Span(values[i], float(len(surface)), chain) if isinstance(surface, Many) else Chain(values[i], chain)
-            )
+        for i, walls in reversed(self.order.spans(self.surfaces)):
+            chain = Chain(values[i], chain) if walls == 1 else Span(values[i], float(walls), chain)
         return chain
 
     def owners(self) -> list[int]:
-        """The surface that each wall of the chain belongs to, a field for one wall."""
-        owners = [i for i, surface in enumerate(self.surfaces) for _wall in surface.walls()]
-        return sorted(owners, key=lambda i: not isinstance(self.surfaces[i], Many))
+        """The surface that each row of the chain belongs to, one for a field."""
+        return self.order.owners(self.surfaces)
+
+    @cached_property
+    def order(self) -> Order:
+        """The surfaces in the order of the chain."""
+        return order_of(self.surfaces)
+
+    @cached_property
+    def _groups(self) -> list[Members]:
+        """The surfaces that kernels take as fields."""
+        return [members_of([self.surfaces[i] for i in group]) for group in self.order.groups]
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""

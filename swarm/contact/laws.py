@@ -19,7 +19,7 @@ class Span(NamedTuple):
     """In a chain of numbers, one that holds for so many walls."""
 
     first: Any
-    count: float
+    walls: float
     rest: Any
 
 
@@ -53,7 +53,7 @@ def _(chain, wall):
 
 @number_of.register(Span)
 def _(chain, wall):
-    return select(wall < chain.count, chain.first, number_of(chain.rest, wall - chain.count))
+    return select(wall < chain.walls, chain.first, number_of(chain.rest, wall - chain.walls))
 
 
 @by_type
@@ -78,7 +78,7 @@ def _(chain, wall):
 
 @thermal_of.register(Span)
 def _(chain, wall):
-    return _either(wall < chain.count, chain.first, thermal_of(chain.rest, wall - chain.count))
+    return _either(wall < chain.walls, chain.first, thermal_of(chain.rest, wall - chain.walls))
 
 
 @inlined

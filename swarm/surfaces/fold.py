@@ -1,7 +1,7 @@
 """All walls of a scene at once: the functions of one surface, folded over the chain of its walls.
 
-A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes. Fields come before
-all other walls: whether a scene has one is the type of its chain.
+A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes. Fields come
+before all other walls: whether a scene has one is the type of its chain.
 """
 
 import inspect
@@ -30,36 +30,36 @@ class Field(NamedTuple):
     rest: Any
 
 
-def chain_of(surfaces: Sequence[Surface]) -> Chain | Field | None:
-    """The walls of `surfaces` as a chain, in their order, fields first."""
-    return chained([wall for surface in surfaces for wall in surface.walls()])
+class Listed(Field):
+    """A field of walls that are surfaces of their own: each has a row of what it gives."""
 
 
-def chained(walls: Sequence[Any]) -> Chain | Field | None:
-    """These walls as a chain, in their order, fields first."""
-    fields = [wall for wall in walls if is_field(wall)]
-    chain: Chain | Field | None = None
-    for wall in reversed([wall for wall in walls if not is_field(wall)]):
+def chain_of(surfaces: Sequence[Surface]) -> Chain | None:
+    """The walls of `surfaces` as a chain, in their order."""
+    chain = None
+    for wall in reversed([wall for surface in surfaces for wall in surface.walls()]):
         chain = Chain(wall, chain)
-    for wall in reversed(fields):
-        chain = Field(wall, chain)
     return chain
 
 
 @by_type
-def is_field(wall):
-    """Whether these are the numbers of many walls."""
+def is_end(chain):
+    """Whether there are no walls: a constant for the compiler."""
     return False
+
+
+is_end.register(Nothing, lambda chain: True)
 
 
 @by_type
 def length(chain):
-    """How many walls there are, a field for one of them: a constant for the compiler."""
+    """How many rows there are of what walls give, one for a field: a constant for the compiler, unless one is `Listed`."""
     raise NotImplementedError
 
 
 length.register(Chain, lambda chain: 1 + length(chain.rest))
 length.register(Field, lambda chain: 1 + length(chain.rest))
+length.register(Listed, lambda chain: int(count(chain.first)) + length(chain.rest))
 length.register(Nothing, lambda chain: 0)
 
 
@@ -92,6 +92,9 @@ def _(chain, wall):
     return select(wall < count(chain.first), 0, 1 + row(chain.rest, wall - count(chain.first)))
 
 
+row.register(Listed, lambda chain, wall: int(wall))
+
+
 # --- A function of one wall ------------------------------------------------------------------------------
 
 
@@ -118,7 +121,7 @@ def _of_wall_0(function: Any, neutral: Any) -> Any:
 
     @fold.register(Field)
     def _(chain, wall):
-        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        here = (wall < count(chain.first)) | (is_end(chain.rest))
         other = fold(chain.rest, wall - count(chain.first))
         return select(here, function(member(chain.first, wall)), other)
 
@@ -139,7 +142,7 @@ def _of_wall_1(function: Any, neutral: Any) -> Any:
 
     @fold.register(Field)
     def _(chain, wall, a):
-        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        here = (wall < count(chain.first)) | (is_end(chain.rest))
         other = fold(chain.rest, wall - count(chain.first), a)
         return select(here, function(member(chain.first, wall), a), other)
 
@@ -160,7 +163,7 @@ def _of_wall_2(function: Any, neutral: Any) -> Any:
 
     @fold.register(Field)
     def _(chain, wall, a, b):
-        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        here = (wall < count(chain.first)) | (is_end(chain.rest))
         other = fold(chain.rest, wall - count(chain.first), a, b)
         return select(here, function(member(chain.first, wall), a, b), other)
 
@@ -181,7 +184,7 @@ def _of_wall_3(function: Any, neutral: Any) -> Any:
 
     @fold.register(Field)
     def _(chain, wall, a, b, c):
-        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        here = (wall < count(chain.first)) | (is_end(chain.rest))
         other = fold(chain.rest, wall - count(chain.first), a, b, c)
         return select(here, function(member(chain.first, wall), a, b, c), other)
 
@@ -202,7 +205,7 @@ def _of_wall_4(function: Any, neutral: Any) -> Any:
 
     @fold.register(Field)
     def _(chain, wall, a, b, c, d):
-        here = (wall < count(chain.first)) | (length(chain.rest) == 0)
+        here = (wall < count(chain.first)) | (is_end(chain.rest))
         other = fold(chain.rest, wall - count(chain.first), a, b, c, d)
         return select(here, function(member(chain.first, wall), a, b, c, d), other)
 

@@ -4,12 +4,13 @@
 without motion has none of this around its walls and pays nothing.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..kernel.jit import by_type
 from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of, pose
-from .fold import Chain, chained, length
+from .fold import Chain, length
 from .posed import Drifting, Posed
 from .surface import Surface
 
@@ -50,10 +51,12 @@ length.register(Carried, lambda chain: length(chain.walls))
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def carried(surfaces: tuple[Surface, ...], moment: float) -> Chain | Carried | None:
+def carried(surfaces: Sequence[Surface], moment: float) -> Chain | Carried | None:
     """The walls of a scene in the frame that ends at a moment [s]."""
     of_surfaces = [_walls_of(surface, moment) for surface in surfaces]
-    chain = chained([wall for walls in of_surfaces for wall in walls])
+    chain = None
+    for wall in reversed([wall for walls in of_surfaces for wall in walls]):
+        chain = Chain(wall, chain)
     if chain is None or all(surface.motion is None for surface in surfaces):
         return chain
     marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]

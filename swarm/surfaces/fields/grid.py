@@ -154,7 +154,8 @@ def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reache
     """The grid of bodies with these bounds (3, n).
 
     Args:
-        low, high: corners of the bounds of each body, infinite where it has no end [m].
+        low: lowest corner of the bounds of each body, infinite where it has no end [m].
+        high: highest corner.
         reaches: which of so many bodies may have a point in common with the boxes that have these corners (3, pairs).
     """
     corner, shape, width = _cells(low, high)
@@ -175,9 +176,10 @@ def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reache
     order = np.argsort(of_cell, kind="stable")
     first = np.zeros(int(shape.prod()) + 2, np.int32)
     np.cumsum(np.bincount(of_cell, minlength=first.size - 1), out=first[1:])
-    rows = (vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape))
-    # A kernel that looks for nothing looks at the first entry.
-    return Grid(*rows, first, of_body[order] if of_body.size else np.zeros(1, np.int32))
+    low_corner, wide, inverse, room, cells_along = (
+        vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape)
+    )
+    return Grid(low_corner, wide, inverse, room, cells_along, first, of_body[order])
 
 
 def _cells(

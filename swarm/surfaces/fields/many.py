@@ -1,6 +1,5 @@
 """Many bodies of one kind as one surface: what their descriptions have in common."""
 
-import math
 from dataclasses import fields
 from functools import cached_property
 from typing import Any
@@ -76,7 +75,7 @@ class Many(Surface):
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """phi of the nearest body at points (3, N): below 0 in it, above 0 outside of all; shape (N,)."""
-        return self._of_nearest(points)[3]
+        return np.asarray(self._of_nearest(points)[3])
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of that phi at points (3, N); shape (3, N)."""

@@ -21,6 +21,8 @@ from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereNumbers
 from .grid import Grid, cell_of, until_next
 
+# The rows of a rotation that turns nothing.
+_AXES = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # Bytes of a line of the cache.
 _LINE = 64
 
@@ -56,6 +58,53 @@ def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
     return aligned(np.array([_written(body) for body in bodies]))
 
 
+def can_be_member(wall: Any) -> bool:
+    """Whether a field may be of bodies with such numbers."""
+    if isinstance(wall, (float, type(None))):
+        return True
+    if isinstance(wall, (SphereNumbers, Vec)):
+        return True
+    known = gathered.dispatch(type(wall)) is not gathered.dispatch(object)
+    return known and all(map(can_be_member, wall))
+
+
+def kind_of(wall: Any) -> Any:
+    """What numbers have in common that a field may hold: their types, whatever their axes are."""
+    wall = wall.body if isinstance(wall, Rotated) else wall
+    if isinstance(wall, (AlongX, AlongY, AlongZ)):
+        return Vec
+    return (type(wall), *map(kind_of, wall)) if isinstance(wall, tuple) else type(wall)
+
+
+def alike(walls: Sequence[Any]) -> list[Any]:
+    """The numbers of bodies of one kind, of one type also where some of them are turned and others are not."""
+    if len({_type_of(wall) for wall in walls}) == 1:
+        return list(walls)
+    turned = any(isinstance(wall, Rotated) for wall in walls)
+    return [_in_general(wall, turned) for wall in walls]
+
+
+def _type_of(wall: Any) -> Any:
+    return (type(wall), *map(_type_of, wall)) if isinstance(wall, tuple) else type(wall)
+
+
+def _in_general(wall: Any, turned: bool) -> Any:
+    """The same numbers, of the type that a body turned in any way has."""
+    if isinstance(wall, AlongX | AlongY | AlongZ):
+        return Vec(*(float(isinstance(wall, axis)) for axis in (AlongX, AlongY, AlongZ)))
+    if isinstance(wall, Rotated):
+        return wall._replace(body=_in_general(wall.body, False))
+    if isinstance(wall, SlabNumbers | Chain | SolidNumbers):
+        parts = [_in_general(part, isinstance(wall, Chain) and _is_round(part)) for part in wall]
+        return type(wall)(*parts)
+    return Rotated(wall, *_AXES) if turned else wall
+
+
+def _is_round(part: Any) -> bool:
+    """Whether a part of a solid may be turned."""
+    return isinstance(part, QuadricNumbers)
+
+
 def _written(like: Any) -> list[float]:
     """The columns of one body."""
     if like is None:
@@ -76,7 +125,6 @@ def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 # --- As walls of a chain ---------------------------------------------------------------------------------
 
-fold.is_field.register(Members, lambda wall: True)
 fold.count.register(Members, lambda members: float(members.table.shape[0]))
 
 

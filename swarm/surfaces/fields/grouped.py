@@ -1,0 +1,85 @@
+"""Which surfaces of a scene kernels take together: those of one kind, where there are more than a few, are one field."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fold import Chain, Field, Listed
+from ..surface import Surface
+from .grid import grid_of
+from .many import Many
+from .members import Members, alike, can_be_member, kind_of, table_of
+
+# So many surfaces of one kind stay walls of their own, which is faster: their numbers are not looked up.
+_FEW = 4
+
+
+class Order(NamedTuple):
+    """The surfaces of a scene, by their numbers, in the order of its chain."""
+
+    fields: tuple[int, ...]  # each many bodies
+    groups: tuple[tuple[int, ...], ...]  # each taken as one field
+    others: tuple[int, ...]
+
+    def owners(self, surfaces: Sequence[Surface]) -> list[int]:
+        """The surface that each row of the chain belongs to: one for a field, else one for each wall."""
+        walls = [i for i in self.others for _wall in surfaces[i].walls()]
+        return [*self.fields, *(i for group in self.groups for i in group), *walls]
+
+    def spans(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
+        """The same as (surface, how many walls in a row have its laws), several where one takes the place of many."""
+        walls = [(i, 1) for i in self.others for _wall in surfaces[i].walls()]
+        many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], Many)]
+        return [*many, *((group[0], len(group)) for group in self.groups), *walls]
+
+    def compiled(self, surfaces: Sequence[Surface]) -> int:
+        """How many walls kernels are compiled for."""
+        return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.others)
+
+
+def order_of(surfaces: Sequence[Surface]) -> Order:
+    """The order of the chain of a scene; where a surface moves all are walls of their own."""
+    fields = tuple(i for i, surface in enumerate(surfaces) if isinstance(surface, Many))
+    rest = [i for i in range(len(surfaces)) if i not in fields]
+    of_kind: dict[Any, list[int]] = defaultdict(list)
+    still = all(surface.motion is None and not surface.reacts() for surface in surfaces)
+    for i in rest if still and len(rest) > _FEW else ():
+        if surfaces[i].is_solid() and len(surfaces[i].walls()) == 1 and can_be_member(surfaces[i].walls()[0]):
+            of_kind[kind_of(surfaces[i].walls()[0]), _laws(surfaces[i])].append(i)
+    groups = tuple(tuple(group) for group in of_kind.values() if len(group) > _FEW)
+    grouped = {i for group in groups for i in group}
+    return Order(fields, groups, tuple(i for i in rest if i not in grouped))
+
+
+def chain_in(order: Order, surfaces: Sequence[Surface], groups: Sequence[Members]) -> Chain | Field | None:
+    """The chain of a scene in which nothing moves; `groups` are the fields of the order's groups."""
+    chain: Chain | Field | None = None
+    for wall in reversed([wall for i in order.others for wall in surfaces[i].walls()]):
+        chain = Chain(wall, chain)
+    for members in reversed(groups):
+        chain = Listed(members, chain)
+    for i in reversed(order.fields):
+        chain = Field(surfaces[i].walls()[0], chain)
+    return chain
+
+
+def members_of(surfaces: Sequence[Surface]) -> Members:
+    """Solid surfaces of one kind as one field."""
+    bodies = alike([surface.walls()[0] for surface in surfaces])
+    # The bounds of a body are those of its cavity.
+    boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
+    low, high = np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
+    return Members(bodies[0], table_of(bodies), grid_of(low, high, _may_reach))
+
+
+def _may_reach(bodies: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """A body may be in every cell that its bounds are in."""
+    return np.ones(len(bodies), np.bool_)
+
+
+def _laws(surface: Surface) -> tuple[Any, ...]:
+    return surface.restitution, surface.friction, surface.temperature, surface.accommodation
