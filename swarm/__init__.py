@@ -27,10 +27,14 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .surfaces import (
         Box,
+        Boxes,
         Capsule,
+        Capsules,
         Cone,
         Cylinder,
+        Cylinders,
         Ellipsoid,
+        Ellipsoids,
         Formula,
         OwnSurface,
         Paraboloid,
@@ -63,19 +67,19 @@ _HOMES = {
     "scene": ("Scene",),
     "run.simulation": ("Result", "simulate"),
     "surfaces": (
-        "Box", "Capsule", "Cone", "Cylinder", "Ellipsoid", "Formula", "OwnSurface", "Paraboloid", "Plane", "Quadric",
-        "Slab", "Sphere", "Spheres", "Torus",
+        "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
+        "OwnSurface", "Paraboloid", "Plane", "Quadric", "Slab", "Sphere", "Spheres", "Torus",
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "AugmentedLagrangian", "Bodies", "Body", "Box", "Capsule", "CompleteError", "Cone", "ContactHistory",
-    "Cylinder", "Ellipsoid", "FileError", "Formula", "Frame", "Guide", "Impact", "Midpoint", "Oscillation",
-    "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation",
-    "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError", "Torus", "Trajectory",
-    "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell",
-    "elastic", "fill", "load", "place", "rigid", "simulate", "tetrahedron",
+    "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
+    "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
+    "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Quadric",
+    "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError",
+    "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__", "chain",
+    "contact_history", "dumbbell", "elastic", "fill", "load", "place", "rigid", "simulate", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -17,7 +17,8 @@ from .errors import SceneError
 from .kernel.gravity import Gravity
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.fields.grouped import Order, chain_in, members_of, order_of
+from .surfaces.fields.grouped import Order, chain_in, order_of
+from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.moving import Carried, carried

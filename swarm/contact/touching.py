@@ -304,12 +304,10 @@ def _goes_straight(chain, gravity, touch, r, v):
     for i in range(touch.touched.size):
         if touch.touched[i] and abs(along(touch.normal, i, v)) > ALLOWED * speed:
             return False
-    if speed == 0.0:
-        return True
+    bent = 0
     for i in range(touch.touched.size):
-        if touch.touched[i] and not walls.flat(chain, touch.number[i]):
-            return False
-    return True
+        bent += touch.touched[i] and not walls.flat(chain, touch.number[i])
+    return speed == 0.0 or bent == 0
 
 
 @outlined

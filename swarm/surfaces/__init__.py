@@ -11,6 +11,10 @@ run.
 # First, so that what follows from `bend` and from `hessian` is registered with them.
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
+from .fields.boxes import Boxes
+from .fields.capsules import Capsules
+from .fields.cylinders import Cylinders
+from .fields.ellipsoids import Ellipsoids
 from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
@@ -31,10 +35,14 @@ from .surface import Surface
 __all__ = [
     "ALL_SURFACES",
     "Box",
+    "Boxes",
     "Capsule",
+    "Capsules",
     "Cone",
     "Cylinder",
+    "Cylinders",
     "Ellipsoid",
+    "Ellipsoids",
     "Formula",
     "OwnSurface",
     "Paraboloid",
@@ -61,4 +69,8 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "slab": Slab,
     "formula": Formula,
     "spheres": Spheres,
+    "ellipsoids": Ellipsoids,
+    "cylinders": Cylinders,
+    "capsules": Capsules,
+    "boxes": Boxes,
 }

@@ -53,7 +53,7 @@ is_end.register(Nothing, lambda chain: True)
 
 @by_type
 def length(chain):
-    """How many rows there are of what walls give, one for a field: a constant for the compiler, unless one is `Listed`."""
+    """How many rows there are of what walls give, one for a field: a constant for the compiler if none is `Listed`."""
     raise NotImplementedError
 
 

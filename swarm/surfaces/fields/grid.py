@@ -96,7 +96,7 @@ def in_block(grid, block, k):
 
 @inlined
 def until_next(gravity, grid, cell, r, v):
-    """When a flight is beyond the wall of its cell; from outside, a time before which it does not come into the grid."""
+    """When a flight is beyond the wall of its cell; from outside, until when it surely does not come into the grid."""
     p, n = cell.place, grid.shape
     x = _along(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
     y = _along(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)

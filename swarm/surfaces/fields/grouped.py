@@ -1,18 +1,13 @@
-"""Which surfaces of a scene kernels take together: those of one kind, where there are more than a few, are one field."""
+"""Which surfaces of a scene kernels take together: more than a few of one kind are one field."""
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..fold import Chain, Field, Listed
 from ..surface import Surface
-from .grid import grid_of
 from .many import Many
-from .members import Members, alike, can_be_member, kind_of, table_of
+from .members import Members, can_be_member, kind_of
 
 # So many surfaces of one kind stay walls of their own, which is faster: their numbers are not looked up.
 _FEW = 4
@@ -65,20 +60,6 @@ def chain_in(order: Order, surfaces: Sequence[Surface], groups: Sequence[Members
     for i in reversed(order.fields):
         chain = Field(surfaces[i].walls()[0], chain)
     return chain
-
-
-def members_of(surfaces: Sequence[Surface]) -> Members:
-    """Solid surfaces of one kind as one field."""
-    bodies = alike([surface.walls()[0] for surface in surfaces])
-    # The bounds of a body are those of its cavity.
-    boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
-    low, high = np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
-    return Members(bodies[0], table_of(bodies), grid_of(low, high, _may_reach))
-
-
-def _may_reach(bodies: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """A body may be in every cell that its bounds are in."""
-    return np.ones(len(bodies), np.bool_)
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

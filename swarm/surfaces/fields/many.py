@@ -1,8 +1,8 @@
 """Many bodies of one kind as one surface: what their descriptions have in common."""
 
-from dataclasses import fields
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from ...checks import LARGEST, SMALLEST, array, in_bytes, memory
 from ...errors import SceneError
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import grid_of
-from .members import Members, nearest
+from .members import Members, alike, nearest, table_of
 
 Floats = NDArray[np.float64]
 # What a body takes in its table and in the grid of cells [bytes], and a number of them that fits on every machine.
@@ -43,23 +43,14 @@ class Many(Surface):
 
     # --- For kernels -------------------------------------------------------------------------------------
 
-    def corners(self) -> tuple[Floats, Floats]:
-        """The bounds of every body, its low and high corners (3, n), infinite where it has no end."""
-        raise NotImplementedError
-
-    def reaches(self, bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
-        """Which of these bodies may have a point in common with the boxes that have these corners (3, pairs)."""
-        return np.ones(len(bodies), np.bool_)
-
-    def table(self) -> tuple[Any, Floats]:
-        """The numbers of one body, and the table of all."""
+    def solids(self) -> list[Surface]:
+        """Every body as a surface of its own."""
         raise NotImplementedError
 
     @cached_property
     def members(self) -> Members:
         """What kernels take."""
-        like, table = self.table()
-        return Members(like, table, grid_of(*self.corners(), self.reaches))
+        return members_of(self.solids())
 
     def walls(self) -> tuple[Members]:
         return (self.members,)
@@ -69,9 +60,11 @@ class Many(Surface):
     def bounds(self) -> Box:
         return UNBOUNDED
 
+    def size(self) -> float:
+        return min(solid.size() for solid in self.solids())
+
     def extent(self) -> float:
-        low, high = self.corners()
-        return float(np.abs(np.where(np.isfinite([low, high]), [low, high], 0.0)).max())
+        return max(solid.extent() for solid in self.solids())
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """phi of the nearest body at points (3, N): below 0 in it, above 0 outside of all; shape (N,)."""
@@ -88,6 +81,20 @@ class Many(Surface):
         with np.errstate(all="ignore"):
             nearest(self.members, flat, found)
         return found.reshape(4, *np.shape(rows.x))
+
+
+def members_of(surfaces: Sequence[Surface]) -> Members:
+    """Solid surfaces of one kind as one field."""
+    bodies = alike([surface.walls()[0] for surface in surfaces])
+    # The bounds of a body are those of its cavity.
+    boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
+    low, high = np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
+    return Members(bodies[0], table_of(bodies), grid_of(low, high, _may_reach))
+
+
+def _may_reach(bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """A body may be in every cell that its bounds are in."""
+    return np.ones(len(bodies), np.bool_)
 
 
 def bodies(name: str, value: ArrayLike) -> Floats:
@@ -118,6 +125,42 @@ def lengths(name: str, value: ArrayLike, count: int) -> Floats:
         where = f"{name}[{bad[0]}]" if given.ndim else name
         raise SceneError(f"{where} must be a length above 0 m, got {np.atleast_1d(given)[bad[0]]:g}")
     return _kept(np.broadcast_to(given, (count,)))
+
+
+def widths(name: str, value: ArrayLike, count: int) -> Floats:
+    """`value` as three lengths above 0 for each body (n, 3), or for all."""
+    return _rows(name, value, count, 3, lambda rows: (rows >= SMALLEST) & (rows <= LARGEST), "three lengths above 0 m")
+
+
+def directions(name: str, value: ArrayLike, count: int) -> Floats:
+    """`value` as a vector for each body (n, 3), or for all, not all 0."""
+    return _rows(name, value, count, 3, _is_some, "three finite numbers, not all 0")
+
+
+def quaternions(name: str, value: ArrayLike, count: int) -> Floats:
+    """`value` as a quaternion for each body (n, 4), or for all, not all 0."""
+    return _rows(name, value, count, 4, _is_some, "four finite numbers (w, x, y, z), not all 0")
+
+
+def _is_some(rows: Floats) -> NDArray[np.bool_]:
+    """Which rows have a length."""
+    return np.asarray((np.abs(rows) <= LARGEST) & (rows != 0.0).any(axis=1)[:, None])
+
+
+def _rows(
+    name: str, value: ArrayLike, count: int, columns: int, good: Callable[[Floats], NDArray[np.bool_]], expected: str
+) -> Floats:
+    given = array(name, value)
+    if given.shape not in ((columns,), (count, columns)):
+        raise SceneError(
+            f"{name} must have {columns} numbers, or {count} rows of them, one for each of the centers, got shape "
+            f"{given.shape}"
+        )
+    bad = np.flatnonzero(~good(np.atleast_2d(given)).all(axis=1))
+    if bad.size:
+        where, row = (f"{name}[{bad[0]}]" if given.ndim == 2 else name), np.atleast_2d(given)[bad[0]]
+        raise SceneError(f"{where} must be {expected}, got {tuple(row.tolist())}")
+    return _kept(np.broadcast_to(given, (count, columns)))
 
 
 def _kept(values: Floats) -> Floats:

@@ -71,7 +71,7 @@ def can_be_member(wall: Any) -> bool:
 def kind_of(wall: Any) -> Any:
     """What numbers have in common that a field may hold: their types, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
-    if isinstance(wall, (AlongX, AlongY, AlongZ)):
+    if isinstance(wall, Vec | AlongX | AlongY | AlongZ):
         return Vec
     return (type(wall), *map(kind_of, wall)) if isinstance(wall, tuple) else type(wall)
 

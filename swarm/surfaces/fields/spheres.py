@@ -1,14 +1,16 @@
 """Spheres: many balls, each at its place and with its radius."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..shapes.sphere import SphereNumbers
+from .grid import grid_of
 from .many import Floats, Many, bodies, lengths
-from .members import aligned, gathered
+from .members import Members, aligned, gathered
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -41,17 +43,21 @@ class Spheres(Many):
     def size(self) -> float:
         return float(self.radii.min())
 
-    def corners(self) -> tuple[Floats, Floats]:
-        return self.centers.T - self.radii, self.centers.T + self.radii
+    def extent(self) -> float:
+        return float((np.abs(self.centers).max(axis=1) + self.radii).max())
 
-    def reaches(self, bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
+    @cached_property
+    def members(self) -> Members:
+        """What kernels take."""
+        table, center = aligned(np.column_stack([self.centers, self.radii])), self.centers.T
+        grid = grid_of(center - self.radii, center + self.radii, self._reach)
+        return Members(gathered(_LIKE, table, 0, 0), table, grid)
+
+    def _reach(self, bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
+        """Which of these balls have a point in common with the boxes that have these corners (3, pairs)."""
         center = self.centers.T[:, bodies]
         off = np.maximum(np.maximum(low - center, center - high), 0.0)
         return np.asarray((off**2).sum(axis=0) <= self.radii[bodies] ** 2)
-
-    def table(self) -> tuple[Any, Floats]:
-        columns = aligned(np.column_stack([self.centers, self.radii]))
-        return gathered(_LIKE, columns, 0, 0), columns
 
 
 _LIKE = SphereNumbers(*[0.0] * 5)  # type: ignore[arg-type]

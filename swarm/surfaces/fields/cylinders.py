@@ -1,0 +1,48 @@
+"""Cylinders: many posts or rods, each at its place, with its radius and axis."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..shapes.cylinder import Cylinder
+from ..surface import Surface
+from .many import Many, bodies, directions, lengths
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Cylinders(Many):
+    """Many solid cylinders, endless or capped, one surface; the space outside of all of them. They may overlap.
+
+    Args:
+        centers: (n, 3) [m], one row a cylinder.
+        radii: (n,) or one number for all, above 0 [m].
+        axes: (n, 3) or three numbers for all, not all 0.
+        lengths: None (endless), or (n,) or one number for all, the distances above 0 [m] between the caps.
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next one. One that is endless along no axis of the scene is in all cells.
+
+    >>> Cylinders([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25).phi([[0.25], [0.0], [7.0]])
+    array([0.])
+    """
+
+    centers: Any
+    radii: Any
+    axes: Any = (0.0, 0.0, 1.0)
+    lengths: Any = None
+    side: str = "outside"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "centers", bodies("centers", self.centers))
+        object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
+        object.__setattr__(self, "axes", directions("axes", self.axes, len(self)))
+        if self.lengths is not None:
+            object.__setattr__(self, "lengths", lengths("lengths", self.lengths, len(self)))
+
+    def solids(self) -> list[Surface]:
+        long = [None] * len(self) if self.lengths is None else self.lengths.tolist()
+        each = zip(self.radii.tolist(), self.axes.tolist(), long, self.centers.tolist(), strict=True)
+        return [Cylinder(radius, axis, length, center, self.side) for radius, axis, length, center in each]
