@@ -94,6 +94,7 @@ def contact_history(
                 f"surfaces[{i}] must be at rest, without motion, mass and inertia, for a single contact step, got "
                 f"{surface}; use simulate"
             )
+    scene = scene.apart("contact_history")
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")

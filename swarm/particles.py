@@ -1,7 +1,5 @@
 """Particles: arrays with one row per component."""
 
-import csv
-import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
+from .columns import read_columns
 from .errors import SceneError
 
 Floats = NDArray[np.float64]
 
-_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -64,22 +62,7 @@ class Particles:
             SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names
                 file, row and column.
         """
-        try:
-            with open(path, newline="", encoding="utf-8-sig") as file:
-                table = list(csv.reader(file))
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise SceneError(f"cannot read {path}: {error}") from error
-        header = [name.strip() for name in table[0]] if table else []
-        missing = [name for name in _COLUMNS if name not in header]
-        unknown = [name for name in header if name not in (*_COLUMNS, "mass")]
-        if missing or unknown or len(set(header)) < len(header):
-            problem = f"column {missing[0]!r} is missing" if missing else f"columns are {', '.join(header)}"
-            raise SceneError(f"{path}: expected the columns {', '.join(_COLUMNS)} and optionally mass; {problem}")
-        rows = [(number, cells) for number, cells in enumerate(table[1:], start=2) if cells]
-        if not rows:
-            raise SceneError(f"{path}: expected at least one particle below the header, got none")
-        values = np.array([_csv_row(path, number, header, cells) for number, cells in rows])
-        columns = dict(zip(header, values.T, strict=True))
+        columns = read_columns(path, _COLUMNS, ("mass",), "particle")
         return cls(
             [columns[name] for name in _COLUMNS[:3]],
             [columns[name] for name in _COLUMNS[3:]],
@@ -150,21 +133,6 @@ class State(NamedTuple):
     multipliers: Multipliers | None
     contacts: Contacts | None = None
     heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without
-
-
-def _csv_row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:
-    if len(cells) != len(header):
-        raise SceneError(f"{path}, row {number}: expected {len(header)} cells, got {len(cells)}")
-    values = []
-    for name, cell in zip(header, cells, strict=True):
-        # float() also takes what other programs do not write: 1_0, and the digits of all scripts.
-        value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
-        if not np.isfinite(value):
-            raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell[:40]!r}")
-        if name == "mass" and value <= 0.0:
-            raise SceneError(f"{path}, row {number}, column 'mass': expected a number above 0, got {cell!r}")
-        values.append(value)
-    return values
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:

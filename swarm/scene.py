@@ -1,5 +1,6 @@
 """The scene: surfaces, gravity, and the volume that the surfaces enclose."""
 
+import copy
 import itertools
 import math
 from collections.abc import Sequence
@@ -79,12 +80,11 @@ class Scene:
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         object.__setattr__(self, "surfaces", surfaces)
-        walls = self.order.compiled(surfaces)
-        if walls > MOST_WALLS:
+        self._require_few_walls("")
+        for i in self.order.fields if self.moves() else ():
             raise SceneError(
-                f"surfaces must have at most {MOST_WALLS} walls in all, got {walls} of {len(surfaces)} surfaces: each "
-                "wall is compiled into the kernels, and with more the compiler runs out of stack; remove some (a box "
-                "has 3 walls, a capped cylinder 2, most others 1)"
+                f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where a surface moves, got {surfaces[i]}; "
+                f"list its bodies one by one, at most {MOST_WALLS} walls in all"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
         if not self._has_volume():
@@ -92,6 +92,35 @@ class Scene:
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
                 "have no point in common; check their `side`, and that solids are smaller than their cavity"
             )
+
+    def _require_few_walls(self, why: str) -> None:
+        """Raise a `SceneError` where there are more walls than kernels can be compiled for."""
+        walls = self.order.compiled(self.surfaces)
+        if walls > MOST_WALLS:
+            raise SceneError(
+                f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
+                "surfaces: each wall is compiled into the kernels, and with more the compiler runs out of stack; "
+                "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one kind, of which any "
+                "number is one field for Impact where nothing moves"
+            )
+
+    def apart(self, what: str) -> "Scene":
+        """The scene with every wall compiled by itself, for `what` knows no fields.
+
+        Raises:
+            SceneError: it has a field, or too many walls.
+        """
+        for i in self.order.fields:
+            raise SceneError(
+                f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
+                f"Impact with contact_step = 0 and particles, or list its bodies one by one, at most {MOST_WALLS} walls"
+            )
+        if not self.order.groups:
+            return self
+        made = copy.copy(self)
+        made.__dict__.update(order=order_of(self.surfaces, together=False), _groups=[])
+        made._require_few_walls(f" with {what}")
+        return made
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""

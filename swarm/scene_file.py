@@ -6,14 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import tables
 from .checks import closest, count, listed, particles_fit
+from .columns import read_columns
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
 from .particles import Particles
 from .run.options import RunOptions
 from .scene import Scene
+from .surfaces import ALL_FIELDS
 
 if TYPE_CHECKING:
     from .bodies.state import Bodies
@@ -139,13 +143,44 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
         came = "both" if "body" in document else "neither"
         raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
     return Job(
-        scene=tables.scene_of(document.get("surface"), document.get("gravity")),
+        scene=tables.scene_of(_with_bodies(document.get("surface"), path), document.get("gravity")),
         method=tables.method_of(document["method"]),
         run=_run(document["run"]),
         text=text,
         source=_body(document["body"]) if "body" in document else _particles(document["particles"]),
         path=path,
     )
+
+
+def _with_bodies(surfaces: Any, path: Path) -> Any:
+    """The tables of the surfaces, with the bodies of those that take them from a file."""
+    if not isinstance(surfaces, list):
+        return surfaces
+    return [_bodies_of(table, f"surface[{i}]", path) for i, table in enumerate(surfaces)]
+
+
+def _bodies_of(table: Any, where: str, path: Path) -> Any:
+    if not isinstance(table, dict) or "from" not in table or table.get("kind") not in ALL_FIELDS:
+        return table
+    kind, name = ALL_FIELDS[table["kind"]], table["from"]
+    if not isinstance(name, str) or Path(name).suffix.lower() != ".csv":
+        raise SceneError(f"{where}.from: expected a .csv file, got {name!r}")
+    columns = kind.columns()
+    both = [argument for argument in columns if argument in table]
+    if both:
+        raise SceneError(f"{where}.{both[0]}: cannot be combined with from = {name!r}; remove one of them")
+    needed = [column for argument in kind.needed() for column in columns[argument]]
+    optional = [column for argument, names in columns.items() if argument not in kind.needed() for column in names]
+    try:
+        read = read_columns(path.parent / name, needed, optional, "body")
+    except SceneError as error:
+        raise SceneError(f"{where}.from: {error}") from None
+    given = {
+        argument: np.column_stack([read[column] for column in names]) if len(names) > 1 else read[names[0]]
+        for argument, names in columns.items()
+        if set(names) <= set(read)
+    }
+    return {**{key: value for key, value in table.items() if key != "from"}, **given}
 
 
 def _run(table: Any) -> RunOptions:

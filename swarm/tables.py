@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import msgspec
+import numpy as np
 
 from .checks import closest, listed, one_of
 from .errors import SceneError
@@ -40,6 +41,7 @@ def table_of(described: Surface | Method) -> dict[str, Any]:
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
     table = {keys[name]: value for name, value in dataclasses.asdict(described).items() if value is not None}
+    table = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
     return {"kind": kinds[type(described)], **table}

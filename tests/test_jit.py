@@ -530,7 +530,7 @@ LAYERS = [
     ["contact"],
     ["surfaces"],
     ["frames", "kernel", "motion"],
-    ["checks", "extras"],
+    ["checks", "columns", "extras"],
     ["status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}

@@ -12,6 +12,7 @@ from skimage.measure import marching_cubes
 from ..motion import Pose
 from ..particles import Floats
 from ..scene import Scene
+from ..surfaces import Spheres
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
@@ -19,6 +20,8 @@ _POINTS = 48
 _PLANES, _FINE = 5, 160
 # The outermost planes are this fraction of the width inside a surface, where they show rims and edges.
 _END = 0.01
+# Of each of many balls, the points along each side of its grid and of its circles; how many balls get these.
+_COARSE, _MOST_WIRES = 10, 2_000
 # Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
 # An open volume is drawn to this many times the distance of the surfaces and particles.
@@ -66,6 +69,9 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
     shapes = []
     for i, surface in enumerate(scene.surfaces):
         name = f"{i}_{type(surface).__name__.lower()}"
+        if isinstance(surface, Spheres):
+            shapes.append(Shape(name, True, *_balls(surface)))
+            continue
         own = _of_surface(still, i, *coarse)
         around = _around(own[0], box) if len(own[0]) else _near(surface, scene.poses(time)[i], box)
         # Again, on a grid around this surface only.
@@ -73,6 +79,26 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
         wires = _wires(still, i, vertices, box) if len(vertices) else []
         shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
     return shapes
+
+
+def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:
+    """Vertices, triangles, normals and wires of many balls, each like the others: coarse, so that thousands are drawn."""
+    low, high = np.full(3, -1.3), np.full(3, 1.3)
+    axis = np.linspace(-1.3, 1.3, _COARSE)
+    distance = np.sqrt((np.array(np.meshgrid(axis, axis, axis, indexing="ij")) ** 2).sum(axis=0))
+    spacing = tuple((high - low) / (_COARSE - 1.0))
+    unit, triangles, _normals, _values = marching_cubes(distance, 1.0, spacing=spacing)
+    unit = unit + low
+    normals = unit / np.sqrt((unit**2).sum(axis=1))[:, None]
+    center, radius = spheres.centers[:, None, :], spheres.radii[:, None, None]
+    vertices = (center + radius * normals).reshape(-1, 3)
+    first = len(unit) * np.arange(len(spheres))[:, None, None]
+    angle = np.linspace(0.0, 2.0 * math.pi, _COARSE + 1)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    some = slice(None, None, max(1, len(spheres) // _MOST_WIRES))
+    circles = [np.roll(circle, k, axis=1) for k in range(3)]
+    wires = [c + r * one for c, r in zip(spheres.centers[some], spheres.radii[some], strict=True) for one in circles]
+    return vertices, (triangles + first).reshape(-1, 3).astype(np.int64), np.tile(normals, (len(spheres), 1)), wires
 
 
 def _box(scene: Still, positions: Floats) -> Corners:

@@ -29,7 +29,10 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         if not isinstance(value, allowed):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     if isinstance(particles, Bodies):
-        return _task_of_bodies(scene, particles.copy(), method, options)
+        return _task_of_bodies(scene.apart("bodies"), particles.copy(), method, options)
+    if not isinstance(method, Impact) or method.contact_step > 0.0:
+        name = "a contact_step" if isinstance(method, Impact) else type(method).__name__
+        scene = scene.apart(name)
     if getattr(method, "dt", None) is not None and isinstance(method, Impact):
         raise SceneError(
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"

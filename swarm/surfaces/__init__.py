@@ -15,6 +15,7 @@ from .fields.boxes import Boxes
 from .fields.capsules import Capsules
 from .fields.cylinders import Cylinders
 from .fields.ellipsoids import Ellipsoids
+from .fields.many import Many
 from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
@@ -33,6 +34,7 @@ from .shapes.torus import Torus
 from .surface import Surface
 
 __all__ = [
+    "ALL_FIELDS",
     "ALL_SURFACES",
     "Box",
     "Boxes",
@@ -55,6 +57,14 @@ __all__ = [
     "Torus",
 ]
 
+# Many bodies of one kind.
+ALL_FIELDS: dict[str, type[Many]] = {
+    "spheres": Spheres,
+    "cylinders": Cylinders,
+    "capsules": Capsules,
+    "boxes": Boxes,
+    "ellipsoids": Ellipsoids,
+}
 ALL_SURFACES: dict[str, type[Surface]] = {
     "sphere": Sphere,
     "ellipsoid": Ellipsoid,
@@ -68,9 +78,5 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "quadric": Quadric,
     "slab": Slab,
     "formula": Formula,
-    "spheres": Spheres,
-    "ellipsoids": Ellipsoids,
-    "cylinders": Cylinders,
-    "capsules": Capsules,
-    "boxes": Boxes,
+    **ALL_FIELDS,
 }

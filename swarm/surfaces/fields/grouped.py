@@ -36,13 +36,13 @@ class Order(NamedTuple):
         return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.others)
 
 
-def order_of(surfaces: Sequence[Surface]) -> Order:
-    """The order of the chain of a scene; where a surface moves all are walls of their own."""
+def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
+    """The order of the chain of a scene; where a surface moves, or not `together`, all are walls of their own."""
     fields = tuple(i for i, surface in enumerate(surfaces) if isinstance(surface, Many))
     rest = [i for i in range(len(surfaces)) if i not in fields]
     of_kind: dict[Any, list[int]] = defaultdict(list)
-    still = all(surface.motion is None and not surface.reacts() for surface in surfaces)
-    for i in rest if still and len(rest) > _FEW else ():
+    together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)
+    for i in rest if together and len(rest) > _FEW else ():
         if surfaces[i].is_solid() and len(surfaces[i].walls()) == 1 and can_be_member(surfaces[i].walls()[0]):
             of_kind[kind_of(surfaces[i].walls()[0]), _laws(surfaces[i])].append(i)
     groups = tuple(tuple(group) for group in of_kind.values() if len(group) > _FEW)

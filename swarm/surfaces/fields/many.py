@@ -1,7 +1,7 @@
 """Many bodies of one kind as one surface: what their descriptions have in common."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,11 @@ from .grid import grid_of
 from .members import Members, alike, nearest, table_of
 
 Floats = NDArray[np.float64]
+_COLUMNS = {
+    "centers": ("x", "y", "z"), "radii": ("radius",), "lengths": ("length",),
+    "axes": ("axis_x", "axis_y", "axis_z"), "half_widths": ("half_x", "half_y", "half_z"),
+    "semi_axes": ("a", "b", "c"), "rotations": ("q_w", "q_x", "q_y", "q_z"),
+}  # fmt: skip
 # What a body takes in its table and in the grid of cells [bytes], and a number of them that fits on every machine.
 _BODY, _FEW = 300, 1_000_000
 
@@ -40,6 +45,17 @@ class Many(Surface):
             ", ".join([f"{type(self).__name__}(<{len(self)}>", *(f"{f.name}={getattr(self, f.name)!r}" for f in laws)])
             + ")"
         )
+
+    @classmethod
+    def columns(cls) -> dict[str, tuple[str, ...]]:
+        """The columns of a file that hold each argument of the bodies."""
+        known = {field.name for field in fields(cls)}
+        return {argument: names for argument, names in _COLUMNS.items() if argument in known}
+
+    @classmethod
+    def needed(cls) -> list[str]:
+        """The arguments that have no default."""
+        return [field.name for field in fields(cls) if field.default is MISSING]
 
     # --- For kernels -------------------------------------------------------------------------------------
 
