@@ -100,8 +100,8 @@ class Scene:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
                 "surfaces: each wall is compiled into the kernels, and with more the compiler runs out of stack; "
-                "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one kind, of which any "
-                "number is one field for Impact where nothing moves"
+                "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one "
+                "kind, of which any number is one field for Impact where nothing moves"
             )
 
     def apart(self, what: str) -> "Scene":

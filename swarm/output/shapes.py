@@ -82,7 +82,7 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
 
 
 def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:
-    """Vertices, triangles, normals and wires of many balls, each like the others: coarse, so that thousands are drawn."""
+    """Vertices, triangles, normals and wires of many balls: coarse, so that thousands can be drawn."""
     low, high = np.full(3, -1.3), np.full(3, 1.3)
     axis = np.linspace(-1.3, 1.3, _COARSE)
     distance = np.sqrt((np.array(np.meshgrid(axis, axis, axis, indexing="ij")) ** 2).sum(axis=0))
