@@ -1,0 +1,211 @@
+"""Many bodies as one surface: the grid finds the first hit that a look at all of them finds, and none is missed."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.errors import SceneError
+from swarm.kernel.gravity import Gravity
+from swarm.kernel.vector import vec
+from swarm.surfaces import flights
+from swarm.surfaces.fields import grid as grids
+
+EPSILON = np.finfo(np.float64).eps
+# Hits that are looked for: later a flight is far away.
+LAST = 20.0
+FALL = Gravity(0.3, -0.2, -1.0)
+
+
+def turns(random, n):
+    return random.standard_normal((n, 4))
+
+
+KINDS = {
+    "spheres": lambda random, c, r: swarm.Spheres(c, r),
+    "posts": lambda random, c, r: swarm.Cylinders(c, r),
+    "cylinders": lambda random, c, r: swarm.Cylinders(c, r, random.standard_normal(c.shape), 2.0 * r),
+    "capsules": lambda random, c, r: swarm.Capsules(c, r, r, random.standard_normal(c.shape)),
+    "boxes": lambda random, c, r: swarm.Boxes(c, np.outer(r, (1.0, 0.7, 0.5)), turns(random, len(c))),
+    "boxes along the axes": lambda random, c, r: swarm.Boxes(c, np.outer(r, (1.0, 0.7, 0.5))),
+    "ellipsoids": lambda random, c, r: swarm.Ellipsoids(c, np.outer(r, (1.0, 0.7, 0.5)), turns(random, len(c))),
+}
+
+
+def packing(kind, n=120, seed=1):
+    """Bodies at random in a unit cube, which overlap."""
+    random = np.random.default_rng(seed)
+    return KINDS[kind](random, random.random((n, 3)), 0.02 + 0.08 * random.random(n))
+
+
+def one_by_one(field):
+    """The numbers of every body, as walls of their own."""
+    return [wall for solid in field.solids() for wall in solid.walls()]
+
+
+def balls_of(field):
+    return [
+        swarm.Sphere(r, tuple(c), "outside") for c, r in zip(field.centers.tolist(), field.radii.tolist(), strict=True)
+    ]
+
+
+def solids_of(field):
+    return balls_of(field) if isinstance(field, swarm.Spheres) else field.solids()
+
+
+def first_through_cells(scene, gravity, r, v):
+    """The first hit as a particle finds it: from cell to cell."""
+    pull = np.zeros(3) if gravity is None else np.array(gravity)
+    chain, passed = scene.chain(), 0.0
+    for _cell in range(10_000):
+        time, wall = flights.first_hit(chain, gravity, vec(r), vec(v))
+        if not passed + time < LAST:
+            return math.inf, -1
+        passed, r, v = passed + time, r + time * (v + 0.5 * time * pull), v + time * pull
+        if wall >= 0.0:
+            return passed, int(wall)
+    raise AssertionError("no end")
+
+
+def first_of_all(walls, gravity, r, v):
+    """The least of the first hits of all bodies."""
+    least = math.inf, -1
+    for number, wall in enumerate(walls):
+        passed, here, speed = 0.0, r, v
+        pull = np.zeros(3) if gravity is None else np.array(gravity)
+        while passed < min(least[0], LAST):
+            time, found = flights.hit(gravity, wall, vec(here), vec(speed))
+            passed, here, speed = passed + time, here + time * (speed + 0.5 * time * pull), speed + time * pull
+            if found or not time < math.inf:
+                break
+        if passed < min(least[0], LAST):
+            least = passed, number
+    return least
+
+
+@pytest.mark.parametrize("gravity", [None, FALL], ids=["straight", "falling"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_hit_is_missed(kind, gravity):
+    field = packing(kind)
+    scene, walls = swarm.Scene([field]), [solid.walls()[0] for solid in solids_of(field)]
+    random, off = np.random.default_rng(2), []
+    points = random.uniform(-0.3, 1.3, (3, 400))
+    points = points[:, (field.phi(points) > 0.0)][:, :150]
+    with np.errstate(all="ignore"):
+        for r in points.T:
+            v = random.standard_normal(3)
+            time, number = first_through_cells(scene, gravity, r, v)
+            wanted, other = first_of_all(walls, gravity, r, v)
+            assert (time == math.inf) == (wanted == math.inf)
+            if wanted < math.inf:
+                assert number == other
+                off.append(abs(time - wanted))
+    assert len(off) > 20
+    # Where a flight grazes, the time is as uncertain as the root of the round-off of the place.
+    assert np.median(off) <= 2.0 * EPSILON
+    assert max(off) <= 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_phi_is_that_of_a_body_near_the_point(kind):
+    field = packing(kind)
+    points = np.random.default_rng(3).uniform(-0.2, 1.2, (3, 300))
+    each = np.array([solid.phi(points) for solid in solids_of(field)])
+    found = field.phi(points)
+    assert ((found < 0.0) == (each.min(axis=0) < 0.0)).all()
+    near = each.min(axis=0) < np.quantile(each.min(axis=0), 0.1)
+    assert found[near] == pytest.approx(each.min(axis=0)[near], abs=1e-12)
+    h = 1e-6
+    steps = np.stack(
+        [(field.phi(points + h * e) - field.phi(points - h * e)) / (2.0 * h) for e in np.eye(3)[:, :, None]]
+    )
+    smooth = np.abs(steps - field.gradient(points)).max(axis=0) < 1e-4
+    assert smooth.mean() > 0.95
+
+
+def test_the_cells_hold_what_reaches_into_them():
+    field = packing("spheres", 500)
+    members, random = field.members, np.random.default_rng(4)
+    points = random.uniform(-0.2, 1.2, (3, 3000))
+    inside = ((points[:, None, :] - field.centers.T[:, :, None]) ** 2).sum(axis=0) < field.radii[:, None] ** 2
+    for point, bodies in zip(points.T, inside.T, strict=True):
+        cell = grids.cell_of(members.grid, vec(point)).number
+        entries = members.grid.entries[members.grid.first[cell] : members.grid.first[cell + 1]]
+        assert set(np.flatnonzero(bodies)) <= set(entries.tolist())
+
+
+def test_memory_is_linear_in_the_bodies():
+    sizes = []
+    for side in (10, 20):
+        places = np.stack(np.meshgrid(*3 * [np.arange(side, dtype=float)], indexing="ij"), -1).reshape(-1, 3)
+        members = swarm.Spheres(places, 0.3).members
+        sizes.append((members.table.nbytes + members.grid.first.nbytes + members.grid.entries.nbytes) / len(places))
+    assert sizes[1] < 1.1 * sizes[0] < 110.0
+
+
+def test_more_than_a_few_of_one_kind_are_one_field():
+    def balls(n, **laws):
+        return [swarm.Sphere(0.05, (0.2 * k - 0.4, 0.0, 0.0), "outside", **laws) for k in range(n)]
+
+    box = swarm.Box((0.5, 0.5, 0.5))
+    few, some, two = (
+        swarm.Scene([*balls(n), box, *more]) for n, more in ((4, ()), (5, ()), (5, balls(5, friction=0.3)))
+    )
+    assert [len(scene.order.groups) for scene in (few, some, two)] == [0, 1, 2]
+    # One row for each surface, in the order of the chain.
+    assert some.owners() == [0, 1, 2, 3, 4, 5, 5, 5]
+    assert two.owners() == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 5, 5, 5]
+
+
+@pytest.mark.parametrize(
+    ("build", "parts"),
+    [
+        (lambda: swarm.Spheres([[0, 0, 0], [1, 0, 0]], [0.1, -0.2]), ["radii[1]", "above 0", "got -0.2"]),
+        (lambda: swarm.Spheres([[0, 0, 0], [1, 0, 0]], 0.0), ["radii", "above 0", "got 0"]),
+        (lambda: swarm.Spheres([[0, 0, 0], [1, 0, 0]], [0.1, 0.1, 0.1]), ["radii", "2", "one for each", "(3,)"]),
+        (lambda: swarm.Spheres([0, 0, 0], 0.1), ["centers", "(n, 3)", "(3,)"]),
+        (lambda: swarm.Spheres(np.empty((0, 3)), 0.1), ["centers", "at least one row"]),
+        (lambda: swarm.Spheres([[0, 0, math.nan]], 0.1), ["centers[0]", "finite", "nan"]),
+        (lambda: swarm.Spheres([[0, 0, 0]], 0.1, side="inside"), ["side", "outside", "inside"]),
+        (lambda: swarm.Spheres([[0, 0, 0]], 0.1, rotation=(1, 1, 0, 0)), ["rotation", "None", "Spheres"]),
+        (lambda: swarm.Spheres(np.broadcast_to(0.0, (10**12, 3)), 0.1), ["centers", "memory", "bodies", "TB"]),
+        (lambda: swarm.Cylinders([[0, 0, 0]], 0.1, (0, 0, 0)), ["axes", "not all 0"]),
+        (lambda: swarm.Cylinders([[0, 0, 0]], 0.1, lengths=[-1.0]), ["lengths[0]", "above 0", "-1"]),
+        (lambda: swarm.Boxes([[0, 0, 0]], (0.1, 0.0, 0.1)), ["half_widths", "above 0", "0.0"]),
+        (lambda: swarm.Boxes([[0, 0, 0]], (0.1, 0.1)), ["half_widths", "3 numbers", "(2,)"]),
+        (lambda: swarm.Ellipsoids([[0, 0, 0]], (1, 1, 1), [[0, 0, 0, 0]]), ["rotations[0]", "not all 0"]),
+    ],
+)  # fmt: skip
+def test_bad_bodies_are_told(build, parts):
+    with pytest.raises(SceneError) as caught:
+        build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_a_packing_without_room_is_told():
+    places = np.stack(np.meshgrid(*3 * [np.linspace(-0.5, 0.5, 8)], indexing="ij"), -1).reshape(-1, 3)
+    with pytest.raises(SceneError, match="must leave a volume for particles"):
+        swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Spheres(places, 0.15)])
+
+
+def test_what_knows_no_fields_says_so():
+    field, box = swarm.Spheres([[0.0, 0.0, 0.0]], 0.1), swarm.Box((0.5, 0.5, 0.5))
+    scene, start = swarm.Scene([box, field]), swarm.Particles([0.3, 0, 0], [1, 0, 0])
+    for method in (swarm.Penalty(1e-3, 1e5), swarm.Verlet(1e-3, 1e5), swarm.Impact(contact_step=1e-3)):
+        with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with .*use Impact"):
+            swarm.simulate(scene, start, method, until=0.1)
+    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with bodies"):
+        swarm.simulate(scene, swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Impact(dt=1e-2), until=0.1)
+    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres where a surface moves"):
+        swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=swarm.Translation((0.1, 0.0, 0.0))), field])
+
+
+def test_other_methods_take_listed_solids_one_by_one():
+    """Five balls are a field for Impact, and walls of their own for a method with steps."""
+    balls = [swarm.Sphere(0.05, (0.2 * k - 0.4, 0.0, 0.0), "outside") for k in range(5)]
+    scene = swarm.Scene([swarm.Sphere(0.6), *balls])
+    start = swarm.Particles([0.1, 0.3, 0.0], [0.1, -1.0, 0.05])
+    soft = swarm.simulate(scene, start, swarm.Penalty(1e-3, 1e6), until=0.5, compile="never")
+    assert soft.observables["impulse"].shape[1] == 6
+    assert soft.observables["energy_error"].max() < 1e-12
