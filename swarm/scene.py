@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,14 @@ from . import motion as motions
 from .contact.laws import Laws, Moves, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
+from .kernel.vector import Vec
+from .particles import Particles
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.fold import Chain
+from .surfaces.images import Lengths, cell_of, images_of, into_cell, lengths_of
 from .surfaces.moving import Carried, carried
+from .surfaces.period import Period
 from .surfaces.surface import SIDES, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
@@ -51,9 +55,14 @@ class Scene:
     Args:
         surfaces: at least one surface.
         gravity: None, or three numbers (gx, gy, gz) [m/s^2], each at most 1e100.
+        period: None, or three lengths (Lx, Ly, Lz) [m] of a cell that repeats without end, None for a direction in
+            which it does not: what leaves [0, L) through a face comes back through the other one, and is counted. A
+            solid that reaches over a face is there on the other side too; a cavity is within the cell; and any other
+            surface is the same all along the period, as a plane or an endless cylinder along it.
 
     Raises:
-        SceneError: no surface, more than 24 walls, or surfaces that leave no volume.
+        SceneError: no surface, more than 24 walls with their images, surfaces that leave no volume, or one that does
+            not go with the period.
 
     >>> import swarm
     >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
@@ -62,8 +71,16 @@ class Scene:
 
     surfaces: tuple[Surface, ...]
     gravity: checks.Vector | None
+    period: Lengths | None
+    # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
+    _images: tuple[tuple[Surface, ...], ...] = field(repr=False, compare=False)
 
-    def __init__(self, surfaces: Sequence[Surface], gravity: Sequence[float] | None = None) -> None:
+    def __init__(
+        self,
+        surfaces: Sequence[Surface],
+        gravity: Sequence[float] | None = None,
+        period: Sequence[float | None] | None = None,
+    ) -> None:
         surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
         if not surfaces:
             raise SceneError("surfaces must hold at least one surface, got none")
@@ -75,6 +92,8 @@ class Scene:
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "period", lengths_of(period))
+        object.__setattr__(self, "_images", tuple(self._images_of(i) for i in range(len(surfaces))))
         walls = len(self.owners())
         if walls > MOST_WALLS:
             raise SceneError(
@@ -106,11 +125,30 @@ class Scene:
                 rows = tuple(map(tuple, rotations.matrix(turn).tolist()))
                 held = motions.Placed(tuple(np.array(positions)[i].tolist()), turn, rows)
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
-        return Scene(surfaces, self.gravity)
+        return Scene(surfaces, self.gravity, self.period)
 
     def chain(self, moment: float = 0.0) -> Chain | Carried | None:
         """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
-        return carried(self.surfaces, moment)
+        return carried(tuple(image for images in self._images for image in images), moment)
+
+    def cell(self) -> Period | None:
+        """The cell that repeats as kernels take it."""
+        if self.period is None:
+            return None
+        pulls = self.gravity or (0.0, 0.0, 0.0)
+        falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
+        return Period(*self.period, Vec(*falls) if any(falls) else None)
+
+    def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""
+        return into_cell(self.period or (None, None, None), checks.array("points", points))
+
+    def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
+        """Where particles are (3, N), with all cells that they have come through: position + image * period."""
+        if self.period is None or particles.image is None:
+            return np.array(particles.position)
+        lengths = np.array([length or 0.0 for length in self.period])
+        return np.asarray(particles.position + particles.image * lengths[:, None])
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""
@@ -137,7 +175,7 @@ class Scene:
 
     def owners(self) -> list[int]:
         """The surface that each wall of the chain belongs to."""
-        return [i for i, surface in enumerate(self.surfaces) for _wall in surface.walls()]
+        return [i for i, images in enumerate(self._images) for image in images for _wall in image.walls()]
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
@@ -155,14 +193,22 @@ class Scene:
     def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
         rows = checks.array("points", points)
-        return np.array([_side(surface) * surface.phi(rows, time) for surface in self.surfaces])
+        if self.period is not None:
+            rows, _image = into_cell(self.period, rows)
+        return np.array([_gaps(images, rows, time).max(axis=0) for images in self._images])
 
     def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
-        slopes = [np.sqrt((surface.gradient(points, time) ** 2).sum(axis=0)) for surface in self.surfaces]
-        # At the centre of a ball the slope is 0, and a point is as far inside as can be.
-        with np.errstate(over="ignore"):
-            return np.asarray(self.gaps(points, time) / np.maximum(slopes, np.finfo(np.float64).tiny))
+        rows = checks.array("points", points)
+        if self.period is not None:
+            rows, _image = into_cell(self.period, rows)
+        found = []
+        for images in self._images:
+            slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
+            # At the centre of a ball the slope is 0, and a point is as far inside as can be.
+            with np.errstate(over="ignore"):
+                found.append((_gaps(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
+        return np.array(found)
 
     def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
         """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
@@ -190,12 +236,18 @@ class Scene:
             (*n, offset) for surface in self.surfaces for n, offset in _placed(surface, surface.open_faces(), time)
         ]
         rows = np.array(faces).reshape(-1, 4)
+        # Through a face across the period nobody leaves.
+        repeats = np.array([length is not None for length in self.period or (None,) * 3])
+        rows = rows[~(rows[:, :3] != 0.0)[:, repeats].any(axis=1)]
         return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]
 
     def bounds(self, time: float = 0.0) -> Box:
         """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
         boxes = np.array([_box(surface, time) for surface in self.surfaces])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
+        if self.period is not None:
+            corners = np.array(cell_of(self.period))
+            low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
         planes = [plane for surface in self.surfaces for plane in _placed(surface, surface.half_spaces(), time)]
         if planes:
             low, high = _polyhedron_bounds(planes, low, high)
@@ -214,15 +266,15 @@ class Scene:
             if (gaps.max(axis=0) <= 0.0).any():
                 return True
             worst = gaps.argmax(axis=0)
-            for i, surface in enumerate(self.surfaces):
+            for i, images in enumerate(self._images):
                 outside = worst == i
-                gradient = _side(surface) * surface.gradient(points[:, outside])
+                gradient = _gradient(images, points[:, outside])
                 slope = np.maximum((gradient**2).sum(axis=0), np.finfo(np.float64).tiny)
                 points[:, outside] -= _PAST * gaps[i, outside] / slope * gradient
         points = points[:, np.argsort(self.gaps(points).max(axis=0))[:_NEAREST]]
         for _ in range(_STEPS):
             # One surface after the other converges slowly along a sharp edge; a Newton step for all near ones does not.
-            gradients = np.array([_side(surface) * surface.gradient(points) for surface in self.surfaces])
+            gradients = np.array([_gradient(images, points) for images in self._images])
             lengths = np.maximum(np.sqrt((gradients**2).sum(axis=1)), np.finfo(np.float64).tiny)
             gaps = self.gaps(points) / lengths
             worst = gaps.max(axis=0)
@@ -236,7 +288,25 @@ class Scene:
 
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
-        return max(surface.extent() for surface in self.surfaces) or 1.0
+        lengths = [length for length in self.period or () if length is not None]
+        return max([*(surface.extent() for surface in self.surfaces), *lengths]) or 1.0
+
+    def _images_of(self, i: int) -> tuple[Surface, ...]:
+        if self.period is None:
+            return (self.surfaces[i],)
+        return tuple(images_of(self.surfaces[i], self.period, f"surfaces[{i}]"))
+
+
+def _gaps(images: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """Signed gap of every image of a surface, (images, N)."""
+    return np.array([_side(image) * image.phi(points, time) for image in images])
+
+
+def _gradient(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Gradient of the gap of the image that has the largest one, (3, N)."""
+    gradients = np.array([_side(image) * image.gradient(points) for image in images])
+    worst = _gaps(images, points, 0.0).argmax(axis=0) if len(images) > 1 else np.zeros(points.shape[1], np.int64)
+    return np.asarray(gradients[worst, :, np.arange(points.shape[1])].T)
 
 
 def _box(surface: Surface, time: float) -> Box:
