@@ -73,7 +73,7 @@ class Scene:
     gravity: checks.Vector | None
     period: Lengths | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
-    _images: tuple[tuple[Surface, ...], ...] = field(repr=False, compare=False)
+    _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -235,11 +235,11 @@ class Scene:
         faces = [
             (*n, offset) for surface in self.surfaces for n, offset in _placed(surface, surface.open_faces(), time)
         ]
-        rows = np.array(faces).reshape(-1, 4)
+        rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
         # Through a face across the period nobody leaves.
         repeats = np.array([length is not None for length in self.period or (None,) * 3])
-        rows = rows[~(rows[:, :3] != 0.0)[:, repeats].any(axis=1)]
-        return rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0]
+        rows = rows[(rows[:, :3][:, repeats] == 0.0).all(axis=1)]
+        return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])
 
     def bounds(self, time: float = 0.0) -> Box:
         """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
