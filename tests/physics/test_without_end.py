@@ -218,7 +218,7 @@ def test_resumed_is_whole(tmp_path, name):
 
 
 def test_the_chute_is_followed_to_round_off():
-    """Bouncing, sliding and resting grains, from cell to cell: none leaves its walls, and no energy is lost sight of."""
+    """Bouncing, sliding and resting grains, from cell to cell: none leaves its walls, no energy is lost sight of."""
     scene = CASES["chute"]
     start = swarm.fill(scene, 700, speed=1.0, seed=5)
     result = swarm.simulate(scene, start, swarm.Impact(), until=4.0, every=0.5, compile="always")
