@@ -59,6 +59,7 @@ def fill(
     points, volume = _points(scene, n, random)
     particles = Particles(points, np.zeros((3, n)), mass)
     particles.volume = volume
+    particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
     normal = random.standard_normal((3, n))
     if speed is not None:
         particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))

@@ -18,6 +18,7 @@ from .surfaces import flights
 from .surfaces.fields.members import deepest
 from .surfaces.fold import Field
 from .surfaces.moving import at
+from .surfaces.period import Period
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
@@ -44,6 +45,27 @@ def _(chain, r):
 @penetration.register(Nothing)
 def _(chain, r):
     return 0.0
+
+
+@by_type
+def _fall_of(period):
+    """The potential energy per mass of one image along each axis, None where there is none."""
+    return
+
+
+_fall_of.register(Period, lambda period: period.fall)
+
+
+@by_type
+def _whole_fall(fall, state, i, in_cell):
+    """The potential energy per mass of particle i where it is, if it has come through the faces of the cell."""
+    return in_cell
+
+
+@_whole_fall.register(Vec)
+def _(fall, state, i, in_cell):
+    image = state.image
+    return in_cell + (image[0, i] * fall.x + image[1, i] * fall.y + image[2, i] * fall.z)
 
 
 class Energies(NamedTuple):
@@ -121,7 +143,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
                     depth = penetration(at(chain, 0.0), r)
                     sums[_KINETIC, j] += m * e.kinetic
-                    sums[_POTENTIAL, j] += m * e.fall
+                    sums[_POTENTIAL, j] += m * _whole_fall(_fall_of(state.period), state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
                     spin = cross(r, p)
                     sums[_PX, j] += p.x
@@ -159,8 +181,17 @@ def count_escaped(chain, gravity, far, faces, state):
         for k in range(faces.shape[0]):
             n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
-        count += out or _escapes(gravity, chain, r, v)
+        count += out or _escapes_from(state.period, gravity, chain, r, v)
     return count
+
+
+@by_type
+def _escapes_from(period, gravity, chain, r, v):
+    return _escapes(gravity, chain, r, v)
+
+
+# A flight that hits no wall of its cell may hit those of others.
+_escapes_from.register(Period, lambda period, gravity, chain, r, v: False)
 
 
 @by_type

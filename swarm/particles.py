@@ -1,7 +1,7 @@
 """Particles: arrays with one row per component."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ class Particles:
         position: (3, N) or (3,) [m], rows x, y, z.
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
+        image: (3, N) whole numbers, or None: in a scene with a period, how many cells away each particle is.
 
     The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Arrays that are
     assigned later are checked and converted in the same way when a run starts.
@@ -36,13 +37,16 @@ class Particles:
 
     volume: float | None = None
 
-    def __init__(self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0) -> None:
+    def __init__(
+        self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0, image: ArrayLike | None = None
+    ) -> None:
         checked = _checked(position, velocity, mass)
         self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
+        self.image = None if image is None else _images(image, len(self))
 
     def copy(self) -> "Particles":
         """The same particles, checked again, with arrays of their own."""
-        return Particles(self.position, self.velocity, self.mass)
+        return Particles(self.position, self.velocity, self.mass, self.image)
 
     def __len__(self) -> int:
         return int(self.position.shape[1])
@@ -133,6 +137,10 @@ class State(NamedTuple):
     multipliers: Multipliers | None
     contacts: Contacts | None = None
     heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without
+    # Where the scene repeats: the energy is that of the position in the cell, and changes with the image.
+    image: NDArray[np.int64] | None = None  # (3, N) how many cells away it is
+    carry: Floats | None = None  # (N,) what is lost of the energy by round-off at these changes
+    period: Any = None  # `Period` of the cell
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -152,6 +160,16 @@ def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple
             f"{checks.SMALLEST:g} to {checks.LARGEST:g} kg"
         )
     return rows, speeds, masses
+
+
+def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:
+    """The argument `image`, checked."""
+    given = checks.array("image", value)
+    given = given.reshape(3, 1) if given.ndim == 1 and given.size == 3 else given
+    # Whole numbers beyond this are no floats of their own.
+    if given.shape != (3, n) or not (np.abs(given) <= 2.0**53).all() or (given != np.floor(given)).any():
+        raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {value!r:.200}")
+    return given.astype(np.int64, order="C")
 
 
 def _rows(name: str, value: ArrayLike) -> Floats:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .bodies.state import Bodies
     from .bodies.table import Made
 
-_TABLES = ("gravity", "particles", "body", "surface", "method", "run")
+_TABLES = ("gravity", "period", "particles", "body", "surface", "method", "run")
 _SAVED = {"checkpoint": 60.0}
 
 
@@ -143,7 +143,9 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
         came = "both" if "body" in document else "neither"
         raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
     return Job(
-        scene=tables.scene_of(_with_bodies(document.get("surface"), path), document.get("gravity")),
+        scene=tables.scene_of(
+            _with_bodies(document.get("surface"), path), document.get("gravity"), document.get("period")
+        ),
         method=tables.method_of(document["method"]),
         run=_run(document["run"]),
         text=text,

@@ -53,6 +53,7 @@ def of_trajectory(file: Path) -> dict[str, str]:
             **_what(trajectory),
             "surfaces": ", ".join(map(_call, trajectory.scene.surfaces)),
             "gravity": "none" if trajectory.scene.gravity is None else f"{trajectory.scene.gravity} m/s^2",
+            **_period(trajectory.scene.period),
             "method": _call(trajectory.method),
             "observables": ", ".join(seen) or "none",
             "size": f"{file.stat().st_size / 1e6:.1f} MB",
@@ -141,6 +142,14 @@ def _what(trajectory: "Trajectory") -> dict[str, str]:
     }
     told = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in parts.items() if count]
     return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
+
+
+def _period(period: Any) -> dict[str, str]:
+    """The row of a scene that repeats."""
+    if period is None:
+        return {}
+    lengths = ", ".join("none" if length is None else f"{length:g}" for length in period)
+    return {"period": f"({lengths}) m"}
 
 
 def _call(described: Any) -> str:

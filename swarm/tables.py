@@ -21,12 +21,12 @@ from .surfaces import ALL_SURFACES, OwnSurface, Surface
 T = TypeVar("T")
 
 
-def scene_of(surfaces: Any, gravity: Any) -> Scene:
-    """A scene from its tables: a list of surface tables, and gravity or None."""
+def scene_of(surfaces: Any, gravity: Any, period: Any = None) -> Scene:
+    """A scene from its tables: a list of surface tables, gravity or None, and the period or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
     built = [of_kind(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
-    return Scene(surfaces=built, gravity=gravity)
+    return Scene(surfaces=built, gravity=gravity, period=period)
 
 
 def method_of(table: Any) -> Method:
@@ -50,7 +50,9 @@ def table_of(described: Surface | Method) -> dict[str, Any]:
 def scene_table(scene: Scene) -> dict[str, Any]:
     """The tables of a scene."""
     gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
-    return {**gravity, "surface": [table_of(surface) for surface in scene.surfaces]}
+    # TOML has no None.
+    period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
+    return {**gravity, **period, "surface": [table_of(surface) for surface in scene.surfaces]}
 
 
 def convert(table: Any, cls: type[T], where: str) -> T:
@@ -62,7 +64,8 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     names = {field.metadata.get("key", field.name): field for field in fields}
     for key in table:
         if key not in names:
-            hint = "; gravity belongs at the top, before the first table" if key == "gravity" else closest(key, names)
+            at_top = key in ("gravity", "period")
+            hint = f"; {key} belongs at the top, before the first table" if at_top else closest(key, names)
             raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
     for key, field in names.items():
         if field.default is dataclasses.MISSING and key not in table:

@@ -223,11 +223,18 @@ def _deep_after(surface, path, near):
 
 @inlined
 def _at(path, s):
-    """The cubic through both ends of a step."""
+    """Where the cubic through both ends of a step is."""
+    r0, a, b, c = cubic(path)
+    return r0 + s * (a + s * (b + s * c))
+
+
+@inlined
+def cubic(path):
+    """The cubic through both ends of a step, as the coefficients of the powers of the part of it."""
     d, h = path.r1 - path.r0, path.h
-    # Hermite's form: r0 + h v0 s + (3 d - h (2 v0 + v1)) s^2 + (h (v0 + v1) - 2 d) s^3
+    # Hermite's form
     a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
-    return path.r0 + s * (h * path.v0 + s * (a + s * b))
+    return path.r0, h * path.v0, a, b
 
 
 @inlined

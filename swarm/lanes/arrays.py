@@ -46,6 +46,7 @@ class Lanes(NamedTuple):
     some: Array  # int64, those `eights` of which one is marked
     order: Array  # int64, the lanes that are marked
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
+    period: Any = None  # the cell where it repeats
 
 
 class Halted(NamedTuple):
@@ -85,7 +86,7 @@ class Share(NamedTuple):
     seed: int  # of random numbers
 
 
-def empty(walls: int, rows: int) -> Lanes:
+def empty(walls: int, rows: int, period: Any = None) -> Lanes:
     """Lanes for one block, with so many rows of what walls give."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
@@ -105,6 +106,7 @@ def empty(walls: int, rows: int) -> Lanes:
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
         left_behind=table(ROWS + rows),
+        period=period,
     )
 
 

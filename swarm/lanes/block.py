@@ -42,6 +42,7 @@ from .arrays import (
 )
 from .fly import go, marked_lanes, put_end
 from .solve import solution, solve
+from .wrap import return_lanes
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
@@ -149,6 +150,7 @@ def _(contacts, lanes, i):
 def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
+    return_lanes(lanes.period, share.state, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)

@@ -1,7 +1,7 @@
 """One composed step of every lane that slides: loops without branches, and what the step may end with."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..kernel.vector import ZERO, column, either, put, square
 from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at, during
+from ..surfaces.period import is_beyond
 from .arrays import STRIDE, table
 
 # What a lane holds: position, velocity and acceleration, what presses on its walls, the time left, the next step, the
@@ -42,13 +43,14 @@ class Lanes(NamedTuple):
     event: Array  # int64, what the step of this pass may end with
     gained: Array  # twice what walls that move give in the step of this pass, per mass
     after: Array  # twice the energy per mass at its end
+    period: Any  # the cell where it repeats
 
 
 # What a step may end with.
-LIFTED, MET, FAILED, STOPPED, STUCK = 1, 2, 4, 8, 16
+LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES = 1, 2, 4, 8, 16, 32
 
 
-def empty() -> Lanes:
+def empty(period: Any = None) -> Lanes:
     """Lanes for one block."""
     return Lanes(
         table(ROWS),
@@ -57,6 +59,7 @@ def empty() -> Lanes:
         np.zeros(STRIDE, np.int64),
         table(1)[0],
         table(1)[0],
+        period,
     )
 
 
@@ -215,8 +218,9 @@ def end_steps(kind, method, chain, gravity, lanes, live):
         lifted = hold.lets_go(held, force.n, force.m)
         met = crossing.meets(start, now, 0.0, held, path, crossing.near(method, r1))
         good = (ratio <= 1.0) & (lanes.event[i] == 0)
-        fine = good & (not lifted) & (not met)
-        happened = select(lifted, LIFTED, 0) | select(met, MET, 0)
+        leaves = is_beyond(lanes.period, r1)
+        fine = good & (not lifted) & (not met) & (not leaves)
+        happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
         lanes.event[i] |= select(good, happened, 0)
         lanes.unsolved[i] = fine
         # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be

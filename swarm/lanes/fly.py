@@ -8,6 +8,7 @@ from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fold import Field
 from ..surfaces.moving import Marched, Strided, at
+from ..surfaces.period import cut
 from .arrays import EIGHT, LEFT, R, V, lane_of
 from .seek import hit_of_lane, seek
 
@@ -117,7 +118,7 @@ def _flight(method, chain, gravity, lanes, i, hit):
     """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lane_of(method, lanes.rows, i)
     if methods.lands(method):
-        end = methods.land(method, chain, gravity, lane, hit)
+        end = methods.land(method, chain, gravity, lane, cut(lanes.period, gravity, lane.r, lane.v, hit))
     else:
         end = methods.flight(method, chain, gravity, lane)
     put_end(lanes, i, end)

@@ -17,6 +17,7 @@ from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
+from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
@@ -172,6 +173,7 @@ def careful_block(method, chain, gravity, share):
         if following == stop:
             return Status.DONE.value, 0, drawn
         _step(method, chain, gravity, share, following)
+        return_particle(share.state.period, chain, share.state, following)
         contacts = share.state.contacts
         closed = _have_closed(chain, method, column(share.state.position, 0, following), contacts.left[following])
         if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:

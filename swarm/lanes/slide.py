@@ -21,11 +21,13 @@ from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
+from ..surfaces.period import part_until
 from .arrays import LANES, following_particle, speed2_scale, with_distances
 from .compose import (
     CUT,
     FAILED,
     KEEP,
+    LEAVES,
     LEFT,
     LIFTED,
     MET,
@@ -55,6 +57,7 @@ from .compose import (
     work,
 )  # fmt: skip
 from .stay import phase_of, stay
+from .wrap import return_particle, return_sliding
 
 # Times that a step is cut before the lane is given up: it takes four or so.
 _MOST_TRIALS = 100
@@ -92,6 +95,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
+            phase = return_sliding(lanes.period, chain, share.state, lanes, i, phase)
             if phase != phase_of(kind):
                 _retire(kind, moving, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
@@ -211,6 +215,7 @@ def _retire(kind, moving, chain, share, lanes, i, phase):
     contacts.left[p] = rows[LEFT, i] if phase != ARRIVED else 0.0
     contacts.step[p] = rows[STEP, i] if slid else 0.0
     contacts.keep[p] = keep
+    return_particle(lanes.period, chain, share.state, p)
     share.phase[p] = phase
     share.pending[phase] += 1
 
@@ -257,6 +262,9 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
             put(rows, R, i, walls.settle(at(chain, rows[LEFT, i]), met.wall, r))
             return EVENT
         cut = min(cut, met.time)
+    if event & LEAVES:
+        path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
+        cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(kind, method, chain, gravity, state, lanes, i)

@@ -48,6 +48,10 @@ class Method:
         """Whether a particle outside its walls by more than round-off is an error rather than wall compliance."""
         return False
 
+    def knows_period(self) -> bool:
+        """Whether its flights end where a particle leaves a cell that repeats, and its contacts do not move."""
+        return False
+
     def has_multipliers(self) -> bool:
         """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
         return False

@@ -98,6 +98,9 @@ class Impact(base.Method):
     def time_of_impact(self) -> float:
         return self.contact_step
 
+    def knows_period(self) -> bool:
+        return self.contact_step == 0.0
+
     def is_rigid(self) -> bool:
         return True
 

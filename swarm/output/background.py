@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..particles import State
-from .layout import COUNTS, PARTS
+from .layout import COUNTS, IMAGES, PARTS
 from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
@@ -22,8 +22,8 @@ _PATIENCE = 0.05
 # memory. With very many particles there is one, which is written while the next is computed.
 _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
-# What is copied of a state, for the writers, and its bytes a particle.
-_COPIED, _PARTICLE = (*PARTS, COUNTS), 56
+# What is copied of a state, for the writers, as far as it is there, and its bytes a particle.
+_COPIED, _PARTICLE = (*PARTS, COUNTS, IMAGES), 80
 
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
@@ -70,7 +70,11 @@ class Several:
 
 
 def _some(state: State, kept: slice) -> State:
-    return state._replace(**{name: getattr(state, name)[..., kept] for name in _COPIED})
+    return state._replace(**{name: getattr(state, name)[..., kept] for name in _copied(state)})
+
+
+def _copied(state: State) -> list[str]:
+    return [name for name in _COPIED if getattr(state, name) is not None]
 
 
 class Background:
@@ -120,8 +124,8 @@ class Background:
             raise self._problem
         some = _some(state, self._kept)
         if copy is None:
-            copy = some._replace(**{name: np.empty_like(getattr(some, name)) for name in _COPIED})
-        for name in _COPIED:
+            copy = some._replace(**{name: np.empty_like(getattr(some, name)) for name in _copied(some)})
+        for name in _copied(some):
             np.copyto(getattr(copy, name), getattr(some, name))
         self._frames.put((number, moment, copy, seen))
 

@@ -86,7 +86,9 @@ def _one_line(value: Any) -> str:
 def digest_of(particles: Particles, body: str = "") -> str:
     """A digest that identifies particles, or the points of bodies together with the text of the body."""
     digest = hashlib.sha256(body.encode())
-    for array in (particles.position, particles.velocity, particles.mass):
+    for array in (particles.position, particles.velocity, particles.mass, particles.image):
+        if array is None:
+            continue
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]
 

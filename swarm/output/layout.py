@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 PARTS = ("position", "velocity")
 # The impacts of each particle, beside these; files of older versions have none.
 COUNTS = "impacts"
+# The cells that each particle has come through, where the scene repeats.
+IMAGES = "image"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
@@ -70,6 +72,8 @@ def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
     for name in PARTS:
         _require_fits(_dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
+    if f"particles/all/{IMAGES}" in file:
+        _require_fits(_dataset(file, f"particles/all/{IMAGES}/value", _INTEGER, (n, len(kept), 3)), n, path)
     if f"particles/all/{COUNTS}" in file:
         _require_fits(_dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
 

@@ -1,8 +1,9 @@
 """Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read on demand.
 
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
-start; particles/all/{mass,id} (N,); observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as
-TOML text, parameters/particles, the number that were run, parameters/start, a digest of them at the start, and
+start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3);
+particles/all/{mass,id} (N,); observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML
+text, parameters/particles, the number that were run, parameters/start, a digest of them at the start, and
 parameters/seed, of thermal walls. Of bodies: parameters/body, the table of one as TOML text, parameters/copies, their
 number n, and connectivity/bonds (B n, 2); point p of copy i is particle p n + i. All elements share one step and one
 time dataset by hard links. writer.py writes it.
@@ -136,7 +137,8 @@ class Trajectory:
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
             position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
-            return Particles(position, velocity, everything["mass"][()])
+            image = everything[f"{layout.IMAGES}/value"][k].T if layout.IMAGES in everything else None
+            return Particles(position, velocity, everything["mass"][()], image)
 
     def bodies(self, k: int) -> "Bodies":
         """The bodies at frame k; negative k count from the end.
@@ -261,7 +263,7 @@ class Trajectory:
             own = any(surface["kind"] == "own" for surface in surfaces)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
-            return tables.scene_of(surfaces, table.get("gravity"))
+            return tables.scene_of(surfaces, table.get("gravity"), table.get("period"))
 
     @property
     def method(self) -> Method:

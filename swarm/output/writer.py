@@ -23,7 +23,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import paths, superblock
-from .layout import COUNTS, PARTS
+from .layout import COUNTS, IMAGES, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -73,6 +73,7 @@ class TrajectoryWriter:
         self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
         self._identity, self._following = identity, following
         self._part = path if following else paths.part_of(path)
+        self._edges: Any = None
 
     def __enter__(self) -> WriteFrames:
         self._size, self._block = 0, b""
@@ -143,7 +144,11 @@ class TrajectoryWriter:
             return
         everything = file.create_group("particles/all")
         box = everything.create_group("box")
-        box.attrs["dimension"], box.attrs["boundary"] = 3, ["none"] * 3
+        repeats = self._scene.period
+        box.attrs["dimension"] = 3
+        box.attrs["boundary"] = ["periodic" if length else "none" for length in repeats or (None,) * 3]
+        if repeats is not None:
+            self._edges = self._element("particles/all/box/edges", (3,), np.float64, (1024, 3))
         everything["mass"] = self._mass
         everything["id"] = np.arange(self._count)[self._storage.kept()]
         if self._bodies is not None:
@@ -157,6 +162,10 @@ class TrajectoryWriter:
             self._values[name] = self._element(
                 f"particles/all/{name}", (n, 3), self._storage.precision, (deep, min(n, _CHUNK[1]), 3), **options,
             )  # fmt: skip
+        if repeats is not None:
+            self._values[IMAGES] = self._element(
+                f"particles/all/{IMAGES}", (n, 3), np.int64, (deep, min(n, _CHUNK[1]), 3), **options
+            )
         self._values[COUNTS] = self._element(
             f"particles/all/{COUNTS}", (n,), np.int64, (deep, min(n, _CHUNK[1])), **options
         )
@@ -164,7 +173,8 @@ class TrajectoryWriter:
     def _open(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
-        kept = [name for name in (*PARTS, COUNTS) if f"particles/all/{name}" in self._file]
+        kept = [name for name in (*PARTS, IMAGES, COUNTS) if f"particles/all/{name}" in self._file]
+        self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (
             {name: self._file[f"{group}/{name}/value"] for name in names} for group, names in groups.items()
@@ -205,6 +215,8 @@ class TrajectoryWriter:
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
                 _put(dataset, first, parts if name == COUNTS else rows(parts, dataset.dtype))
+            if self._edges is not None:
+                _put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():
                 _put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
             self._file.flush()
@@ -279,6 +291,15 @@ def rows(frames: list[NDArray[Any]], dtype: DTypeLike) -> NDArray[Any]:
         for axis in range(3):
             row[:, axis] = frame[axis]
     return out
+
+
+def _edges_of(scene: Scene) -> list[float]:
+    """The lengths of the cell; where it does not repeat that of the volume, or where this is open of the surfaces."""
+    low, high = scene.bounds()
+    return [
+        length or (b - a if np.isfinite(b - a) else 2.0 * scene.extent())
+        for length, a, b in zip(scene.period or (None,) * 3, low, high, strict=True)
+    ]
 
 
 def _descriptor_of(file: h5py.File) -> int:

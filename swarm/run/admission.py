@@ -38,7 +38,8 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
         )
     # The arrays of Particles may have been changed since it checked them.
-    particles = particles.copy()
+    particles = _in_the_cell(scene, particles.copy())
+    _require_period(scene, method)
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled(scene.surfaces)
@@ -56,6 +57,11 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
     """A run of bodies, checked."""
     _require_method_of_bodies(scene, bodies, method, options)
+    if scene.period is not None:
+        raise SceneError(
+            f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
+            "particles, or a vessel without a period"
+        )
     for i, surface in enumerate(scene.surfaces):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
@@ -159,6 +165,29 @@ def _lead(bodies: Bodies) -> None:
     for k, (_point, surface) in enumerate(body.guides):
         if surface.friction > 0.0:
             raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
+
+
+def _in_the_cell(scene: Scene, particles: Particles) -> Particles:
+    """The particles, with their positions in the cell and their images where the scene repeats."""
+    if scene.period is None:
+        if particles.image is not None:
+            raise SceneError(
+                "particles.image must be None where the scene has no period, got images; set it to None, or give the "
+                "scene the period that they are of"
+            )
+        return particles
+    particles.position, images = scene.wrapped(particles.position)
+    particles.image = images if particles.image is None else images + particles.image
+    return particles
+
+
+def _require_period(scene: Scene, method: Method) -> None:
+    """Raise a `SceneError` where a method does not know that the scene repeats."""
+    if scene.period is not None and not method.knows_period():
+        raise SceneError(
+            f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
+            f"{scene.period}; use Impact() with contact_step = 0"
+        )
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

@@ -21,6 +21,7 @@ from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
+from ..surfaces.period import Period
 from . import failures
 from .tiers import Tier
 from .waiting import result_of
@@ -66,6 +67,8 @@ class Run:
             _no_sweeps(n) if method.has_multipliers() else None,
             _no_contacts(len(self._owners), n) if method.may_slide() else None,
             None if laws is None or laws.thermal is None else np.zeros((len(self._owners), n)),
+            particles.image,
+            *_cell(scene, n),
         )
         self._scene, self._method = scene, method
         self._numbers, self._law = method.numbers(scene), method.law()
@@ -160,7 +163,7 @@ class Run:
         try:
             mine = self._lanes.pop()
         except IndexError:
-            mine = lanes.empty(len(self._owners), self._booked)
+            mine = lanes.empty(len(self._owners), self._booked, self.state.period)
         if not self._kinds:
             end = self._part(span, draws, mine)
         else:
@@ -264,7 +267,8 @@ class Run:
                 self._gravity,
                 share,
             )
-        return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, compose.empty())
+        mine = compose.empty(self.state.period)
+        return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, mine)
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
@@ -272,7 +276,7 @@ class Run:
 
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
-        draws, mine = self._drawing(), lanes.empty(len(self._owners), self._booked)
+        draws, mine = self._drawing(), lanes.empty(len(self._owners), self._booked, self.state.period)
         share = self._shared(0.0, draws)
         yield blocks.advance_block, self._flying(share, mine)
         for phase in self._kinds:
@@ -300,7 +304,7 @@ class Run:
         arrays: dict[str, NDArray[Any]] = {"phase": self._phase, **_named("halted", self._halted)}
         for name, array in self.state._asdict().items():
             arrays |= _named(name, array) if isinstance(array, (Contacts, Multipliers)) else {name: array}
-        return {name: array for name, array in arrays.items() if array is not None}
+        return {name: array for name, array in arrays.items() if isinstance(array, np.ndarray)}
 
     def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
         """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
@@ -343,6 +347,12 @@ def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:
 def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
     """The arrays of a NamedTuple under dotted names."""
     return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
+
+
+def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | None]:
+    """What the state needs besides images where a scene repeats."""
+    period = scene.cell()
+    return None if period is None or period.fall is None else np.zeros(n), period
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:

@@ -22,7 +22,8 @@ _ENDLESS = 1e200
 _BATCH = 4_000_000
 
 
-Reaches = Callable[[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
+Floats = NDArray[np.float64]
+Reaches = Callable[[NDArray[np.int64], Floats, Floats], NDArray[np.bool_]]
 
 
 class Grid(NamedTuple):
@@ -52,9 +53,19 @@ class Cell(NamedTuple):
 def cell_of(grid, r):
     """The `Cell` of a point."""
     n, d = grid.shape, r - grid.low
-    x, y, z = np.floor(d.x * grid.inverse.x), np.floor(d.y * grid.inverse.y), np.floor(d.z * grid.inverse.z)
+    x = _place(d.x, grid.inverse.x, n.x)
+    y = _place(d.y, grid.inverse.y, n.y)
+    z = _place(d.z, grid.inverse.z, n.z)
     inside = (x >= 0.0) & (x < n.x) & (y >= 0.0) & (y < n.y) & (z >= 0.0) & (z < n.z)
     return Cell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
+
+
+@inlined
+def _place(d, inverse, count):
+    """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther."""
+    place = d * inverse
+    low, high = (place < 0.0) & (place >= -0.5 * _MARGIN), (place >= count) & (place < count + 0.5 * _MARGIN)
+    return select(low, 0.0, select(high, count - 1.0, np.floor(place)))
 
 
 class Block(NamedTuple):
@@ -150,15 +161,16 @@ def _(gravity, axis, cells, place, x, v):
 # --- How it is made --------------------------------------------------------------------------------------
 
 
-def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reaches) -> Grid:
+def grid_of(low: Floats, high: Floats, reaches: Reaches, repeated: tuple[Floats, Floats] | None = None) -> Grid:
     """The grid of bodies with these bounds (3, n).
 
     Args:
         low: lowest corner of the bounds of each body, infinite where it has no end [m].
         high: highest corner.
+        repeated: the corners (3,) of the cell of the scene that repeats, infinite where it does not; None: none does.
         reaches: which of so many bodies may have a point in common with the boxes that have these corners (3, pairs).
     """
-    corner, shape, width = _cells(low, high)
+    corner, shape, width = _cells(low, high, repeated)
     margin = _MARGIN * width
     last = shape.astype(np.int64) - 1
     begins, ends = (
@@ -182,18 +194,25 @@ def grid_of(low: NDArray[np.float64], high: NDArray[np.float64], reaches: Reache
     return Grid(low_corner, wide, inverse, room, cells_along, first, of_body[order])
 
 
-def _cells(
-    low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
     """The corner of the grid, how many cells it has along each axis, and how wide they are."""
-    first, last = low.min(axis=1), high.max(axis=1)
+    first, last, bodies = low.min(axis=1), high.max(axis=1), low.shape[1]
+    if repeated is not None:
+        # Cells begin and end at the faces.
+        first, last = np.maximum(first, repeated[0]), np.minimum(last, repeated[1])
+        middle = 0.5 * (low + high)
+        bodies = (
+            ((middle >= repeated[0][:, None]) & (middle < repeated[1][:, None]) | np.isnan(middle)).all(axis=0).sum()
+        )
     endless = ~((first > -0.5 * _ENDLESS) & (last < 0.5 * _ENDLESS))
     extent = np.where(endless, 1.0, last - first)
-    each = extent[~endless].prod() / (_CELLS_EACH * low.shape[1])
+    each = extent[~endless].prod() / (_CELLS_EACH * max(1, bodies))
     side = each ** (1.0 / max(1, (~endless).sum()))
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
     room = 4.0 * _MARGIN * extent
+    if repeated is not None:
+        room = np.where(np.isfinite(repeated[0]), 0.0, room)
     width = np.where(endless, _ENDLESS, (extent + 2.0 * room) / shape)
     return np.where(endless, -0.5 * _ENDLESS, first - room), shape, width
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields, replace
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +27,10 @@ _BODY, _FEW = 300, 1_000_000
 class Many(Surface):
     """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
 
+    centers: Any
+    # The corners of the cell that repeats, in a scene in which one does.
+    repeated: ClassVar[tuple[Floats, Floats] | None] = None
+
     def __post_init__(self) -> None:
         super().__post_init__()
         side, name = getattr(self, "side", "outside"), type(self).__name__
@@ -36,7 +41,7 @@ class Many(Surface):
                 raise SceneError(f"{what} must be None for {name}, got {getattr(self, what)!r}")
 
     def __len__(self) -> int:
-        return len(self.centers)  # type: ignore[attr-defined]
+        return len(self.centers)
 
     def __repr__(self) -> str:
         """Their kind and number, and the laws of their wall."""
@@ -63,10 +68,22 @@ class Many(Surface):
         """Every body as a surface of its own."""
         raise NotImplementedError
 
+    def corners(self) -> tuple[Floats, Floats]:
+        """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""
+        return _corners_of(self.solids())
+
+    def images(self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats]) -> "Many":
+        """A field of these bodies, at other places, for a cell with these corners that repeats."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        taken: dict[str, Any] = {name: value[which] for name, value in given.items() if isinstance(value, np.ndarray)}
+        made = replace(self, **{**taken, "centers": centers})
+        object.__setattr__(made, "repeated", repeated)
+        return made
+
     @cached_property
     def members(self) -> Members:
         """What kernels take."""
-        return members_of(self.solids())
+        return members_of(self.solids(), self.repeated)
 
     def walls(self) -> tuple[Members]:
         return (self.members,)
@@ -99,13 +116,16 @@ class Many(Surface):
         return found.reshape(4, *np.shape(rows.x))
 
 
-def members_of(surfaces: Sequence[Surface]) -> Members:
-    """Solid surfaces of one kind as one field."""
+def members_of(surfaces: Sequence[Surface], repeated: tuple[Floats, Floats] | None) -> Members:
+    """Solid surfaces of one kind as one field; in a scene whose cell repeats, with the corners of that."""
     bodies = alike([surface.walls()[0] for surface in surfaces])
-    # The bounds of a body are those of its cavity.
+    return Members(bodies[0], table_of(bodies), grid_of(*_corners_of(surfaces), _may_reach, repeated))
+
+
+def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:
+    """The lowest and the highest corners of solids (3, n): those of their cavities."""
     boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
-    low, high = np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
-    return Members(bodies[0], table_of(bodies), grid_of(low, high, _may_reach))
+    return np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
 
 
 def _may_reach(bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:

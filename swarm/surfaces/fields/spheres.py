@@ -46,12 +46,14 @@ class Spheres(Many):
     def extent(self) -> float:
         return float((np.abs(self.centers).max(axis=1) + self.radii).max())
 
+    def corners(self) -> tuple[Floats, Floats]:
+        return self.centers.T - self.radii, self.centers.T + self.radii
+
     @cached_property
     def members(self) -> Members:
         """What kernels take."""
-        table, center = aligned(np.column_stack([self.centers, self.radii])), self.centers.T
-        grid = grid_of(center - self.radii, center + self.radii, self._reach)
-        return Members(gathered(_LIKE, table, 0, 0), table, grid)
+        table = aligned(np.column_stack([self.centers, self.radii]))
+        return Members(gathered(_LIKE, table, 0, 0), table, grid_of(*self.corners(), self._reach, self.repeated))
 
     def _reach(self, bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
         """Which of these balls have a point in common with the boxes that have these corners (3, pairs)."""
