@@ -526,10 +526,11 @@ LAYERS = [
     ["observables", "history"],
     ["lanes", "reacting"],
     ["methods"],
-    ["scene", "particles"],
+    ["scene"],
+    ["particles"],
     ["contact"],
     ["surfaces"],
-    ["frames", "kernel", "motion"],
+    ["frames", "kernel", "motion", "rows"],
     ["checks", "columns", "extras"],
     ["status", "errors", "version", "interrupt"],
 ]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from conftest import SURFACES, scene_of
 
-from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill, scene
+from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
+from swarm.surfaces import contract, polyhedron
 
 
 def cube(half=1.0):
@@ -147,10 +147,18 @@ def test_size_by_hand(surfaces, size):
 
 
 def test_more_walls_than_can_be_compiled_are_refused():
-    balls = [Sphere(0.01, (x, y, 0.0), side="outside") for x in (-0.2, 0.0, 0.2) for y in np.linspace(-0.3, 0.3, 7)]
-    assert len(Scene([Box((0.5, 0.5, 0.5)), *balls]).owners()) == 24
+    around = [Plane((math.cos(a), math.sin(a), 0.0), 0.4) for a in np.linspace(0.0, 6.0, 21)]
+    assert len(Scene([Box((0.5, 0.5, 0.5)), *around]).owners()) == 24
     with pytest.raises(SceneError, match=r"at most 24 walls in all, got 45 of 43 surfaces: each wall is compiled"):
-        Scene([Box((0.5, 0.5, 0.5)), *balls, *balls])
+        Scene([Box((0.5, 0.5, 0.5)), *around, *around])
+
+
+def test_any_number_of_solids_of_one_kind_are_a_scene():
+    balls = [Sphere(0.01, (x, y, 0.0), side="outside") for x in (-0.2, 0.0, 0.2) for y in np.linspace(-0.3, 0.3, 9)]
+    scene = Scene([Box((0.5, 0.5, 0.5)), *balls])
+    assert len(scene.owners()) == 30
+    with pytest.raises(SceneError, match=r"at most 24 walls in all with Verlet, got 30 of 28 surfaces"):
+        scene.apart("Verlet")
 
 
 # --- Laws of walls ---------------------------------------------------------------------------------------
@@ -211,7 +219,7 @@ def test_a_cone_that_is_a_plane_to_round_off_is_refused():
 
 def test_many_planes_have_the_bounds_of_their_corners(monkeypatch):
     """More triples of planes than are intersected at once, against one corner after the other."""
-    monkeypatch.setattr(scene, "_TRIPLES", 100)
+    monkeypatch.setattr(polyhedron, "_TRIPLES", 100)
     normals = np.random.default_rng(2).normal(size=(24, 3))
     normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
     corners = [np.linalg.solve(normals[list(three)], np.ones(3)) for three in itertools.combinations(range(24), 3)]

@@ -277,6 +277,14 @@ def _(chain, impulse, row, lane, wall, given):
     _add_to(chain.rest, impulse, row + 1, lane, select(wall < count, -1.0, wall - count), given)
 
 
+@_add_to.register(walls.Listed)
+def _(chain, impulse, row, lane, wall, given):
+    count = walls.count(chain.first)
+    here = (wall >= 0.0) & (wall < count)
+    impulse[index(row + int(select(here, wall, 0.0))), lane] += select(here, given, 0.0)
+    _add_to(chain.rest, impulse, row + int(count), lane, select(wall < count, -1.0, wall - count), given)
+
+
 @_add_to.register(Nothing)
 def _(chain, impulse, row, lane, wall, given):
     pass

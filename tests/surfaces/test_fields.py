@@ -1,15 +1,18 @@
 """Many bodies as one surface: the grid finds the first hit that a look at all of them finds, and none is missed."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
+import tomli_w
 
 import swarm
+from swarm import scene_file, tables
 from swarm.errors import SceneError
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import flights
+from swarm.surfaces import ALL_SURFACES, flights
 from swarm.surfaces.fields import grid as grids
 
 EPSILON = np.finfo(np.float64).eps
@@ -209,3 +212,58 @@ def test_other_methods_take_listed_solids_one_by_one():
     soft = swarm.simulate(scene, start, swarm.Penalty(1e-3, 1e6), until=0.5, compile="never")
     assert soft.observables["impulse"].shape[1] == 6
     assert soft.observables["energy_error"].max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_field_is_made_again_from_its_table(kind):
+    field = packing(kind, 20)
+    table = tomllib.loads(tomli_w.dumps(tables.table_of(field)))
+    again = tables.of_kind(table, "surface", ALL_SURFACES)
+    assert again.members.table.tobytes() == field.members.table.tobytes()
+    assert again.members.grid.entries.tobytes() == field.members.grid.entries.tobytes()
+
+
+COLUMNS = {
+    "spheres": "radius",
+    "cylinders": "radius,axis_x,axis_y,axis_z,length",
+    "capsules": "radius,length,axis_x,axis_y,axis_z",
+    "boxes": "half_x,half_y,half_z,q_w,q_x,q_y,q_z",
+    "ellipsoids": "a,b,c,q_w,q_x,q_y,q_z",
+}
+
+
+@pytest.mark.parametrize("kind", COLUMNS)
+def test_bodies_are_read_from_a_file(kind, tmp_path):
+    field = packing(kind, 20)
+    arrays = {name: getattr(field, name) for name in field.columns()}
+    rows = np.column_stack(list(arrays.values()))
+    header = ",".join(column for names in field.columns().values() for column in names)
+    assert set(header.split(",")) == {"x", "y", "z", *COLUMNS[kind].split(",")}
+    np.savetxt(tmp_path / "packing.csv", rows, fmt="%.17g", delimiter=",", header=header, comments="")
+    text = f"""
+[particles]
+count = 1
+speed = 1.0
+[[surface]]
+kind = "box"
+half_widths = [2.0, 2.0, 2.0]
+[[surface]]
+kind = "{kind}"
+from = "packing.csv"
+friction = 0.1
+[method]
+kind = "impact"
+[run]
+until = 1.0
+"""
+    (tmp_path / "scene.toml").write_text(text)
+    read = scene_file.read(tmp_path / "scene.toml").scene.surfaces[1]
+    for name, values in arrays.items():
+        assert getattr(read, name).tobytes() == np.ascontiguousarray(values).tobytes()
+    (tmp_path / "scene.toml").write_text(text.replace("friction = 0.1", "centers = [[0, 0, 0]]"))
+    with pytest.raises(SceneError, match=r"surface\[1\].centers: cannot be combined with from = 'packing.csv'"):
+        scene_file.read(tmp_path / "scene.toml")
+    (tmp_path / "packing.csv").write_text("x,y,z\n0,0,0\n")
+    (tmp_path / "scene.toml").write_text(text)
+    with pytest.raises(SceneError, match=r"surface\[1\].from: .*packing.csv: expected the columns x, y, z, .*missing"):
+        scene_file.read(tmp_path / "scene.toml")

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ...rows import bodies, quaternions, widths
 from ..shapes.box import Box
 from ..surface import Surface
-from .many import Many, bodies, quaternions, widths
+from .many import Many
 
 
 @dataclass(frozen=True, repr=False, eq=False)

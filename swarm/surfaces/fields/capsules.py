@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ...rows import bodies, directions, lengths
 from ..shapes.capsule import Capsule
 from ..surface import Surface
-from .many import Many, bodies, directions, lengths
+from .many import Many
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ...rows import bodies, directions, lengths
 from ..shapes.cylinder import Cylinder
 from ..surface import Surface
-from .many import Many, bodies, directions, lengths
+from .many import Many
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...rows import bodies, lengths
 from ..shapes.sphere import SphereNumbers
 from .grid import grid_of
-from .many import Floats, Many, bodies, lengths
+from .many import Floats, Many
 from .members import Members, aligned, gathered
 
 
