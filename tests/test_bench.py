@@ -163,3 +163,9 @@ def test_motion_quick():
     told = printed("motion")
     for row in ("piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^4 kg", "box oscillating, an impact"):
         assert row in told
+
+
+def test_fields_quick():
+    told = printed("fields")
+    for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
+        assert row in told

@@ -18,6 +18,8 @@ from .members import Members, aligned, gathered
 class Spheres(Many):
     """Many solid balls, one surface; the space outside of all of them. They may overlap.
 
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
+
     Args:
         centers: (n, 3) [m], one row a ball.
         radii: (n,) or one number for all, above 0 [m].
