@@ -13,7 +13,8 @@ from .many import Many
 class Boxes(Many):
     """Many solid boxes, one surface; the space outside of all of them. They may overlap.
 
-    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, half_x, half_y, half_z and optionally q_w, q_x, q_y, q_z.
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, half_x, half_y, half_z
+    and optionally q_w, q_x, q_y, q_z.
 
     Args:
         centers: (n, 3) [m], one row a box.

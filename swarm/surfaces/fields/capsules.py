@@ -13,7 +13,8 @@ from .many import Many
 class Capsules(Many):
     """Many solid capsules, one surface; the space outside of all of them. They may overlap.
 
-    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius, length and optionally axis_x, axis_y, axis_z.
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius, length
+    and optionally axis_x, axis_y, axis_z.
 
     Args:
         centers: (n, 3) [m], one row a capsule.

@@ -13,7 +13,8 @@ from .many import Many
 class Cylinders(Many):
     """Many solid cylinders, endless or capped, one surface; the space outside of all of them. They may overlap.
 
-    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius and optionally axis_x, axis_y, axis_z, length.
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius
+    and optionally axis_x, axis_y, axis_z, length.
 
     Args:
         centers: (n, 3) [m], one row a cylinder.

@@ -13,7 +13,8 @@ from .many import Many
 class Ellipsoids(Many):
     """Many solid ellipsoids, one surface; the space outside of all of them. They may overlap.
 
-    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, a, b, c and optionally q_w, q_x, q_y, q_z.
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, a, b, c
+    and optionally q_w, q_x, q_y, q_z.
 
     Args:
         centers: (n, 3) [m], one row an ellipsoid.
