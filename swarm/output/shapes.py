@@ -93,7 +93,7 @@ def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Fl
     center, radius = spheres.centers[:, None, :], spheres.radii[:, None, None]
     vertices = (center + radius * normals).reshape(-1, 3)
     first = len(unit) * np.arange(len(spheres))[:, None, None]
-    angle = np.linspace(0.0, 2.0 * math.pi, _COARSE + 1)
+    angle = np.linspace(0.0, 2.0 * math.pi, 3 * _COARSE + 1)
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     some = slice(None, None, max(1, len(spheres) // _MOST_WIRES))
     circles = [np.roll(circle, k, axis=1) for k in range(3)]
