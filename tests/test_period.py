@@ -113,9 +113,9 @@ def test_what_turns_over_a_face_is_refused():
 
 
 def test_images_count_as_walls():
-    balls = [swarm.Sphere(0.01 * k, (0.0, 0.0, 0.0), "outside") for k in range(1, 5)]
+    rings = [swarm.Torus(0.02 * k, 0.01, (0.0, 0.0, 0.0), "outside") for k in range(1, 5)]
     with pytest.raises(swarm.SceneError, match="at most 24 walls in all, got 32 of 4 surfaces"):
-        swarm.Scene(balls, period=CELL)
+        swarm.Scene(rings, period=CELL)
 
 
 @pytest.mark.parametrize(
