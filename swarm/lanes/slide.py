@@ -257,7 +257,8 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     if event & MET:
         path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
         met = crossing.arrival(chain, 0.0, held, path, crossing.near(method, r), rows[LEFT, i])
-        if met.time == 0.0:
+        # At once, or so soon that the time left does not change.
+        if rows[LEFT, i] - met.time * h == rows[LEFT, i]:
             state.contacts.met[lanes.particle[i]] = met.wall
             put(rows, R, i, walls.settle(at(chain, rows[LEFT, i]), met.wall, r))
             return EVENT

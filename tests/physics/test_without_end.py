@@ -163,6 +163,22 @@ def test_friction_stops_a_grain_beyond_a_face():
     assert (result.particles.velocity == 0.0).all()
 
 
+def test_blows_against_a_ball_on_the_floor_become_weaker_and_end():
+    """Grains slide into an inelastic ball again and again; its next blow is sooner than the time can tell."""
+    walls = [
+        swarm.Plane(**FLOOR, friction=0.3, restitution=0.6), swarm.Plane(**CEILING),
+        swarm.Sphere(0.2, (0.0, 0.4, 0.15), "outside", restitution=0.6),
+    ]  # fmt: skip
+    scene = swarm.Scene(walls, (4.9, 0.0, -8.5), period=(1.0, 0.8, None))
+    start = swarm.fill(scene, 300, speed=0.5, seed=0)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=2.0, every=0.1, compile="always")
+    seen = result.observables
+    assert seen["sliding"][-1] > 250
+    assert seen["max_penetration"].max() <= 16.0 * EPSILON
+    balance = seen["total_energy"] + seen["dissipated_energy"]
+    np.testing.assert_allclose(balance, balance[0], rtol=1e-13)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_grain_slides_over_a_ball_in_a_face(friction):
     """The wall in the next cell is another number: as on the same ball in the middle of its cell."""
