@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .motion import Guide, Oscillation, Path, Rotation, Translation
+    from .output.impact_log import ImpactLog, load_impacts
     from .output.trajectory import Trajectory, load
     from .particles import Particles
     from .run.simulation import Result, simulate
@@ -62,6 +63,7 @@ _HOMES = {
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
     "motion": ("Guide", "Oscillation", "Path", "Rotation", "Translation"),
+    "output.impact_log": ("ImpactLog", "load_impacts"),
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -76,10 +78,11 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Quadric",
-    "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError",
-    "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__", "chain",
-    "contact_history", "dumbbell", "elastic", "fill", "load", "place", "rigid", "simulate", "tetrahedron",
+    "Impact", "ImpactLog", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty",
+    "Plane", "Quadric", "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain",
+    "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__",
+    "chain", "contact_history", "dumbbell", "elastic", "fill", "load", "load_impacts", "place", "rigid", "simulate",
+    "tetrahedron",
 ]  # fmt: skip
 
 

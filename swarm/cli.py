@@ -54,6 +54,9 @@ def run(  # noqa: PLR0913  one argument an option
     recording: Annotated[
         Path | None, typer.Option("--record", metavar="OUT.rrd", help="Recording for Rerun and swarm view.")
     ] = None,
+    impacts: Annotated[
+        Path | None, typer.Option("--impacts", metavar="OUT.h5", help="Log of every impact, for swarm.load_impacts.")
+    ] = None,
     live: Annotated[bool, typer.Option("--live", help="Show the run in a Rerun viewer.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
@@ -92,6 +95,7 @@ def run(  # noqa: PLR0913  one argument an option
                 job.run,
                 trajectory=target,
                 recording=recording or (None if resume else job.run.recording),
+                impacts=impacts or job.run.impacts,
                 live=live,
                 threads=job.run.threads if threads is None else threads,
                 progress=not quiet,
@@ -105,6 +109,8 @@ def run(  # noqa: PLR0913  one argument an option
             inputs = {"scene file": scene_file, "file of the start": job.start_file()}
             paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
             paths.check_target(target, overwrite or resume)
+            if options.impacts is not None:
+                paths.check_target(options.impacts, overwrite or resume, "impacts")
             if options.recording is not None:
                 paths.check_target(options.recording, overwrite, "recording")
             before, start = paths.identity(target), job.start()

@@ -198,6 +198,10 @@ class Scene:
         """The surface that each row of the chain belongs to, one for a field."""
         return [self._owner[i] for i in self.order.owners(self._pieces)]
 
+    def members(self) -> NDArray[np.int64]:
+        """Of each wall of the chain its surface, and its number in the field that this is or -1: (2, walls)."""
+        return np.array([(self._owner[i], member) for i, member in self.order.members(self._pieces)]).T
+
     @cached_property
     def _pieces(self) -> tuple[Surface, ...]:
         """The surfaces, and the images of those that reach over a face of the cell."""

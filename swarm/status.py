@@ -15,6 +15,7 @@ class Status(IntEnum):
     TOO_FAST = 6
     HARD_CONTACT = 7
     LEASE_ENDED = 8
+    LOG_FULL = 9
 
     @property
     def sentence(self) -> str:
@@ -33,4 +34,5 @@ _SENTENCES = {
     Status.NOT_FINITE: "position or velocity are no longer finite numbers",
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
+    Status.LOG_FULL: "the log of impacts needs an empty part",
 }

@@ -47,6 +47,7 @@ class Lanes(NamedTuple):
     order: Array  # int64, the lanes that are marked
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
     period: Any = None  # the cell where it repeats
+    before: Any = None  # what a lane is before its contact, for the log of impacts, where there is one
 
 
 class Halted(NamedTuple):
@@ -84,6 +85,7 @@ class Share(NamedTuple):
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
     seed: int  # of random numbers
+    log: Any = None  # `log.Log` of impacts
 
 
 def empty(walls: int, rows: int, period: Any = None) -> Lanes:

@@ -20,6 +20,7 @@ from ..particles import Contacts
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
+from . import log as impact_log
 from .arrays import (
     HITS,
     LANES,
@@ -66,9 +67,10 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and `lanes.left_behind` has what these held,
     which the next call takes as `share.halted`. Particles that are done are left alone, and those that arrive become
     it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
+    LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
     lanes, state = with_distances(lanes), share.state
-    following, stop, drawn, live, passes = 0, 0, 0, 0, 0
+    following, stop, drawn, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
         following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
         if following == stop:
@@ -77,9 +79,9 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         following += 1
         live += 1
     while live > 0:
-        if passes >= share.halt[0]:
-            leave(lanes, live)
-            return Status.INTERRUPTED.value, live, drawn
+        status = _halts(share, lanes, following, stop, drawn, live, passes)
+        if status != Status.DONE.value:
+            return status, live, drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
         if some_hard or (methods.holds(method) and passes % _LOOK == 0):
@@ -102,6 +104,18 @@ def advance_block(method, chain, gravity, hard, share, lanes):
                 live -= 1
                 move(chain, lanes, live, lane)
     return Status.DONE.value, 0, drawn
+
+
+@inlined
+def _halts(share, lanes, following, stop, drawn, live, passes):
+    """Whether the call ends before the next pass."""
+    if passes >= share.halt[0]:
+        leave(lanes, live)
+        return Status.INTERRUPTED.value
+    if impact_log.is_full(share.log):
+        impact_log.keep_going(share.log, following, stop, drawn, live, passes)
+        return Status.LOG_FULL.value
+    return Status.DONE.value
 
 
 @outlined
@@ -153,6 +167,7 @@ def _pass(method, chain, gravity, share, lanes, live):
     return_lanes(lanes.period, share.state, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
+    impact_log.keep_before(share.log, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
@@ -160,7 +175,9 @@ def _pass(method, chain, gravity, share, lanes, live):
         here = methods.walls_of(method, chain, lane.left)
         contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
+        impact_log.note(share.log, lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
+    impact_log.add_rows(share.log, method, chain, share.state, lanes, live)
     return some_arrived, some_hard
 
 
@@ -187,6 +204,7 @@ def _(thermal, method, chain, gravity, share, lanes, live):
                 rows[OWN, i] = after
                 rows[HITS, i] += 1.0
                 lanes.impulse[walls.row(chain, wall), i] += left.impulse
+                impact_log.note(share.log, lanes, i, left.impulse)
                 # The contact is done, unless a wall at 0 K holds the particle.
                 lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 

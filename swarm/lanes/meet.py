@@ -15,6 +15,7 @@ from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
+from . import log as impact_log
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
 from .wrap import return_particle
@@ -29,12 +30,15 @@ _MOVED = 1e-9
 
 @kernel
 def meet_block(method, chain, gravity, share):
-    """Decide for the particles that a thread draws: (status, particle, drawn)."""
-    following, stop, drawn = 0, 0, 0
+    """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
+    following, stop, drawn, _live, _passes = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
         if following == stop:
             return Status.DONE.value, 0, drawn
+        if impact_log.is_full(share.log):
+            impact_log.keep_going(share.log, following, stop, drawn, 0, 0)
+            return Status.LOG_FULL.value, 0, drawn
         if not _decide(method, chain, gravity, share, following):
             return Status.STALLED.value, following, drawn
         following += 1
@@ -67,6 +71,8 @@ def _decide(method, chain, gravity, share, i):
     state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
     if found.impulse > 0.0:
         state.impacts[i] += 1
+        struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
+        impact_log.add_row(share.log, method, carried, state, i, struck)
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
     u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
@@ -109,6 +115,8 @@ def _(thermal, method, chain, gravity, share, i):
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
+    struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
+    impact_log.add_row(share.log, method, chain, state, i, struck)
     state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.phase[i] = FLYING

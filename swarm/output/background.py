@@ -1,6 +1,7 @@
 """Frames written in the background: by a thread that reads a short queue."""
 
 import contextlib
+import math
 import queue
 import threading
 import time
@@ -25,6 +26,7 @@ _BYTES = 1 << 26
 # What is copied of a state, for the writers, as far as it is there, and its bytes a particle.
 _COPIED, _PARTICLE = (*PARTS, COUNTS, IMAGES), 80
 
+Job = Callable[[], None]
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
@@ -87,8 +89,8 @@ class Background:
     def __init__(self, writer: Writer, n: int, kept: slice = slice(None)) -> None:
         self._writer, self._kept = writer, kept
         n = max(1, len(range(n)[kept]))
-        # An event is set when all frames before it are written; None is the end.
-        self._frames: queue.SimpleQueue[Written | threading.Event | None] = queue.SimpleQueue()
+        # An event is set when all frames before it are written, a function is called; None is the end.
+        self._frames: queue.SimpleQueue[Written | threading.Event | Job | None] = queue.SimpleQueue()
         # Bounds the other queue: a frame needs one of these copies.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
         copies = max(1, min(_COPIES, _BYTES // (_PARTICLE * n)))
@@ -129,6 +131,10 @@ class Background:
             np.copyto(getattr(copy, name), getattr(some, name))
         self._frames.put((number, moment, copy, seen))
 
+    def do(self, job: Job) -> None:
+        """Have the thread call a function, in its turn among the frames."""
+        self._frames.put(job)
+
     def drain(self) -> None:
         """Wait until every frame so far is on the disk."""
         written = threading.Event()
@@ -159,15 +165,25 @@ class Background:
     def _gather(self) -> tuple[list[Written], object]:
         """The next batch of frames, and what ended it: None is the end of the run."""
         frames: list[Written] = []
-        frame = self._frames.get()
-        latest = time.monotonic() + _PATIENCE
+        frame, latest = self._frames.get(), math.inf
         while frame is not None and not isinstance(frame, threading.Event):
-            frames.append(frame)
-            # Up to the end of a chunk, not across it: numbers count from 0.
-            if (frame[0] + 1) % self._at_once == 0:
-                return frames, True
+            if callable(frame):
+                self._call(frame)
+            else:
+                frames.append(frame)
+                latest = min(latest, time.monotonic() + _PATIENCE)
+                # Up to the end of a chunk, not across it: numbers count from 0.
+                if (frame[0] + 1) % self._at_once == 0:
+                    return frames, True
+            left = latest - time.monotonic()
             try:
-                frame = self._frames.get(timeout=max(0.0, latest - time.monotonic()))
+                frame = self._frames.get(timeout=max(0.0, left) if frames else None)
             except queue.Empty:
                 return frames, True
         return frames, frame
+
+    def _call(self, job: Job) -> None:
+        try:
+            job()
+        except BaseException as problem:  # the computing thread raises it
+            self._problem = self._problem or problem

@@ -43,6 +43,7 @@ class Job:
         following: time of the frame that is being computed [s], or None.
         wall_time: used so far [s].
         seed: of thermal walls.
+        kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
     """
 
     version: str
@@ -56,10 +57,12 @@ class Job:
     following: float | None = None
     wall_time: float = 0.0
     seed: int = 0
+    kept: str = ""
+    rows: int = 0
 
     def require_same(self, other: "Job", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
-        for name in ("particles", "method", "scene", "storage", "start", "seed", "version"):
+        for name in ("particles", "method", "scene", "storage", "start", "seed", "kept", "version"):
             mine, its = getattr(self, name), getattr(other, name)
             if mine != its:
                 raise SceneError(
@@ -74,6 +77,7 @@ _NAMES = {
     "storage": "trajectory keeps",
     "start": "particles at the start (seed, speed, mass, file, body) have the digest",
     "seed": "seed of thermal walls is",
+    "kept": "log of impacts keeps",
     "version": "version of swarm is",
 }
 

@@ -41,22 +41,22 @@ def frames(file: Any, path: Path) -> int:
     While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
     for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start", "body")):
-        if name in file and (h5py.check_string_dtype(_dataset(file, name).dtype) is None or file[name].shape != ()):
+        if name in file and (h5py.check_string_dtype(dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
     for name in ("parameters/seed", "parameters/copies"):
         if name in file:
-            _dataset(file, name, _INTEGER, ())
-    count = int(_dataset(file, "parameters/particles", _INTEGER, ())[()])
-    time = _dataset(file, "parameters/time", _REAL, (None,))
+            dataset(file, name, _INTEGER, ())
+    count = int(dataset(file, "parameters/particles", _INTEGER, ())[()])
+    time = dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])
-    _require_fits(time, n, path)
-    _dataset(file, "parameters/frame", _INTEGER, (n,))
+    require_fits(time, n, path)
+    dataset(file, "parameters/frame", _INTEGER, (n,))
     if "observables" in file:
         for name in file["observables"]:
-            value = _dataset(file, f"observables/{name}/value", _NUMBER)
+            value = dataset(file, f"observables/{name}/value", _NUMBER)
             if value.ndim not in (1, 2, 3) or value.shape[0] < n:
                 raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
-            _require_fits(value, n, path)
+            require_fits(value, n, path)
     if "particles/all" in file:
         _require_particles(file, n, count, path)
     return n
@@ -64,18 +64,18 @@ def frames(file: Any, path: Path) -> int:
 
 def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
     """Raise a ValueError if what is kept of the `count` particles in n frames is inconsistent."""
-    kept = _dataset(file, "particles/all/mass", _REAL, (None,))
+    kept = dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
         raise ValueError(f"particles/all/mass must have 1 to {count} entries, got {len(kept)}")
-    _require_fits(kept, len(kept), path)
-    if (ids := _dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
+    require_fits(kept, len(kept), path)
+    if (ids := dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
     for name in PARTS:
-        _require_fits(_dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
+        require_fits(dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
     if f"particles/all/{IMAGES}" in file:
-        _require_fits(_dataset(file, f"particles/all/{IMAGES}/value", _INTEGER, (n, len(kept), 3)), n, path)
+        require_fits(dataset(file, f"particles/all/{IMAGES}/value", _INTEGER, (n, len(kept), 3)), n, path)
     if f"particles/all/{COUNTS}" in file:
-        _require_fits(_dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
+        require_fits(dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
 
 
 def require_index(file: Any) -> None:
@@ -130,7 +130,7 @@ def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
             raise ValueError(f"expected {name} of the shape {shape}, got {came}")
 
 
-def _dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
+def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
     """A dataset of one of these kinds and of this shape; None is any length, and the first axis may be longer."""
     found = file[name]
     if not isinstance(found, h5py.Dataset) or found.shape is None:
@@ -148,7 +148,7 @@ def _dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | 
     return found
 
 
-def _require_fits(dataset: Any, rows: int, path: Path) -> None:
+def require_fits(dataset: Any, rows: int, path: Path) -> None:
     """Raise a ValueError if the file is too small for so many rows, before memory is allocated for them."""
     size, packed = path.stat().st_size, dataset.id.get_create_plist().get_nfilters() > 0
     wanted = rows * math.prod(dataset.shape[1:]) * dataset.dtype.itemsize

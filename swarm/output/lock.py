@@ -1,4 +1,4 @@
-"""Only one run writes a trajectory: the lock of a file beside it, which the system releases when a process ends."""
+"""Only one run writes a file: the lock of another beside it, which the system releases when a process ends."""
 
 import contextlib
 from collections.abc import Iterator
@@ -9,10 +9,10 @@ from . import paths
 
 
 @contextlib.contextmanager
-def only_writer(trajectory: Path) -> Iterator[None]:
-    """Hold the lock of a trajectory.
+def only_writer(target: Path, what: str = "trajectory") -> Iterator[None]:
+    """Hold the lock of a file that a run writes.
 
-    A file beside it is locked, since a lock on the trajectory itself would block readers. A lock file that is left by a
+    A file beside it is locked, since a lock on the file itself would block readers. A lock file that is left by a
     killed run blocks no later run.
 
     Raises:
@@ -20,19 +20,18 @@ def only_writer(trajectory: Path) -> Iterator[None]:
     """
     import filelock
 
-    path = paths.lock_of(trajectory)
+    path = paths.lock_of(target)
     lock = filelock.FileLock(path, blocking=False)
     try:
         lock.acquire()
     except filelock.Timeout as error:
         if not path.exists():  # filelock reports a file that cannot be created as locked
-            raise FileError(f"cannot write the trajectory {trajectory}: no file can be made in that folder") from error
+            raise FileError(f"cannot write the {what} {target}: no file can be made in that folder") from error
         raise FileError(
-            f"the trajectory {trajectory} is being written by another run; wait until that has ended, or choose "
-            "another name"
+            f"the {what} {target} is being written by another run; wait until that has ended, or choose another name"
         ) from error
     except OSError as error:
-        raise FileError(f"cannot write the trajectory {trajectory}: {error}") from error
+        raise FileError(f"cannot write the {what} {target}: {error}") from error
     try:
         yield
     finally:

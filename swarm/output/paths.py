@@ -33,9 +33,9 @@ def checkpoint_of(trajectory: Path) -> Path:
     return trajectory.with_name(trajectory.name + ".checkpoint")
 
 
-def lock_of(trajectory: Path) -> Path:
-    """The file whose lock a run holds while it writes a trajectory."""
-    return trajectory.with_name(f".{trajectory.name}.{_OURS}lock")
+def lock_of(path: Path) -> Path:
+    """The file whose lock a run holds while it writes another."""
+    return path.with_name(f".{path.name}.{_OURS}lock")
 
 
 def part_of(path: Path) -> Path:

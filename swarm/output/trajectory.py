@@ -9,37 +9,25 @@ number n, and connectivity/bonds (B n, 2); point p of copy i is particle p n + i
 time dataset by hard links. writer.py writes it.
 """
 
-import contextlib
 import functools
-import operator
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import tables
 from ..errors import SceneError
-from ..methods import Method
 from ..particles import Particles
-from ..scene import Scene
-from . import layout, paths, superblock
-from .sources import DAMAGE, DamagedError, reason, require_file
+from . import layout
+from .stored import Stored, finite, times_of, whole
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
     from ..bodies.state import Bodies
 
-_STILL_WRITTEN = "already open"
-# In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
-# another. The logging driver reads like the default one, logs nothing by default, and is rarely used.
-_DRIVER = "swarm"
 
-
-class Trajectory:
+class Trajectory(Stored):
     """A trajectory on disk, read on demand.
 
     Attributes:
@@ -54,9 +42,7 @@ class Trajectory:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = paths.given("path", path)
-        require_file(self.path, "a trajectory (.h5)")
-        self._file = _opened(self.path)
+        super().__init__(path, "a trajectory (.h5)", "swarm.load")
         try:
             with self._reading("its structure") as file:
                 foreign = layout.missing(file)
@@ -67,28 +53,6 @@ class Trajectory:
             self.close()
             raise
 
-    def __enter__(self) -> "Trajectory":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    @contextlib.contextmanager
-    def _reading(self, what: str) -> Iterator[Any]:
-        """The open file, for reading `what`; an error in that means that the file is damaged, and is a SceneError."""
-        if not self._file:
-            raise SceneError(f"{self.path} is closed; open it again with swarm.load")
-        try:
-            yield self._file
-        except DamagedError:
-            raise
-        except DAMAGE as error:
-            raise DamagedError(f"{self.path} is damaged: {what}: {reason(error)}") from error
-
     def __len__(self) -> int:
         """Number of complete frames."""
         with self._reading("its frames"):
@@ -98,10 +62,7 @@ class Trajectory:
     def times(self) -> NDArray[np.float64]:
         """Times of the frames [s]."""
         with self._reading("its times") as file:
-            times = _finite(file["parameters/time"][: self._frames])
-            if (np.diff(times) <= 0.0).any():
-                raise ValueError(f"frame {int((np.diff(times) <= 0.0).argmax()) + 1} is not after the one before it")
-        return times
+            return times_of(file, "parameters/time", self._frames)
 
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
@@ -111,7 +72,7 @@ class Trajectory:
             group = file.get("observables", {})
             for name in group:
                 with self._reading(f"its observable {name}"):
-                    seen[name] = _finite(group[name]["value"][: self._frames])
+                    seen[name] = finite(group[name]["value"][: self._frames])
         return seen
 
     def observed(self) -> dict[str, NDArray[Any]]:
@@ -177,7 +138,7 @@ class Trajectory:
 
     def _number(self, k: int) -> int:
         """The number of a frame whose particles are kept, from 0 on."""
-        k, n = _whole(f"{self.path}: frame", k), len(self)
+        k, n = whole(f"{self.path}: frame", k), len(self)
         self.require_frames()
         if not -n <= k < n:
             raise SceneError(f"{self.path}: frame must lie between {-n} and {n - 1}, got {k}")
@@ -186,7 +147,7 @@ class Trajectory:
 
     def particle(self, i: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """The path of particle i: its positions and velocities, (3, frames) each."""
-        i = _whole(f"{self.path}: particle", i)
+        i = whole(f"{self.path}: particle", i)
         self._require_particles()
         with self._reading("the numbers of its particles") as file:
             ids = file["particles/all/id"][()]
@@ -200,7 +161,7 @@ class Trajectory:
             )
         with self._reading(f"particle {i}") as file:
             position, velocity = (
-                _finite(file[f"particles/all/{name}/value"][: self._frames, column]).T for name in layout.PARTS
+                finite(file[f"particles/all/{name}/value"][: self._frames, column]).T for name in layout.PARTS
             )
         return position, velocity
 
@@ -209,12 +170,6 @@ class Trajectory:
             kept = "particles/all" in file
         if not kept:
             raise SceneError(f'{self.path} keeps no particles: it was run with frames = "none"')
-
-    @property
-    def count(self) -> int:
-        """Number of particles, or of points of bodies, that were run; a frame may keep fewer."""
-        with self._reading("its number of particles") as file:
-            return int(file["parameters/particles"][()])
 
     @functools.cached_property
     def body(self) -> "Body | None":
@@ -242,89 +197,11 @@ class Trajectory:
         return {name: self._text(name) for name in ("scene", "method", "storage")}
 
     @property
-    def start(self) -> str:
-        """A digest of the particles at the start; "" if the file has none."""
-        with self._reading("its start") as file:
-            stored = "parameters/start" in file
-        return self._text("start") if stored else ""
-
-    @property
-    def seed(self) -> int:
-        """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
-        with self._reading("its seed") as file:
-            return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
-
-    @property
-    def scene(self) -> Scene:
-        """The scene that was run."""
-        with self._reading("its scene"):
-            table = tomllib.loads(self._text("scene"))
-            surfaces = table["surface"]
-            own = any(surface["kind"] == "own" for surface in surfaces)
-        # An OwnSurface is not damage: the error says that no file holds it.
-        with contextlib.nullcontext() if own else self._reading("its scene"):
-            return tables.scene_of(surfaces, table.get("gravity"), table.get("period"))
-
-    @property
-    def method(self) -> Method:
-        """The method that was run."""
-        with self._reading("its method"):
-            return tables.method_of(tomllib.loads(self._text("method")))
-
-    @property
     def scene_text(self) -> str | None:
         """The scene file that was run."""
         with self._reading("its scene file") as file:
             stored = "parameters/scene_file" in file
         return self._text("scene_file") if stored else None
-
-    def _text(self, name: str) -> str:
-        with self._reading(f"its {name.replace('_', ' ')}") as file:
-            return layout.text(file[f"parameters/{name}"], self.path)
-
-
-def _opened(path: Path) -> h5py.File:
-    # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
-    # Without locking, a file that is still being written can be read.
-    options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
-    try:
-        try:
-            return h5py.File(path, "r", driver=_DRIVER, **options)
-        except OSError as error:
-            if _STILL_WRITTEN not in str(error):
-                raise
-            # Its writer has marked it and not yet cleared the mark, or was killed in between.
-            return h5py.File(superblock.Unmarked(path), "r", **options)
-    except DAMAGE as error:
-        if "signature not found" in str(error):
-            raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
-        if getattr(error, "errno", None):
-            raise SceneError(f"cannot read {path}: {reason(error)}") from error
-        raise DamagedError(f"{path} is damaged: {reason(error)}") from error
-
-
-def _own_driver(plist: Any, **_options: Any) -> None:
-    plist.set_fapl_log(b"", 0, 0)
-
-
-h5py.register_driver(_DRIVER, _own_driver)
-
-
-def _finite(values: Any) -> NDArray[Any]:
-    """The values, if they are finite: no run writes an infinity or a NaN."""
-    wrong = ~np.isfinite(values)
-    if wrong.any():
-        raise ValueError(f"expected finite numbers, got {values[wrong][0]:g} at frame {int(np.argwhere(wrong)[0, 0])}")
-    return np.asarray(values)
-
-
-def _whole(name: str, value: Any) -> int:
-    try:
-        if isinstance(value, (bool, np.bool_)):
-            raise TypeError
-        return operator.index(value)
-    except TypeError:
-        raise SceneError(f"{name} must be a whole number, got {value!r}") from None
 
 
 def load(path: str | Path) -> Trajectory:

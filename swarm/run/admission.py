@@ -29,6 +29,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         if not isinstance(value, allowed):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     if isinstance(particles, Bodies):
+        _require_no_log("of particles, not of bodies, whose points meet walls together", options)
         return _task_of_bodies(scene.apart("bodies"), particles.copy(), method, options)
     if not isinstance(method, Impact) or method.contact_step > 0.0:
         name = "a contact_step" if isinstance(method, Impact) else type(method).__name__
@@ -37,6 +38,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         raise SceneError(
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
         )
+    _require_instants(scene, particles, method, options)
     # The arrays of Particles may have been changed since it checked them.
     particles = _in_the_cell(scene, particles.copy())
     _require_period(scene, method)
@@ -188,6 +190,26 @@ def _require_period(scene: Scene, method: Method) -> None:
             f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
             f"{scene.period}; use Impact() with contact_step = 0"
         )
+
+
+def _require_instants(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
+    """Raise a `SceneError` where a log of impacts is asked for and cannot be, or of particles that are not there."""
+    if not isinstance(method, Impact):
+        _require_no_log(
+            f"of Impact, whose impacts have an instant, not of {type(method).__name__}; use Impact", options
+        )
+    if scene.reacts():
+        _require_no_log("of walls that impacts do not move; give them a motion instead of a mass", options)
+    numbers = options.impact_particles
+    if isinstance(numbers, tuple) and numbers[-1] >= len(particles):
+        raise SceneError(
+            f"impact_particles must be numbers of particles, from 0 to {len(particles) - 1}, got {numbers[-1]}"
+        )
+
+
+def _require_no_log(instead: str, options: RunOptions) -> None:
+    if options.impacts is not None:
+        raise SceneError(f"impacts must be None here, a log of impacts is {instead}; got {options.impacts}")
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

@@ -16,13 +16,15 @@ from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import compose, meet, slide
+from ..lanes import log as impact_log
 from ..lanes.arrays import booked
 from ..methods.base import Method
-from ..particles import Contacts, Multipliers, Particles, State
+from ..particles import Contacts, Multipliers, Particles
 from ..scene import Scene
 from ..status import Status
-from ..surfaces.period import Period
 from . import failures
+from .impacts import Impacts, Page
+from .state import state_of
 from .tiers import Tier
 from .waiting import result_of
 
@@ -51,25 +53,12 @@ class Run:
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always", seed: int = 0,
+        compile: str = "always", seed: int = 0, impacts: Impacts | None = None,
     ) -> None:  # fmt: skip
-        n, self._owners, laws = len(particles), scene.owners(), scene.laws()
+        self._impacts = impacts
+        n, self._owners = len(particles), scene.owners()
         self._booked = booked(scene.chain())
-        self.state = State(
-            particles.position,
-            particles.velocity,
-            particles.mass,
-            np.empty(n),
-            np.empty(n),
-            np.zeros(n, np.int64),
-            np.zeros((self._booked, n)),
-            np.zeros(0 if laws is None else n),
-            _no_sweeps(n) if method.has_multipliers() else None,
-            _no_contacts(len(self._owners), n) if method.may_slide() else None,
-            None if laws is None or laws.thermal is None else np.zeros((len(self._owners), n)),
-            particles.image,
-            *_cell(scene, n),
-        )
+        self.state = state_of(scene, particles, method, self._booked)
         self._scene, self._method = scene, method
         self._numbers, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
@@ -163,21 +152,24 @@ class Run:
         try:
             mine = self._lanes.pop()
         except IndexError:
-            mine = lanes.empty(len(self._owners), self._booked, self.state.period)
+            mine = self._empty_lanes()
+        page = None if self._impacts is None else Page(self._impacts, self._moment)
         if not self._kinds:
-            end = self._part(span, draws, mine)
+            end = self._part(span, draws, mine, page)
         else:
             # Who flies first would have drawn everything when the others are ready to slide.
             some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := lanes.take(draws, some)).size:
-                end = self._part(span, _again(draws, order), mine)
+                end = self._part(span, _again(draws, order), mine, page)
+        if page is not None:
+            page.close()
         self._lanes.append(mine)
         return end
 
-    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes) -> _End:
+    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes, page: Page | None) -> _End:
         """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
         share = self._shared(span, draws)
-        status, particle, drawn = self._tier.kernel(blocks.advance_block)(*self._flying(share, mine))
+        status, particle, drawn = self._call(blocks.advance_block, self._flying(share, mine), page)
         while status == Status.DONE and any(share.pending[phase] for phase in _KINDS):
             share = self._shared(span, _again(draws, draws.mine[:drawn].copy()))
             for phase in _KINDS:
@@ -185,20 +177,35 @@ class Run:
                     return int(Status.HARD_CONTACT), phase, None
                 if phase in self._kinds and status == Status.DONE:
                     share.draws.ticket[0] = 0
-                    kernel, arguments = self._lasting(phase, share)
-                    status, particle, _drawn = self._tier.kernel(kernel)(*arguments)
+                    status, particle, _drawn = self._call(*self._lasting(phase, share), page)
             if status == Status.INTERRUPTED:
                 return status, 0, None
             if status == Status.DONE:
                 share.pending.fill(0)
                 share.draws.ticket[0] = 0
-                status, particle, _drawn = self._tier.kernel(blocks.advance_block)(*self._flying(share, mine))
+                status, particle, _drawn = self._call(blocks.advance_block, self._flying(share, mine), page)
         if status == Status.DONE:
             self._tier.kernel(observables.observe)(*self._observing(draws.mine[:drawn]))
         if status != Status.INTERRUPTED:
             return status, particle, None
         live = particle
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
+
+    def _call(self, kernel: Any, arguments: tuple[Any, ...], page: Page | None) -> tuple[int, int, int]:
+        """What a kernel returns that advances particles, with the log of this page."""
+        chosen = self._tier.kernel(kernel)
+        if page is None:
+            return tuple(chosen(*arguments))
+        while True:
+            given = [one._replace(log=page.log) if isinstance(one, lanes.Share) else one for one in arguments]
+            status, particle, drawn = chosen(*given)
+            if status != Status.LOG_FULL:
+                return status, particle, drawn
+            page.turn()
+
+    def _empty_lanes(self) -> lanes.Lanes:
+        made = lanes.empty(len(self._owners), self._booked, self.state.period)
+        return made if self._impacts is None else made._replace(before=lanes.table(impact_log.ROWS))
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
@@ -252,7 +259,8 @@ class Run:
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """What a thread shares with the others, and its counts."""
         pending = np.zeros(PHASES, np.int64)
-        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed)
+        log = None if self._impacts is None else self._impacts.example
+        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed, log)
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
@@ -276,7 +284,7 @@ class Run:
 
     def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
-        draws, mine = self._drawing(), lanes.empty(len(self._owners), self._booked, self.state.period)
+        draws, mine = self._drawing(), self._empty_lanes()
         share = self._shared(0.0, draws)
         yield blocks.advance_block, self._flying(share, mine)
         for phase in self._kinds:
@@ -347,20 +355,3 @@ def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:
 def _named(name: str, arrays: Any) -> dict[str, NDArray[Any]]:
     """The arrays of a NamedTuple under dotted names."""
     return {f"{name}.{field}": array for field, array in arrays._asdict().items()}
-
-
-def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | None]:
-    """What the state needs besides images where a scene repeats."""
-    period = scene.cell()
-    return None if period is None or period.fall is None else np.zeros(n), period
-
-
-def _no_contacts(walls: int, n: int) -> Contacts:
-    phase, load = np.zeros(n, np.int8), np.zeros((walls, n))
-    met, step, keep, left, short_steps, sliding = np.zeros((6, n))
-    return Contacts(phase, np.zeros((2, n)), met, step, keep, left, np.zeros((2, n)), short_steps, load, sliding)
-
-
-def _no_sweeps(n: int) -> Multipliers:
-    counts = np.zeros((3, n), np.int64)
-    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))

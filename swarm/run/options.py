@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import checks
 from ..bodies.state import Bodies
 from ..errors import SceneError
@@ -34,6 +36,8 @@ class RunOptions:
     every: float | None = None
     trajectory: Any = None  # then a Path or None, as `recording`
     recording: Any = None
+    impacts: Any = None
+    impact_particles: Any = "all"
     record_particles: int = 5000
     record_color: str = "speed"
     record_megabytes: float = 100.0
@@ -53,7 +57,7 @@ class RunOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("trajectory", "recording"):
+        for name in ("trajectory", "recording", "impacts"):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else paths.target_of(name, value))
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
@@ -67,8 +71,28 @@ class RunOptions:
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
         checks.one_of("compile", self.compile, CHOICES)
+        self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         _ = self.storage
+
+    def _check_impacts(self) -> None:
+        """Raise a SceneError unless impact_particles is "all", k, or numbers of particles; make these a tuple."""
+        given = self.impact_particles
+        if isinstance(given, str):
+            known = given == "all"
+        elif isinstance(given, (list, tuple, np.ndarray)):
+            # A number is known when it is checked against that of the particles.
+            known = len(given) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in given)
+            object.__setattr__(self, "impact_particles", tuple(sorted({int(i) for i in given})) if known else given)
+        else:
+            known = checks.count("impact_particles", given) > 0
+        if not known:
+            raise SceneError(
+                'impact_particles must be "all", k for every k-th particle, or a list of numbers of particles from 0 '
+                f"on, got {given!r:.100}"
+            )
+        if self.impacts is None and self.impact_particles != "all":
+            raise SceneError(f"impact_particles must go with a log of impacts, got {given!r:.100}; give impacts=")
 
     @property
     def times(self) -> FrameTimes:
@@ -81,9 +105,9 @@ class RunOptions:
         return Storage(self.frames, self.precision, self.compression)
 
     def files(self) -> dict[str, Path | None]:
-        """The trajectory and its checkpoint, which may never be made."""
+        """The trajectory, its checkpoint, which may never be made, and the log of impacts."""
         saved = None if self.trajectory is None else paths.checkpoint_of(self.trajectory)
-        return {"trajectory": self.trajectory, "checkpoint": saved}
+        return {"trajectory": self.trajectory, "checkpoint": saved, "log of impacts": self.impacts}
 
     def thread_count(self) -> int:
         """Number of threads that compute."""

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ..errors import SceneError
+from .impacts import Impacts
 from .options import Task
 from .session import Session
 
@@ -33,16 +34,36 @@ def recorder_of(task: Task) -> "Writer | None":
     )  # fmt: skip
 
 
-def writer_of(task: Task, session: Session, recorder: "Writer | None") -> "Background | None":
+def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impacts | None) -> "Background | None":
     """A context that gives the function which writes a frame, in a background thread."""
-    outputs = [(_trajectory(task, session), task.options.storage.kept()), (recorder, slice(None))]
+    # The impacts of a frame are on the disk before it is: who reads the frame finds them.
+    outputs = [
+        (_impacts(task, session, log), slice(0)),
+        (_trajectory(task, session), task.options.storage.kept()),
+        (recorder, slice(None)),
+    ]
     used = [(one, kept) for one, kept in outputs if one is not None]
     if not used:
         return None
     from ..output.background import Background, Several
 
     n = len(task.particles)
-    return Background(Several(used), n) if len(used) > 1 else Background(used[0][0], n, used[0][1])
+    made = Background(Several(used), n) if len(used) > 1 else Background(used[0][0], n, used[0][1])
+    if log is not None:
+        log.queue = made.do
+    return made
+
+
+def _impacts(task: Task, session: Session, log: Impacts | None) -> "Writer | None":
+    if log is None:
+        return None
+    from ..output.impacts import ImpactWriter, about
+
+    texts = about(task.scene, task.method, log.kept, {"particles": len(task.particles), **session.identity})
+    start = (session.first, log.total) if session.first > 0 else None
+    writer = ImpactWriter(task.options.impacts, log.columns(), log.ends, texts, start)
+    log.write = writer.add
+    return writer
 
 
 def _trajectory(task: Task, session: Session) -> "Writer | None":

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..output import paths
 from ..version import VERSION
+from .impacts import Impacts
 from .options import RunOptions, Task
 from .runs import AnyRun
 
@@ -39,6 +40,7 @@ class Session:
         self._job: Job | None = None
         self._arrays: Arrays | None = None
         self._held = contextlib.ExitStack()
+        self._log: Impacts | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -53,7 +55,7 @@ class Session:
         """The first frame that this session writes."""
         return 0 if self._arrays is None or self._job is None else self._job.frame + 1
 
-    def prepare(self, task: Task) -> None:
+    def prepare(self, task: Task, log: Impacts | None) -> None:
         """Find where this session starts: at 0 s with a new file or, to resume, at the checkpoint if there is one.
 
         Raises:
@@ -62,13 +64,21 @@ class Session:
             CompleteError: nothing is left to do.
             FileError: another run writes that trajectory.
         """
-        if self._trajectory is None or self._path is None:
+        if self._trajectory is None and log is None:
             return
         from ..output import checkpoint
         from ..output.lock import only_writer
         from ..output.writer import body_text, descriptions
 
-        overwrite, until = task.options.overwrite, task.options.until
+        overwrite, until, impacts = task.options.overwrite, task.options.until, task.options.impacts
+        body = "" if task.bodies is None else body_text(task.bodies.body)
+        self.identity = {"start": checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
+        self._log = log
+        if log is not None:
+            paths.check_target(impacts, overwrite or self._resumes, "impacts")
+            self._held.enter_context(only_writer(impacts, "log of impacts"))
+        if self._trajectory is None or self._path is None:
+            return
         paths.check_target(self._trajectory, overwrite or self._resumes)
         self._held.enter_context(only_writer(self._trajectory))
         if not self._resumes and os.path.lexists(self._path) and not checkpoint.is_one(self._path):
@@ -76,9 +86,8 @@ class Session:
                 f"{self._path} must be a checkpoint of swarm, or not be there, got another file, which a run would "
                 "replace; move it away, or choose another name for the trajectory"
             )
-        body = "" if task.bodies is None else body_text(task.bodies.body)
-        self.identity = {"start": checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
+        texts["kept"] = "" if log is None else log.kept
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
         if not self._resumes:
             return
@@ -86,6 +95,22 @@ class Session:
             self._resume(self._trajectory, until)
         elif self._trajectory.exists() and not overwrite:
             self._refuse_to_restart(self._trajectory, until)
+        if log is not None:
+            self._find_log(impacts, overwrite)
+
+    def _find_log(self, path: Path, overwrite: bool) -> None:
+        """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""
+        if self.first == 0:
+            paths.check_target(path, overwrite, "impacts")
+            return
+        from ..output.impact_log import load_impacts
+
+        assert self._job is not None
+        assert self._path is not None
+        with load_impacts(path) as before:
+            there = dataclasses.replace(self._job, **before.identity)
+            there.require_same(self._job, path)
+            before.require_holds(self._job.frame + 1, self._job.rows, self._path)
 
     def _refuse_to_restart(self, trajectory: Path, until: float) -> None:
         """Raise an error that says what the trajectory without a checkpoint is."""
@@ -139,6 +164,8 @@ class Session:
             from ..output.checkpoint import require_fit
 
             require_fit(self._path, self._arrays, run.arrays())
+            if self._log is not None:
+                self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)
             self._arrays = {}
 
@@ -197,7 +224,10 @@ class Session:
         assert writer is not None
         # A checkpoint is never ahead of the frames.
         writer.drain()
-        job = dataclasses.replace(self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time())
+        job = dataclasses.replace(
+            self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),
+            rows=0 if self._log is None else self._log.total,
+        )  # fmt: skip
         checkpoint.save(self._path, job, run.arrays())
 
     def finish(self) -> None:

@@ -4,7 +4,7 @@ import contextlib
 import logging
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
 from .admission import task_of
+from .impacts import Impacts, log_of
 from .options import RunOptions, Task
 from .outputs import recorder_of, writer_of
 from .runs import AnyRun, run_of
@@ -70,6 +71,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     every: float | None = None,
     trajectory: str | os.PathLike[str] | None = None,
     recording: str | os.PathLike[str] | None = None,
+    impacts: str | os.PathLike[str] | None = None,
+    impact_particles: str | int | Sequence[int] = "all",
     record_particles: int = 5000,
     record_color: str = "speed",
     record_megabytes: float = 100.0,
@@ -106,6 +109,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
+        impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
+        impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
@@ -116,7 +121,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes at a time. Results do not depend on it.
         frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
-        precision: "float64", or "float32" for frames of half the size; observables and checkpoints stay exact.
+        precision: "float64", or "float32" for frames, and rows of the log of impacts, of half the size; observables,
+            checkpoints and the times of impacts stay exact.
         compression: of the frames, "none", "gzip" or "lzf".
         checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none. It is the
             file TRAJECTORY.checkpoint, until the run is complete.
@@ -159,6 +165,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     from .progress import display  # rich is imported only when it is shown
 
     recorder = recorder_of(task)
+    log = log_of(task)
     runs: list[AnyRun] = []
 
     def stop() -> None:
@@ -167,13 +174,13 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
             one.halt()
 
     with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
-        session.prepare(task)
+        session.prepare(task, log)
         _require_room(task, session)
-        run = run_of(task)
+        run = run_of(task, log)
         runs.append(run)
         session.restore(run)
-        writer = writer_of(task, session, recorder)
-        history = _frames(task, session, run, writer, show)
+        writer = writer_of(task, session, recorder, log)
+        history = _frames(task, session, run, writer, show, log)
         session.finish()
         return Result(
             task.particles,
@@ -187,7 +194,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
 
 
 def _frames(
-    task: Task, session: Session, run: AnyRun, writer: "Background | None", show: "Display"
+    task: Task, session: Session, run: AnyRun, writer: "Background | None", show: "Display", log: Impacts | None
 ) -> list[dict[str, Any]]:
     """All frames of this session: their observables, if no trajectory holds them."""
     history: list[dict[str, Any]] = []
@@ -201,6 +208,8 @@ def _frames(
                 run.observe()
             else:
                 span = span_of("time", moment) - span_of("time", before)
+                if log is not None:
+                    log.begin = before
                 while not run.advance(span, moment, *_meanwhile(session, writer, show)):
                     show.within(before + run.share_done(span) * (moment - before), until)
                     session.look(run, writer, number - 1, before, moment)
@@ -208,6 +217,8 @@ def _frames(
             run.require_admissible(seen, moment)
             if task.options.trajectory is None:
                 history.append(seen)
+            if log is not None:
+                log.ends[number] = log.total
             write(number, moment, run.state, seen)
             show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
             if moment < until:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import superblock, writer
+from swarm.output import appended, superblock, writer
 from swarm.output.storage import Storage
 from swarm.particles import State
 
@@ -100,7 +100,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
 
     unmark = superblock.unmark
     monkeypatch.setattr(writer.h5py, "File", logged)
-    monkeypatch.setattr(writer, "_descriptor_of", lambda file: -1)
+    monkeypatch.setattr(appended, "_descriptor_of", lambda file: -1)
     monkeypatch.setattr(
         superblock, "unmark", lambda handle: logs[-1].notes.append((0, unmark(handle))) or unmark(handle)
     )

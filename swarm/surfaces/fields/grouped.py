@@ -31,6 +31,12 @@ class Order(NamedTuple):
         many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], Many)]
         return [*many, *((group[0], len(group)) for group in self.groups), *walls]
 
+    def members(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
+        """The surface that each wall of the chain belongs to, and its number in the field that this is, or -1."""
+        walls = [(i, -1) for i in self.others for _wall in surfaces[i].walls()]
+        many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], Many) for m in field.numbers()]
+        return [*many, *((i, -1) for group in self.groups for i in group), *walls]
+
     def compiled(self, surfaces: Sequence[Surface]) -> int:
         """How many walls kernels are compiled for."""
         return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.others)

@@ -27,6 +27,8 @@ class Many(Surface):
     centers: Any
     # The corners of the cell that repeats, in a scene in which one does.
     repeated: ClassVar[tuple[Floats, Floats] | None] = None
+    # Of images, the bodies that they are of.
+    which: ClassVar[NDArray[np.int64] | None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -75,7 +77,12 @@ class Many(Surface):
         taken: dict[str, Any] = {name: value[which] for name, value in given.items() if isinstance(value, np.ndarray)}
         made = replace(self, **{**taken, "centers": centers})
         object.__setattr__(made, "repeated", repeated)
+        object.__setattr__(made, "which", which)
         return made
+
+    def numbers(self) -> list[int]:
+        """The number of every body; of an image that of the body it is of."""
+        return list(range(len(self))) if self.which is None else self.which.tolist()
 
     @cached_property
     def members(self) -> Members:

@@ -1,0 +1,181 @@
+"""HDF5 files that grow, so that a kill at any moment leaves a readable one.
+
+HDF5's mode for one writer and many readers (SWMR) orders the writes so that every prefix of them is a valid file.
+"""
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..errors import FileError
+from . import paths, superblock
+
+# HDF5's default chunk cache, 1 MB a dataset, would fill during 100 000 frames, which looks like a memory leak.
+_SMALL_CACHE = 1 << 16
+# The oldest format with SWMR.
+_FORMAT = ("v110", "v110")
+
+
+class AppendedFile:
+    """A file that is created, or reopened to go on with it.
+
+    It gets its name when `take_name` says so; until then an existing file of that name stays.
+
+    Attributes:
+        file: the open file.
+    """
+
+    def __init__(self, path: Path, what: str, following: bool) -> None:
+        self._path, self._what, self._following = path, what, following
+        self._part = path if following else paths.part_of(path)
+
+    def open(self) -> h5py.File:
+        """Open the file.
+
+        Raises:
+            FileError: it cannot be.
+        """
+        self._size, self._block = 0, b""
+        try:
+            if not self._following:
+                self._part.touch()
+            self._open("r+" if self._following else "w")
+        except OSError as error:
+            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
+        return self.file
+
+    def _open(self, mode: str) -> None:
+        self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by `close`
+        if mode == "r+":
+            superblock.make_appendable(self._handle)
+        # HDF5's locks would block readers.
+        self.file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        self._descriptor = _descriptor_of(self.file)
+
+    def close(self, error: BaseException | None) -> None:
+        """Close the file, after an error if there is one.
+
+        Raises:
+            FileError: it cannot be closed, and there was no error before.
+        """
+        try:
+            self.file.close()
+        except (OSError, RuntimeError) as problem:
+            self._abandon()
+            if error is None:
+                raise FileError(f"cannot close the {self._what} {self._path}: {_reason(problem)}") from problem
+        finally:
+            self._handle.close()
+        if self._part != self._path:
+            # Without a frame there is nothing to be read.
+            self._part.unlink(missing_ok=True)
+
+    def sync(self) -> None:
+        """Flush to the disk what was written."""
+        try:
+            os.fsync(self._handle.fileno())
+        except OSError as error:
+            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
+
+    def begin(self) -> None:
+        """Switch to SWMR, after which nothing can be created."""
+        self.file.swmr_mode = True
+        self.flush()
+
+    def flush(self) -> None:
+        """Write what HDF5 holds back: then the file can be read, whatever happens to the process."""
+        self.file.flush()
+        self._block = superblock.unmark(self._handle)
+        self._size = os.fstat(self._handle.fileno()).st_size
+
+    @contextlib.contextmanager
+    def writing(self, what: str) -> Iterator[None]:
+        """Write `what`; an error is a FileError that leaves what was written before as it is."""
+        try:
+            self._require_there()
+            yield
+        except FileError:
+            self._abandon()
+            raise
+        except (OSError, RuntimeError) as error:
+            self._abandon()
+            if not self._handle.closed:
+                superblock.put_back(self._handle, self._block)
+            raise FileError(f"cannot write {what} to {self._path}: {_reason(error)}") from error
+
+    def take_name(self) -> bool:
+        """Take the name from an older file; whether the file had to be opened again for that."""
+        if self._part == self._path:
+            return False
+        try:
+            os.replace(self._part, self._path)
+        except PermissionError:  # Windows renames no file that is open
+            self.file.close()
+            self._handle.close()
+            os.replace(self._part, self._path)
+            self._part = self._path
+            self._open("r+")
+            return True
+        self._part = self._path
+        return False
+
+    @property
+    def is_new(self) -> bool:
+        """Whether it has no name yet."""
+        return self._part != self._path
+
+    def _require_there(self) -> None:
+        """Raise a FileError if the file was removed or truncated, which HDF5 would not notice."""
+        mine = os.fstat(self._handle.fileno())
+        try:
+            there = os.stat(self._part)
+        except FileNotFoundError:
+            there = None
+        if there is None or not os.path.samestat(there, mine):
+            raise FileError(f"the {self._what} {self._path} was deleted or replaced while the run was writing it")
+        if mine.st_size < self._size:
+            raise FileError(
+                f"the {self._what} {self._path} was truncated while the run was writing it, from {self._size} to "
+                f"{mine.st_size} bytes"
+            )
+
+    def _abandon(self) -> None:
+        """Send further writes to the null device: HDF5's buffers of a failed frame would damage earlier ones."""
+        try:
+            # HDF5 is not asked: it crashes the process if it could not close the file.
+            if not os.path.samestat(os.fstat(self._descriptor), os.fstat(self._handle.fileno())):
+                return  # abandoned already
+        except (OSError, ValueError):
+            return  # closed
+        null = os.open(os.devnull, os.O_RDWR)
+        os.dup2(null, self._descriptor)
+        os.close(null)
+
+
+def put(dataset: Any, first: int, values: Any) -> None:
+    """Write entries from row `first` on. h5py's indexing takes four times as long, for twenty datasets a frame."""
+    handle = dataset.id
+    count, *shape = handle.shape
+    entries = np.ascontiguousarray(values, dtype=dataset.dtype)
+    if count < first + len(entries):
+        handle.set_extent((first + len(entries), *shape))
+    space = handle.get_space()
+    space.select_hyperslab((first, *(0 for _ in shape)), entries.shape)
+    handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
+
+
+def _descriptor_of(file: h5py.File) -> int:
+    """The file descriptor of an open file."""
+    return int(file.id.get_vfd_handle())
+
+
+def _reason(error: Exception) -> str:
+    """The message of the system, without HDF5's addresses."""
+    found = re.search(r"error message = '([^']*)'", str(error))
+    return found.group(1) if found else str(error)

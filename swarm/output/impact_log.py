@@ -1,0 +1,237 @@
+"""Logs of impacts, read on demand. impacts.py describes the file and writes it."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import checks
+from ..errors import SceneError
+from ..extras import needed_by
+from . import layout
+from .stored import Stored, finite, times_of, whole
+
+if TYPE_CHECKING:
+    import pandas
+
+_VECTORS = ("position", "velocity_before", "velocity_after")
+_TEXTS = ("scene", "method", "kept", "start")
+_NEEDED = ("impacts/time", "frames/time", "frames/rows", "walls/surface", "walls/member", "parameters/scene")
+# Rows that are read at once, so that what is left out takes no memory.
+_AT_ONCE = 1 << 20
+
+
+class ImpactLog(Stored):
+    """A log of impacts on disk, read on demand.
+
+    Attributes:
+        times: (frames,) of the complete frames [s].
+        ends: (frames,) how many impacts there are at the end of each.
+        scene, method: as they were run.
+        count: number of particles that were run.
+
+    The impacts are those of complete frames. A log that is being written, or that a killed run left, can be read, with
+    the frames that are complete when it is opened. Inconsistent content raises a SceneError that names the part.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        super().__init__(path, "a log of impacts (.h5)", "swarm.load_impacts")
+        try:
+            with self._reading("its structure") as file:
+                foreign = next((name for name in _NEEDED if name not in file), None)
+                if foreign is None:
+                    self._check(file)
+            if foreign is not None:
+                raise SceneError(f"{self.path} is an HDF5 file, but not a log of impacts of swarm: it has no {foreign}")
+        except SceneError:
+            self.close()
+            raise
+
+    def _check(self, file: Any) -> None:
+        """Read what says which rows there are; a ValueError says what is inconsistent."""
+        for name in _TEXTS:
+            if h5py.check_string_dtype(layout.dataset(file, f"parameters/{name}").dtype) is None:
+                raise ValueError(f"parameters/{name} must be a text")
+        frames = int(layout.dataset(file, "frames/time", "f", (None,)).shape[0])
+        layout.require_fits(file["frames/time"], frames, self.path)
+        self.times = times_of(file, "frames/time", frames)
+        self.ends = np.array(layout.dataset(file, "frames/rows", "iu", (frames,))[:frames], np.int64)
+        if (np.diff(self.ends, prepend=0) < 0).any():
+            raise ValueError(f"frame {int((np.diff(self.ends, prepend=0) < 0).argmax())} has fewer impacts than none")
+        self._rows = int(self.ends[-1]) if frames else 0
+        self._columns: dict[str, Any] = {}
+        for name in file["impacts"]:
+            shape = (self._rows, 3) if name in (*_VECTORS, "slip", "image") else (self._rows,)
+            kinds = "iu" if name in ("particle", "wall", "image") else "f"
+            self._columns[name] = layout.dataset(file, f"impacts/{name}", kinds, shape)
+            layout.require_fits(self._columns[name], self._rows, self.path)
+        for name in ("time", "particle", "wall", *_VECTORS, "impulse"):
+            if name not in self._columns:
+                raise ValueError(f"it has no impacts/{name}")
+        surface = layout.dataset(file, "walls/surface", "iu", (None,))
+        member = layout.dataset(file, "walls/member", "iu", surface.shape)
+        self._surface, self._member = surface[()].astype(np.int32), member[()].astype(np.int32)
+
+    def __len__(self) -> int:
+        """How many impacts there are, of complete frames."""
+        return self._rows
+
+    def __repr__(self) -> str:
+        return f"ImpactLog({str(self.path)!r}, {len(self)} impacts)"
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What identifies the run."""
+        texts = {name: self._text(name) for name in ("scene", "method", "kept")}
+        return {**texts, "particles": self.count, "start": self.start, "seed": self.seed}
+
+    def require_holds(self, frames: int, rows: int, checkpoint: Path) -> None:
+        """Raise a SceneError if there are fewer frames, or rows with those of the frame after them."""
+        with self._reading("its rows") as file:
+            layout.require_index(file)
+            there = min(column.shape[0] for column in self._columns.values())
+        if len(self.times) < frames or there < rows:
+            raise SceneError(
+                f"{self.path} must hold {frames} frames and {rows} impacts, as {checkpoint} says, got "
+                f"{len(self.times)} and {there}: it was changed since; remove them and the trajectory to start again"
+            )
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the rows of `table`."""
+        real = self._columns["position"].dtype
+        fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
+        fields += [(name, real, 3) for name in _VECTORS]
+        fields += [("impulse", real), *((name, real, 3) for name in ("slip",) if name in self._columns)]
+        return np.dtype([*fields, *(("image", "i4", 3) for name in ("image",) if name in self._columns)])
+
+    def table(
+        self,
+        particles: int | Sequence[int] | None = None,
+        surfaces: int | Sequence[int] | None = None,
+        begin: float | None = None,
+        end: float | None = None,
+    ) -> NDArray[Any]:
+        """The impacts as a structured array, in the order of time, and of particles at the same time.
+
+        The order and every bit are the same for any number of threads. What is not asked for takes no memory; of the
+        file the frames between `begin` and `end` are read.
+
+        Args:
+            particles: only of this particle, or of these; None: all.
+            surfaces: only on this surface of the scene, or on these; None: all.
+            begin: only from this time on [s]; None: from the start.
+            end: only before this time [s]; None: to the last frame.
+
+        Returns:
+            One row an impact: `time` [s], `particle`, `surface` (its place in `scene.surfaces`), `member` (the number
+            of the body in that surface if it is many, else -1), `position` (3,) [m] of the particle at the impact,
+            `velocity_before` and `velocity_after` (3,) [m/s], `impulse` [N s], given along the wall's normal. Where a
+            surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
+            scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
+
+            A contact step begins at the impact, and `velocity_after` is that at its end. After an impact that is the
+            last of a series, `velocity_after` is the velocity along the wall. What slides, rests or is pressed into an
+            edge by several walls has no impacts: its impulse is in the observable alone.
+
+        Raises:
+            SceneError: an argument is out of its range, or the file is damaged.
+        """
+        first, last = self._range(begin, end)
+        wanted = _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces())
+        parts = [
+            self._part(rows, wanted, (begin, end))
+            for rows in (slice(k, min(k + _AT_ONCE, last)) for k in range(first, last, _AT_ONCE))
+        ]
+        table = np.concatenate([np.empty(0, self.dtype), *parts])
+        return table[np.lexsort((table["particle"], table["time"]))]
+
+    def frame(self, **chosen: Any) -> "pandas.DataFrame":
+        """The same as a pandas frame, with columns x, y, z for the vectors' components; arguments as for `table`."""
+        with needed_by("a frame of impacts", "table"):
+            import pandas
+        table = self.table(**chosen)
+        return pandas.DataFrame(dict(_flat(table)))
+
+    def _surfaces(self) -> int:
+        return int(self._surface.max()) + 1 if len(self._surface) else 0
+
+    def _range(self, begin: float | None, end: float | None) -> tuple[int, int]:
+        """The rows of the frames that this time is in."""
+        low = -np.inf if begin is None else checks.number("begin", begin)
+        high = np.inf if end is None else checks.number("end", end)
+        if low > high:
+            raise SceneError(f"end must be begin or later, got {high:g} before {low:g}")
+        starts = np.append(0, self.ends)
+        k, last = int(np.searchsorted(self.times, low)), int(np.searchsorted(self.times, high)) + 1
+        return int(starts[min(k, len(self.ends))]), int(starts[min(last, len(self.ends))])
+
+    def _part(self, rows: slice, wanted: tuple[Any, Any], span: tuple[float | None, float | None]) -> NDArray[Any]:
+        """What is wanted of some rows."""
+        with self._reading(f"its rows from {rows.start} on"):
+            time = finite(self._columns["time"][rows], "row")
+            particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
+            if len(wall) and not (wall.min() >= 0 and wall.max() < len(self._surface)):
+                raise ValueError(f"expected walls from 0 to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}")
+            if len(particle) and not (particle.min() >= 0 and particle.max() < self.count):
+                raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
+            surface = self._surface[wall]
+            taken = np.ones(len(time), np.bool_)
+            for numbers, values in zip(wanted, (particle, surface), strict=True):
+                taken &= numbers is None or numbers[values]
+            begin, end = span
+            taken &= (begin is None or time >= begin) & (end is None or time < end)
+            k = np.flatnonzero(taken)
+            table = np.empty(len(k), self.dtype)
+            table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
+            table["member"] = self._member[wall[k]]
+            if len(k):
+                within = slice(rows.start + int(k[0]), rows.start + int(k[-1]) + 1)
+                for name in table.dtype.names[4:]:
+                    table[name] = finite(self._columns[name][within], "row")[k - k[0]]
+        return table
+
+
+def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_] | None:
+    """Which of n are wanted; None for all."""
+    if numbers is None:
+        return None
+    listed = numbers if isinstance(numbers, (Sequence, np.ndarray)) else [numbers]
+    found = np.zeros(n, np.bool_)
+    for given in listed:
+        i = whole(name, given)
+        if not 0 <= i < n:
+            raise SceneError(f"{name} must be numbers from 0 to {n - 1}, got {i}")
+        found[i] = True
+    return found
+
+
+def _flat(table: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Every column of a table, and each component of a vector as one."""
+    for name in table.dtype.names or ():
+        if table[name].ndim == 1:
+            yield name, table[name]
+            continue
+        for axis, component in enumerate("xyz"):
+            yield f"{name}_{component}", table[name][:, axis]
+
+
+def load_impacts(path: str | Path) -> ImpactLog:
+    """Open a log of impacts for reading; see `ImpactLog`.
+
+    Raises:
+        SceneError: there is no such file, or it is none.
+
+    >>> import swarm, tempfile
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=2.0, impacts=folder + "/impacts.h5")
+    ...     with swarm.load_impacts(folder + "/impacts.h5") as log:
+    ...         log.table()["time"]
+    array([0.5, 1.5])
+    """
+    return ImpactLog(path)

@@ -1,0 +1,137 @@
+"""Writing logs of impacts: rows are appended, and what says to which frame they belong last.
+
+impacts/{time,particle,wall,position,velocity_before,velocity_after,impulse}, one entry an impact, with friction also
+impacts/slip, and impacts/image where the scene repeats; frames/{time,rows}, the times of the frames and how many rows
+there are at the end of each: rows after the last of them are of a frame that is not complete. walls/{surface,member}
+are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text, parameters/particles,
+parameters/start, a digest of the particles at the start, and parameters/seed.
+"""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..methods import Method
+from ..scene import Scene
+from .appended import AppendedFile, put
+from .storage import Storage
+from .writer import WriteFrames, Written, descriptions
+
+# Rows of a chunk: of more, a log of a few rows would be a large file.
+_CHUNK = 1 << 13
+# So many rows are gathered before they are written: a call for each column takes as long as some hundred of them.
+_SOME = 1 << 12
+
+Rows = dict[str, NDArray[Any]]
+
+
+def about(scene: Scene, method: Method, kept: str, identity: dict[str, Any]) -> dict[str, Any]:
+    """What a log says of its run: group/name -> text, number or array."""
+    surface, member = scene.members()
+    texts = {name: text for name, text in descriptions(scene, method, Storage()).items() if name != "storage"}
+    return {
+        **{f"parameters/{name}": value for name, value in {**texts, "kept": kept, **identity}.items()},
+        "walls/surface": surface,
+        "walls/member": member,
+    }
+
+
+class ImpactWriter:
+    """A context that creates the log, or goes on with it, and gives the function that writes what frames add.
+
+    Args:
+        path: the file.
+        columns: name -> array without rows.
+        ends: frame -> rows at its end; what is written is taken out.
+        about: group/name -> text, number or array.
+        start: frames and rows of the file to go on with; None: a new file.
+    """
+
+    def __init__(
+        self, path: Path, columns: Rows, ends: dict[int, int], about: dict[str, Any], start: tuple[int, int] | None
+    ) -> None:
+        self._path, self._columns, self._ends, self._about = path, columns, ends, about
+        self._frames, self._rows = start or (0, 0)
+        self._grown = AppendedFile(path, "log of impacts", start is not None)
+        self._following = start is not None
+        self._few: list[Rows] = []
+
+    def __enter__(self) -> WriteFrames:
+        self._file = self._grown.open()
+        with self._grown.writing("its beginning"):
+            if self._following:
+                self._open()
+                # What is there of frames that are to be computed again
+                for dataset in self._data.values():
+                    dataset.resize(self._rows, axis=0)
+                for dataset in (self._time, self._counts):
+                    dataset.resize(self._frames, axis=0)
+            else:
+                self._create()
+            self._grown.begin()
+        return self._write
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._grown.close(error)
+
+    def _create(self) -> None:
+        file = self._file
+        for name, value in self._about.items():
+            file[name] = value
+        for name, column in self._columns.items():
+            # A kernel gives every row; zeros before would be written for nothing.
+            file.create_dataset(
+                f"impacts/{name}", column.shape, column.dtype, maxshape=(None, *column.shape[1:]),
+                chunks=(_CHUNK, *column.shape[1:]), fill_time="never",
+            )  # fmt: skip
+        for name, dtype in (("time", np.float64), ("rows", np.int64)):
+            file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(1024,))
+        self._open()
+
+    def _open(self) -> None:
+        self._data: dict[str, h5py.Dataset] = {name: self._file[f"impacts/{name}"] for name in self._columns}
+        self._time, self._counts = self._file["frames/time"], self._file["frames/rows"]
+
+    def add(self, rows: Rows) -> None:
+        """Add rows, which may be changed when it returns, unless there are few."""
+        if len(rows["time"]) < _SOME and sum(len(few["time"]) for few in self._few) < _SOME:
+            self._few.append(rows)
+            return
+        with self._grown.writing("impacts"):
+            self._add_few()
+            self._put(rows)
+
+    def _add_few(self) -> None:
+        if self._few:
+            self._put({name: np.concatenate([few[name] for few in self._few]) for name in self._columns})
+            self._few = []
+
+    def _put(self, rows: Rows) -> None:
+        for name, dataset in self._data.items():
+            put(dataset, self._rows, rows[name])
+        self._rows += len(rows["time"])
+
+    def _write(self, frames: list[Written]) -> None:
+        with self._grown.writing(f"the impacts of frame {frames[0][0]}"):
+            self._add_few()
+            self._file.flush()
+            put(self._counts, frames[0][0], [self._ends.pop(number) for number, *_ in frames])
+            put(self._time, frames[0][0], [moment for _number, moment, *_ in frames])
+            self._grown.flush()
+            if self._grown.is_new and self._grown.take_name():
+                self._file = self._grown.file
+                self._open()
+                self._grown.begin()
+
+    def sync(self) -> None:
+        """Flush to the disk what was written."""
+        with self._grown.writing("impacts"):
+            self._add_few()
+            self._grown.flush()
+        self._grown.sync()

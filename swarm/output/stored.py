@@ -1,0 +1,151 @@
+"""HDF5 files of runs, read on demand, also while they are written or after their writer was killed."""
+
+import contextlib
+import operator
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import tables
+from ..errors import SceneError
+from ..methods import Method
+from ..scene import Scene
+from . import layout, paths, superblock
+from .sources import DAMAGE, DamagedError, reason, require_file
+
+_STILL_WRITTEN = "already open"
+# In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
+# another. The logging driver reads like the default one, logs nothing by default, and is rarely used.
+_DRIVER = "swarm"
+
+
+class Stored:
+    """A file on disk, a context that closes it; `what` it should be and the function that opens it are for errors."""
+
+    def __init__(self, path: str | Path, what: str, opener: str) -> None:
+        self.path, self._opener = paths.given("path", path), opener
+        require_file(self.path, what)
+        self._file = _opened(self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    @contextlib.contextmanager
+    def _reading(self, what: str) -> Iterator[Any]:
+        """The open file, for reading `what`; an error in that means that the file is damaged, and is a SceneError."""
+        if not self._file:
+            raise SceneError(f"{self.path} is closed; open it again with {self._opener}")
+        try:
+            yield self._file
+        except DamagedError:
+            raise
+        except DAMAGE as error:
+            raise DamagedError(f"{self.path} is damaged: {what}: {reason(error)}") from error
+
+    # --- The run -----------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """Number of particles, or of points of bodies, that were run; a file may keep fewer."""
+        with self._reading("its number of particles") as file:
+            return int(file["parameters/particles"][()])
+
+    @property
+    def start(self) -> str:
+        """A digest of the particles at the start; "" if the file has none."""
+        with self._reading("its start") as file:
+            stored = "parameters/start" in file
+        return self._text("start") if stored else ""
+
+    @property
+    def seed(self) -> int:
+        """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
+        with self._reading("its seed") as file:
+            return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that was run."""
+        with self._reading("its scene"):
+            table = tomllib.loads(self._text("scene"))
+            surfaces = table["surface"]
+            own = any(surface["kind"] == "own" for surface in surfaces)
+        # An OwnSurface is not damage: the error says that no file holds it.
+        with contextlib.nullcontext() if own else self._reading("its scene"):
+            return tables.scene_of(surfaces, table.get("gravity"), table.get("period"))
+
+    @property
+    def method(self) -> Method:
+        """The method that was run."""
+        with self._reading("its method"):
+            return tables.method_of(tomllib.loads(self._text("method")))
+
+    def _text(self, name: str) -> str:
+        with self._reading(f"its {name.replace('_', ' ')}") as file:
+            return layout.text(file[f"parameters/{name}"], self.path)
+
+
+def _opened(path: Path) -> h5py.File:
+    # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
+    # Without locking, a file that is still being written can be read.
+    options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
+    try:
+        try:
+            return h5py.File(path, "r", driver=_DRIVER, **options)
+        except OSError as error:
+            if _STILL_WRITTEN not in str(error):
+                raise
+            # Its writer has marked it and not yet cleared the mark, or was killed in between.
+            return h5py.File(superblock.Unmarked(path), "r", **options)
+    except DAMAGE as error:
+        if "signature not found" in str(error):
+            raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
+        if getattr(error, "errno", None):
+            raise SceneError(f"cannot read {path}: {reason(error)}") from error
+        raise DamagedError(f"{path} is damaged: {reason(error)}") from error
+
+
+def _own_driver(plist: Any, **_options: Any) -> None:
+    plist.set_fapl_log(b"", 0, 0)
+
+
+h5py.register_driver(_DRIVER, _own_driver)
+
+
+def times_of(file: Any, name: str, frames: int) -> NDArray[np.float64]:
+    """The times of frames, each after the one before it."""
+    times = finite(file[name][:frames])
+    if (np.diff(times) <= 0.0).any():
+        raise ValueError(f"frame {int((np.diff(times) <= 0.0).argmax()) + 1} is not after the one before it")
+    return times
+
+
+def finite(values: Any, entry: str = "frame") -> NDArray[Any]:
+    """The values, one or more an entry, if they are finite: no run writes an infinity or a NaN."""
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        first = int(np.argwhere(wrong)[0, 0])
+        raise ValueError(f"expected finite numbers, got {values[wrong][0]:g} at {entry} {first}")
+    return np.asarray(values)
+
+
+def whole(name: str, value: Any) -> int:
+    """`value` as an integer."""
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        return operator.index(value)
+    except TypeError:
+        raise SceneError(f"{name} must be a whole number, got {value!r}") from None

@@ -1,0 +1,170 @@
+"""The log of impacts of a run: kernels fill arrays in turn, and the thread that writes frames writes these too."""
+
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from ..lanes.arrays import STRIDE
+from ..lanes.log import GOING, Log
+from ..scene import Scene
+from .options import Task
+
+# Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
+# They bound the memory: 1.6 MB each.
+_ROWS, _MORE = 1 << 14, 2
+# So few rows are copied, so that their log can be filled again at once.
+_FEW = _ROWS // 16
+# A thread that waits for an empty log looks so often whether the run has ended [s].
+_GLANCE = 0.1
+
+Rows = dict[str, NDArray[Any]]
+
+
+class Impacts:
+    """The logs that the threads of a run fill; a log that is full is written while they fill others.
+
+    Args:
+        scene: what is run.
+        n: how many particles.
+        particles: "all", k for every k-th one, or the numbers of those whose impacts are logged.
+        precision: of positions, velocities and impulses; times are float64.
+        threads: how many fill logs.
+
+    Attributes:
+        kept: the particles and the precision, as TOML text.
+        begin: the start of the frame that is computed [s].
+        total: rows so far.
+        ends: frame -> rows at its end, until the writer takes them.
+        write: adds rows to the file; the writer sets it.
+        queue: what has a thread call a function in its turn among the frames; the writer's thread sets it.
+    """
+
+    def __init__(self, scene: Scene, n: int, particles: Any, precision: str, threads: int) -> None:
+        laws, real = scene.laws(), np.dtype(precision)
+        self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
+        self._chosen = chosen(particles, n)
+        self._slips, self._repeats = laws is not None and laws.friction is not None, scene.period is not None
+        self._real = real
+        self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
+        for _ in range(2 * threads + _MORE):
+            self._spare.put(self._made(_ROWS))
+        # Of the types that kernels are called with.
+        self.example = self._made(0)
+        self.begin, self.total, self.ends = 0.0, 0, dict[int, int]()
+        self.write: Callable[[Rows], None] = lambda rows: None
+        self.queue: Callable[[Callable[[], None]], None] = lambda job: job()
+        self._problem: BaseException | None = None
+        self._counting = threading.Lock()
+        self._over = False
+
+    def _made(self, rows: int) -> Log:
+        real = self._real
+        return Log(
+            np.empty(rows), np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, 3), real),
+            np.empty((rows, 3), real), np.empty((rows, 3), real), np.empty(rows, real),
+            np.empty((rows, 3), real) if self._slips else None,
+            np.empty((rows, 3), np.int32) if self._repeats else None, np.zeros(1, np.int64), np.zeros(GOING, np.int64),
+            np.zeros(STRIDE, np.int64), self._chosen, 0.0, 0.0,
+        )  # fmt: skip
+
+    def columns(self) -> dict[str, Any]:
+        """Name -> array without rows, of each column."""
+        return _columns(self.example, 0)
+
+    def empty(self, end: float) -> Log:
+        """An empty log of the frame that ends at a time [s]; it waits for one to be written.
+
+        Raises:
+            FileError: the logs before cannot be written.
+        """
+        while True:
+            if self._problem is not None:
+                raise self._problem
+            if self._over:
+                raise RuntimeError("the log of impacts is closed")
+            try:
+                log = self._spare.get(timeout=_GLANCE)
+            except queue.Empty:
+                continue
+            log.filled[0] = 0
+            return log._replace(begin=self.begin, end=end)
+
+    def hand_over(self, log: Log) -> None:
+        """Have what is in a log written, and the log filled again."""
+        count = int(log.filled[0])
+        rows = _columns(log, count)
+        with self._counting:
+            self.total += count
+        if count <= _FEW:
+            rows = {name: array.copy() for name, array in rows.items()}
+            self._spare.put(log)
+            if count:
+                self.queue(lambda: self._write(rows, None))
+        else:
+            self.queue(lambda: self._write(rows, log))
+
+    def _write(self, rows: Rows, log: Log | None) -> None:
+        try:
+            if self._problem is None:
+                self.write(rows)
+        except BaseException as problem:
+            self._problem = problem
+            raise
+        finally:
+            if log is not None:
+                self._spare.put(log)
+
+    def close(self) -> None:
+        """No thread waits for an empty log from now on."""
+        self._over = True
+
+
+def log_of(task: Task) -> Impacts | None:
+    """The log of impacts of a run, if it has one."""
+    options = task.options
+    if options.impacts is None:
+        return None
+    threads = options.thread_count()
+    return Impacts(task.scene, len(task.particles), options.impact_particles, options.precision, threads)
+
+
+class Page:
+    """The log that one thread fills."""
+
+    def __init__(self, impacts: Impacts, end: float) -> None:
+        self._impacts, self._end = impacts, end
+        self.log = impacts.empty(end)
+
+    def turn(self) -> None:
+        """An empty log in the place of the full one; a kernel goes on where it was."""
+        full = self.log
+        going = full.going.copy()
+        self._impacts.hand_over(full)
+        self.log = self._impacts.empty(self._end)
+        self.log.going[:] = going
+
+    def close(self) -> None:
+        """Hand over what there is."""
+        self._impacts.hand_over(self.log)
+
+
+def chosen(particles: Any, n: int) -> NDArray[np.bool_] | None:
+    """Which of n particles have rows; None for all."""
+    if isinstance(particles, str):
+        return None
+    found = np.zeros(n, np.bool_)
+    found[slice(None, None, particles) if isinstance(particles, int) else list(particles)] = True
+    return found
+
+
+def _columns(log: Log, count: int) -> Rows:
+    arrays = log._asdict()
+    return {name: arrays[name][:count] for name in _NAMES if arrays[name] is not None}
+
+
+_NAMES = Log._fields[: Log._fields.index("filled")]

@@ -1,0 +1,46 @@
+"""The state of a run at its start, of particles that are independent of one another."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..methods.base import Method
+from ..particles import Contacts, Multipliers, Particles, State
+from ..scene import Scene
+from ..surfaces.period import Period
+
+
+def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
+    """The state with the arrays of the particles; with so many rows of what walls give. Energies are still to be set."""
+    n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())
+    return State(
+        particles.position,
+        particles.velocity,
+        particles.mass,
+        np.empty(n),
+        np.empty(n),
+        np.zeros(n, np.int64),
+        np.zeros((booked, n)),
+        np.zeros(0 if laws is None else n),
+        _no_sweeps(n) if method.has_multipliers() else None,
+        _no_contacts(surfaces, n) if method.may_slide() else None,
+        None if laws is None or laws.thermal is None else np.zeros((surfaces, n)),
+        particles.image,
+        *_cell(scene, n),
+    )
+
+
+def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | None]:
+    """What the state needs besides images where a scene repeats."""
+    period = scene.cell()
+    return None if period is None or period.fall is None else np.zeros(n), period
+
+
+def _no_contacts(walls: int, n: int) -> Contacts:
+    phase, load = np.zeros(n, np.int8), np.zeros((walls, n))
+    met, step, keep, left, short_steps, sliding = np.zeros((6, n))
+    return Contacts(phase, np.zeros((2, n)), met, step, keep, left, np.zeros((2, n)), short_steps, load, sliding)
+
+
+def _no_sweeps(n: int) -> Multipliers:
+    counts = np.zeros((3, n), np.int64)
+    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))
