@@ -93,6 +93,8 @@ class Run:
 
     def __exit__(self, *error: object) -> None:
         self.halt()
+        if self._impacts is not None:
+            self._impacts.close()
         self._pool.shutdown(wait=True)
 
     def halt(self, passes: int = 0) -> None:
@@ -194,14 +196,7 @@ class Run:
     def _call(self, kernel: Any, arguments: tuple[Any, ...], page: Page | None) -> tuple[int, int, int]:
         """What a kernel returns that advances particles, with the log of this page."""
         chosen = self._tier.kernel(kernel)
-        if page is None:
-            return tuple(chosen(*arguments))
-        while True:
-            given = [one._replace(log=page.log) if isinstance(one, lanes.Share) else one for one in arguments]
-            status, particle, drawn = chosen(*given)
-            if status != Status.LOG_FULL:
-                return status, particle, drawn
-            page.turn()
+        return tuple(chosen(*arguments)) if page is None else page.call(chosen, arguments)
 
     def _empty_lanes(self) -> lanes.Lanes:
         made = lanes.empty(len(self._owners), self._booked, self.state.period)

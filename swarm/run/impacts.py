@@ -9,9 +9,10 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from ..lanes.arrays import STRIDE
+from ..lanes.arrays import STRIDE, Share
 from ..lanes.log import GOING, Log
 from ..scene import Scene
+from ..status import Status
 from .options import Task
 
 # Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
@@ -92,6 +93,7 @@ class Impacts:
             except queue.Empty:
                 continue
             log.filled[0] = 0
+            log.going.fill(0)
             return log._replace(begin=self.begin, end=end)
 
     def hand_over(self, log: Log) -> None:
@@ -138,19 +140,23 @@ class Page:
 
     def __init__(self, impacts: Impacts, end: float) -> None:
         self._impacts, self._end = impacts, end
-        self.log = impacts.empty(end)
+        self._log = impacts.empty(end)
 
-    def turn(self) -> None:
-        """An empty log in the place of the full one; a kernel goes on where it was."""
-        full = self.log
-        going = full.going.copy()
-        self._impacts.hand_over(full)
-        self.log = self._impacts.empty(self._end)
-        self.log.going[:] = going
+    def call(self, kernel: Any, arguments: tuple[Any, ...]) -> tuple[int, int, int]:
+        """What a kernel returns; each time the log is full, it goes on with an empty one."""
+        while True:
+            given = [one._replace(log=self._log) if isinstance(one, Share) else one for one in arguments]
+            status, particle, drawn = kernel(*given)
+            if status != Status.LOG_FULL:
+                return status, particle, drawn
+            going = self._log.going.copy()
+            self._impacts.hand_over(self._log)
+            self._log = self._impacts.empty(self._end)
+            self._log.going[:] = going
 
     def close(self) -> None:
         """Hand over what there is."""
-        self._impacts.hand_over(self.log)
+        self._impacts.hand_over(self._log)
 
 
 def chosen(particles: Any, n: int) -> NDArray[np.bool_] | None:

@@ -10,7 +10,7 @@ from ..surfaces.period import Period
 
 
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
-    """The state with the arrays of the particles; with so many rows of what walls give. Energies are still to be set."""
+    """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
     n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())
     return State(
         particles.position,
