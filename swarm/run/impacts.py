@@ -16,8 +16,8 @@ from ..status import Status
 from .options import Task
 
 # Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
-# They bound the memory: 1.6 MB each.
-_ROWS, _MORE = 1 << 14, 2
+# They bound the memory: 6 MB each. With a quarter of the rows a row takes the writer twice as long.
+_ROWS, _MORE = 1 << 16, 2
 # So few rows are copied, so that their log can be filled again at once.
 _FEW = _ROWS // 16
 # A thread that waits for an empty log looks so often whether the run has ended [s].

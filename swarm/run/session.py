@@ -100,8 +100,7 @@ class Session:
 
     def _find_log(self, path: Path, overwrite: bool) -> None:
         """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""
-        if self.first == 0:
-            paths.check_target(path, overwrite, "impacts")
+        if self.first == 0 and (overwrite or not path.exists()):
             return
         from ..output.impact_log import load_impacts
 
@@ -110,6 +109,8 @@ class Session:
         with load_impacts(path) as before:
             there = dataclasses.replace(self._job, **before.identity)
             there.require_same(self._job, path)
+            if self.first == 0:
+                return  # a kill came before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._path)
 
     def _refuse_to_restart(self, trajectory: Path, until: float) -> None:
