@@ -1,6 +1,9 @@
 """Tables that the tests share: a new surface, method or law joins by one line."""
 
+import contextlib
 import functools
+import resource
+import signal
 
 import numpy as np
 import pytest
@@ -194,3 +197,16 @@ def gap(surface, point):
 def scene_of(*names, **keywords):
     """A scene of surfaces from the table."""
     return swarm.Scene([surface_of(name) for name in names], **keywords)
+
+
+@contextlib.contextmanager
+def files_limited_to(size):
+    """A write beyond this size of a file fails as on a full disk, in the middle of others."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)

@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 
 _VECTORS = ("position", "velocity_before", "velocity_after")
 _TEXTS = ("scene", "method", "kept", "start")
-_NEEDED = ("impacts/time", "frames/time", "frames/rows", "walls/surface", "walls/member", "parameters/scene")
+_NEEDED = (
+    "impacts/time",
+    "frames/complete",
+    "frames/time",
+    "frames/rows",
+    "walls/surface",
+    "walls/member",
+    "parameters/scene",
+)
 # Rows that are read at once, so that what is left out takes no memory.
 _AT_ONCE = 1 << 20
 
@@ -55,8 +63,10 @@ class ImpactLog(Stored):
         for name in _TEXTS:
             if h5py.check_string_dtype(layout.dataset(file, f"parameters/{name}").dtype) is None:
                 raise ValueError(f"parameters/{name} must be a text")
-        frames = int(layout.dataset(file, "frames/time", "f", (None,)).shape[0])
-        layout.require_fits(file["frames/time"], frames, self.path)
+        frames = int(layout.dataset(file, "frames/complete", "iu", (1,))[0])
+        if frames < 0:
+            raise ValueError(f"frames/complete must be 0 or more, got {frames}")
+        layout.require_fits(layout.dataset(file, "frames/time", "f", (frames,)), frames, self.path)
         self.times = times_of(file, "frames/time", frames)
         self.ends = np.array(layout.dataset(file, "frames/rows", "iu", (frames,))[:frames], np.int64)
         if (np.diff(self.ends, prepend=0) < 0).any():

@@ -1,10 +1,10 @@
-"""Writing logs of impacts: rows are appended, and what says to which frame they belong last.
+"""Writing logs of impacts: rows are appended, and the number of frames that are complete is written last.
 
 impacts/{time,particle,wall,position,velocity_before,velocity_after,impulse}, one entry an impact, with friction also
-impacts/slip, and impacts/image where the scene repeats; frames/{time,rows}, the times of the frames and how many rows
-there are at the end of each: rows after the last of them are of a frame that is not complete. walls/{surface,member}
-are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text, parameters/particles,
-parameters/start, a digest of the particles at the start, and parameters/seed.
+impacts/slip, and impacts/image where the scene repeats; frames/complete (1,), how many frames are, and for these
+frames/{time,rows}, their times and how many rows there are at the end of each: what comes after them is of no use yet.
+walls/{surface,member} are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text,
+parameters/particles, their number, parameters/start, a digest of them at the start, and parameters/seed.
 """
 
 from pathlib import Path
@@ -64,16 +64,12 @@ class ImpactWriter:
     def __enter__(self) -> WriteFrames:
         self._file = self._grown.open()
         with self._grown.writing("its beginning"):
-            if self._following:
-                self._open()
-                # What is there of frames that are to be computed again
-                for dataset in self._data.values():
-                    dataset.resize(self._rows, axis=0)
-                for dataset in (self._time, self._counts):
-                    dataset.resize(self._frames, axis=0)
-            else:
+            if not self._following:
                 self._create()
-            self._grown.begin()
+            self._open()
+            # Rows of frames that are to be computed again are not cut off, which a kill may spoil, but written over;
+            # by several threads in another order, so that these frames are not complete from now on.
+            self._complete(self._frames)
         return self._write
 
     def __exit__(
@@ -94,11 +90,17 @@ class ImpactWriter:
             )  # fmt: skip
         for name, dtype in (("time", np.float64), ("rows", np.int64)):
             file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(1024,))
-        self._open()
+        file["frames/complete"] = np.zeros(1, np.int64)
 
     def _open(self) -> None:
         self._data: dict[str, h5py.Dataset] = {name: self._file[f"impacts/{name}"] for name in self._columns}
         self._time, self._counts = self._file["frames/time"], self._file["frames/rows"]
+        self._grown.begin()
+
+    def _complete(self, frames: int) -> None:
+        """Say how many frames are complete, after these are on file."""
+        put(self._file["frames/complete"], 0, [frames])
+        self._grown.flush()
 
     def add(self, rows: Rows) -> None:
         """Add rows, which may be changed when it returns, unless there are few."""
@@ -122,14 +124,13 @@ class ImpactWriter:
     def _write(self, frames: list[Written]) -> None:
         with self._grown.writing(f"the impacts of frame {frames[0][0]}"):
             self._add_few()
-            self._file.flush()
             put(self._counts, frames[0][0], [self._ends.pop(number) for number, *_ in frames])
             put(self._time, frames[0][0], [moment for _number, moment, *_ in frames])
-            self._grown.flush()
+            self._file.flush()
+            self._complete(frames[-1][0] + 1)
             if self._grown.is_new and self._grown.take_name():
                 self._file = self._grown.file
                 self._open()
-                self._grown.begin()
 
     def sync(self) -> None:
         """Flush to the disk what was written."""

@@ -1,14 +1,12 @@
 """After a kill, on a full disk or beside another process a trajectory keeps every frame that was reported written."""
 
-import contextlib
 import os
-import resource
 import shutil
-import signal
 
 import h5py
 import numpy as np
 import pytest
+from conftest import files_limited_to
 
 import swarm
 from swarm.output import appended, superblock, writer
@@ -183,19 +181,6 @@ def test_a_file_that_is_harmed_ends_the_run(tmp_path, harm, message):
         write([frame(0)])
         harm(path)
         write([frame(1)])
-
-
-@contextlib.contextmanager
-def files_limited_to(size):
-    """A write beyond this size of a file fails as on a full disk, in the middle of others."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, handler)
 
 
 @pytest.mark.parametrize("size", [20_000, *range(66_000, 74_000, 800), 100_001])
