@@ -223,11 +223,11 @@ def test_a_run_that_was_stopped_goes_on_in_its_log(tmp_path):
 
 
 def test_a_run_goes_on_in_the_middle_of_a_frame(tmp_path, monkeypatch):
-    day, options = 86_400.0, {"until": 6.0, "every": 2.0, "n": 100, "seed": 1}
+    day, options = 86_400.0, {"until": 6.0, "every": 2.0, "n": 50, "seed": 1}
     run(tmp_path / "whole.h5", ROUGH, **options)
-    halted_after(monkeypatch, 4, day)
+    halted_after(monkeypatch, 12, day)
     within = 0
-    for threads in (1, 2, 3) * 20:
+    for threads in (1, 2, 3) * 40:
         try:
             run(
                 tmp_path / "i.h5", ROUGH, **options, trajectory=tmp_path / "run.h5", resume=True, checkpoint=7.0 * day,
@@ -263,7 +263,7 @@ KILLED = """
 
         time.monotonic = lambda: float(told)
         try:
-            swarm.simulate(scene, start, swarm.Impact(), until=300.0, every=1.0, trajectory={path!r}, threads=2,
+            swarm.simulate(scene, start, swarm.Impact(), until=120.0, every=1.0, trajectory={path!r}, threads=2,
                            impacts={log!r}, progress=tell, checkpoint=10.0, resume=True, compile="never", frames="none")
         except swarm.CompleteError:
             pass
@@ -311,7 +311,7 @@ def test_kill_9_loses_nothing_that_was_reported(tmp_path):
     assert int(told.stdout.split()[1]) >= 5
     start = swarm.fill(SPHERE, 50, speed=1.0, seed=1)
     swarm.simulate(
-        SPHERE, start, swarm.Impact(), until=300.0, every=1.0, impacts=tmp_path / "whole.h5", compile="never"
+        SPHERE, start, swarm.Impact(), until=120.0, every=1.0, impacts=tmp_path / "whole.h5", compile="never"
     )
     assert table_of(log).tobytes() == table_of(tmp_path / "whole.h5").tobytes()
 
@@ -400,7 +400,7 @@ DAMAGES = {
     "no impulse": (lambda file: file.pop("impacts/impulse"), "is damaged: its structure: it has no impacts/impulse"),
     "too many": (changed("frames/complete", 50), "is damaged: its structure: frames/time must have the shape"),
     "fewer than before": (
-        lambda file: changed("frames/rows", file["frames/rows"][::-1])(file),
+        lambda file: changed("frames/rows", file["frames/rows"][()][::-1])(file),
         "fewer impacts than none",
     ),
     "a wall": (changed("impacts/wall", 7), "is damaged: its rows from 0 on: expected walls from 0 to 0, got 7"),

@@ -103,9 +103,9 @@ class ImpactWriter:
         self._grown.flush()
 
     def add(self, rows: Rows) -> None:
-        """Add rows, which may be changed when it returns, unless there are few."""
+        """Add rows, whose arrays may be changed when it returns."""
         if len(rows["time"]) < _SOME and sum(len(few["time"]) for few in self._few) < _SOME:
-            self._few.append(rows)
+            self._few.append({name: array.copy() for name, array in rows.items()})
             return
         with self._grown.writing("impacts"):
             self._add_few()
