@@ -37,7 +37,9 @@ def main() -> None:
     commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
     commands.add_parser("bodies", help="a step and an impact of bodies of several points, and what they conserve")
     commands.add_parser("motion", help="walls that move and walls that are moved: exactness, conservation, speed")
-    commands.add_parser("fields", help="scenes of many bodies: speed, first calls, what is kept")
+    commands.add_parser(
+        "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
+    )
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import swarm
 
+from . import impact_log
 from .report import ROOT, Row, in_turn, show, write
 
 Floats = NDArray[np.float64]
@@ -201,7 +202,7 @@ def compiled(quick: bool) -> list[Row]:
 
 def main(quick: bool) -> None:
     """Measure all of it."""
-    rows = [row for part in (speed, packing, compiled) for row in part(quick)]
+    rows = [row for part in (speed, packing, impact_log.rows, compiled) for row in part(quick)]
     show(rows)
     if not quick:
         write(rows, "fields")
