@@ -8,7 +8,7 @@ that rises through 0, so no root is skipped; near the root it is Newton's step o
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.gravity import Gravity, accelerated, displacement
+from ..kernel.gravity import Gravity, Nothing, accelerated, displacement
 from ..kernel.jit import by_type, inlined, outlined, select
 from . import contract, flights
 from .course import positive, rise_by, rise_time
@@ -51,6 +51,26 @@ class NearFall(NamedTuple):
     meets: Any
 
 
+class NearPiece(NamedTuple):
+    """The level of a `Near` up to a border, beyond which it may differ by (speed t + bent t^2 - margin)^2.
+
+    `rises`: whether it may be higher by that.
+    """
+
+    c: Any
+    b: Any
+    a2: Any
+    a3: Any
+    a4: Any
+    speed: Any
+    bent: Any
+    margin: Any
+    rises: Any
+    window: Any
+    nearly: Any
+    meets: Any
+
+
 @by_type
 def _slopes(level, t):
     """(s, m) with a3 t^3 + a4 t^4 + ... <= s t^3 and of a magnitude of at most m t^3 from 0 to t."""
@@ -70,10 +90,37 @@ def _(level, t):
     return rise, abs(level.a3) + t * (abs(level.a4) + t * (abs(level.a5) + t * size))
 
 
+@_slopes.register(NearPiece)
+def _(level, t):
+    rise, size = positive(level.a3) + t * positive(level.a4), abs(level.a3) + t * abs(level.a4)
+    return rise, size + _beyond(level, t) / select(t > 0.0, t, math.inf)
+
+
+@by_type
+def _bend(level, t):
+    """What takes the place of a2 from 0 to t."""
+    return level.a2
+
+
+@_bend.register(NearPiece)
+def _(level, t):
+    return level.a2 + select(level.rises, _beyond(level, t), 0.0)
+
+
+@inlined
+def _beyond(level, t):
+    """s with (speed t + bent t^2 - margin)^2 <= s t^2 from 0 to t, 0 before the border."""
+    over = positive(level.speed + t * level.bent - level.margin / select(t > 0.0, t, math.inf))
+    return select(t > 0.0, over * over, 0.0)
+
+
 @inlined
 def _slopes_within(level, reach):
+    """Of a step as far as its reach: `_slopes` and `_bend`."""
     # The reach is infinite only where the level is a parabola.
-    return _slopes(level, select(reach < math.inf, reach, 0.0))
+    t = select(reach < math.inf, reach, 0.0)
+    rise, size = _slopes(level, t)
+    return rise, size, _bend(level, t)
 
 
 @inlined
@@ -88,10 +135,10 @@ def _ended(level, time, reach, size):
 @inlined
 def first_step(level):
     """The first step of a flight: (t, its length, 0 if it is the last)."""
-    rise, size = _slopes_within(level, level.window)
-    time = rise_time(level.c, level.b, level.a2 + rise_by(rise, level.window))
+    rise, size, a2 = _slopes_within(level, level.window)
+    time = rise_time(level.c, level.b, a2 + rise_by(rise, level.window))
     # See `leave` in course.py.
-    leaving = rise_time(2.0 * level.b, 0.5 * level.a2, rise)
+    leaving = rise_time(2.0 * level.b, 0.5 * a2, rise)
     return _ended(level, select((level.b <= 0.0) & (leaving > time), leaving, time), level.window, size)
 
 
@@ -102,8 +149,8 @@ def next_step(level, t, last):
     The parabola holds for twice the last step, or without end where the level is one itself.
     """
     reach = select(level.window < math.inf, 2.0 * last, math.inf)
-    rise, size = _slopes_within(level, reach)
-    step, length = _ended(level, rise_time(level.c, level.b, level.a2 + rise_by(rise, reach)), reach, size)
+    rise, size, a2 = _slopes_within(level, reach)
+    step, length = _ended(level, rise_time(level.c, level.b, a2 + rise_by(rise, reach)), reach, size)
     goes_on = under_way(t, last)
     return select(goes_on, t + step, t), select(goes_on, length, last)
 
@@ -154,19 +201,46 @@ def _(surface, r, v, pull):
 
 # --- In lanes --------------------------------------------------------------------------------------------
 
+contract.near.implies(flights.in_steps)(lambda surface: 1.0)
+
 
 @contract.near.implies(flights.begin_wall)
 def _(surface, gravity, course, row, lane, r, v):
-    level = contract.near(surface, gravity, r, v)
-    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = first_step(level)
+    _begin(_in_steps(gravity, surface), surface, gravity, course, row, lane, r, v)
 
 
 @contract.near.implies(flights.step_wall)
 def _(surface, gravity, course, row, lane, r, v):
+    _step(_in_steps(gravity, surface), surface, gravity, course, row, lane, r, v)
+
+
+@by_type
+def _in_steps(gravity, surface):
+    return 1.0
+
+
+_in_steps.register(Nothing, lambda gravity, surface: flights.in_steps(surface))
+
+
+@by_type
+def _begin(steps, surface, gravity, course, row, lane, r, v):
+    level = contract.near(surface, gravity, r, v)
+    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = first_step(level)
+
+
+@_begin.register(Nothing)
+def _(steps, surface, gravity, course, row, lane, r, v):
+    flights.begin_whole(gravity, surface, course, row, lane, r, v)
+
+
+@by_type
+def _step(steps, surface, gravity, course, row, lane, r, v):
     t, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
     p, w = place(gravity, r, v, t, last)
     level = contract.near(surface, gravity, p, w)
     course[row + flights.TIME, lane], course[row + flights.LAST, lane] = next_step(level, t, last)
 
 
-contract.near.implies(flights.in_steps)(lambda surface: 1.0)
+@_step.register(Nothing)
+def _(steps, surface, gravity, course, row, lane, r, v):
+    pass

@@ -104,6 +104,24 @@ def safe_rise_time(level):
 
 
 @inlined
+def rise_near(level):
+    """(a time up to |window| during which a level surely stays <= 0, whether it rises then), near to its first rise.
+
+    The parabola of twice the time that the one of the window gives is less far above the level.
+    """
+    window = abs(level.window)
+    first = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, window), window))
+    rises, leaving = first <= window, leave(level)[0]
+    time = select(rises, first, window)
+    rises, time = rises & (leaving <= time), select(leaving > time, leaving, time)
+    reach = 2.0 * time
+    again = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, reach), reach))
+    within = select(again < reach, again, reach)
+    later = within > time
+    return select(later, within, time), select(later, again <= reach, rises) & (level.window > 0.0)
+
+
+@inlined
 def _steepest(a3, a4, window):
     """s >= 0 with a3 t^3 + a4 t^4 <= s t^3 up to the window: c + 2 b t + (a2 + s window) t^2 rises first."""
     slope = a3 + select(a4 > 0.0, a4 * window, 0.0)

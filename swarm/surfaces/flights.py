@@ -129,17 +129,17 @@ def _(chain, gravity, course, row, lane, r, v):
 @by_type
 def begin_wall(surface, gravity, course, row, lane, r, v):
     """The same of one wall."""
-    _begin_whole(gravity, surface, course, row, lane, r, v)
+    begin_whole(gravity, surface, course, row, lane, r, v)
 
 
 @by_type
-def _begin_whole(gravity, surface, course, row, lane, r, v):
+def begin_whole(gravity, surface, course, row, lane, r, v):
     """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
     time, found = hit(gravity, surface, r, v)
     course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
 
 
-@_begin_whole.register(Gravity)
+@begin_whole.register(Gravity)
 def _(gravity, surface, course, row, lane, r, v):
     pull = as_vector(gravity)
     if contract.is_quartic(surface):
