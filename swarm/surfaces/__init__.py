@@ -8,7 +8,8 @@ examples/own_surface.py is a complete surface; if a method needs a function that
 run.
 """
 
-# First, so that what follows from `bend` and from `hessian` is registered with them.
+# First, so that what follows from `near`, from `bend` and from `hessian` is registered with them.
+from . import approach as _approach  # noqa: F401
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
 from .fields.boxes import Boxes
