@@ -70,6 +70,11 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
                 f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
                 "anchors, in the frame of the wall"
             )
+        if surface.openings:
+            raise SceneError(
+                f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
+                f"{len(surface.openings)}; use particles, or a box with an open face"
+            )
         if surface.reacts():
             raise SceneError(
                 f"surfaces[{i}] must have no mass and no inertia with bodies, got {surface}; make it a body, whose "
