@@ -42,7 +42,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     _require_period(scene, method)
     check_surfaces(method, scene)
     if options.compile != "never":
-        require_compiled(scene.surfaces)
+        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.openings)])
     method.check(scene, particles)
     times = options.times
     assert times.every is not None
