@@ -1,5 +1,6 @@
 """Openings: volumes inside which a wall is not there, through which particles escape."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -102,6 +103,17 @@ def test_in_a_round_vessel_a_slide_ends_at_the_rim():
     depth = 0.5 * math.cos(0.2)
     assert np.abs(found.particles.position[2] + depth).max() < 1e-9
     assert np.abs(np.sqrt((found.particles.velocity**2).sum(axis=0)) - math.sqrt(2.0 * 9.81 * depth)).max() < 1e-9
+
+
+def test_a_slide_ends_at_another_wall_where_that_is_open():
+    side = swarm.Plane((1.0, 0.0, 0.0), 0.5, openings=[swarm.Sphere(0.1, center=(0.5, 0.0, 0.0))])
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0)), side, swarm.Sphere(10.0)], gravity=(0.0, 0.0, -9.81))
+    found = run(scene, thrown([(0.0, 0.05, 0.0), (0.0, 0.15, 0.0)], [(1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), 1.0, 4)
+    assert found.escape_time[0] == pytest.approx(0.5, abs=1e-12)
+    assert found.particles.position[:, 0] == pytest.approx([0.5, 0.05, 0.0], abs=1e-12)
+    assert found.particles.velocity[:, 0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+    assert np.isnan(found.escape_time[1])
+    assert found.particles.velocity[0, 1] == pytest.approx(-1.0)
 
 
 def test_along_an_edge_the_opening_of_either_wall_lets_out():
@@ -251,6 +263,12 @@ def test_every_body_of_a_field_is_open():
         ]
         apart = run(swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), *single]), swarm.Particles(r, v), until=0.9, frames=2)
         assert np.array_equal(apart.escape_time[: 2 * some], found.escape_time[: 2 * some], equal_nan=True)
+    # One field are those that have the same.
+    mixed = [*single[:2], *(dataclasses.replace(single[0], center=tuple(c), openings=()) for c in balls.centers[2:])]
+    assert len(mixed) == 9
+    some = run(swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), *mixed]), swarm.Particles(r, v), until=0.9, frames=2)
+    assert np.array_equal(some.escape_time[:4], found.escape_time[:4], equal_nan=True)
+    assert np.isnan(some.escape_time[4:]).all()
 
 
 def test_what_repeats_has_its_openings_in_every_cell():
