@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch
+from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch, select
 from ..kernel.vector import norm
 from ..surfaces import fold as walls
 from ..surfaces.fields.grid import in_block, size_of
@@ -19,18 +19,19 @@ _PLACES, _HALVINGS, _THIRDS = 16, 60, 80
 
 
 @inlined
-def is_let_out(openings, held, r, near):
-    """Whether a wall that holds a particle is open at its place, or nearer to that than `near`."""
-    return is_open(openings, held.first, r, near) | is_open(openings, second(held), r, near)
+def open_wall_of(openings, held, r, near):
+    """The wall of those that hold a particle that is open at its place, or nearer to that than `near`; or -1."""
+    first = is_open(openings, held.first, r, near)
+    return select(first, held.first, select(is_open(openings, second(held), r, near), second(held), -1.0))
 
 
 @by_type_outlined
-def open_wall(openings, chain, r, touch, near):
+def open_wall_at(openings, chain, r, touch, near):
     """A wall within the distance `touch` of a place that is open there, or -1."""
     return -1.0
 
 
-@open_wall.register(Openings)
+@open_wall_at.register(Openings)
 def _(openings, chain, r, touch, near):
     count = walls.count_near(chain, r)
     number = scratch(count, np.float64)

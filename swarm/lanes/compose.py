@@ -11,7 +11,7 @@ from ..contact import sliding as slides
 from ..contact.passing import may_pass
 from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import Array, by_type, inlined, select
+from ..kernel.jit import Array, by_type, inlined, outlined, select
 from ..kernel.vector import ZERO, column, either, put, square
 from ..methods import contract as methods
 from ..surfaces import fold as walls
@@ -332,3 +332,14 @@ def lose(state, lanes, i, twice):
     p = lanes.particle[i]
     state.energy[p] = 0.5 * lanes.rows[TWICE, i]
     state.dissipated[p] += 0.5 * twice * state.mass[p]
+
+
+@outlined
+def with_kept(kind, chain, lanes, i):
+    """The velocity of a lane with the speed that it keeps across its walls."""
+    rows, v, keep = lanes.rows, column(lanes.rows, V, i), lanes.rows[KEEP, i]
+    if not keep > 0.0:
+        return v
+    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    taken = hold.split_at(held, chain, None, column(rows, R, i), v)
+    return v + keep * hold.inward(held, taken.n, taken.m)

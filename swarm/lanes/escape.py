@@ -1,10 +1,11 @@
 """Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
 
-from ..contact import crossing, events
-from ..contact.passing import is_let_out, open_wall
+from ..contact import crossing, events, hold
+from ..contact.passing import open_wall_at, open_wall_of
 from ..kernel.jit import by_type, by_type_outlined, index, inlined
-from ..kernel.vector import column
+from ..kernel.vector import column, put
 from ..surfaces.openings import Openings, is_open
+from . import compose
 from .arrays import LEFT, R
 from .fly import marked_lanes
 
@@ -32,14 +33,33 @@ def _(openings, share, lanes, live):
 
 
 @by_type_outlined
-def let_out_held(openings, method, share, p, held, r, left):
-    """Whether a particle that walls hold has escaped, with so much of the frame left."""
+def is_at_opening(openings, kind, method, chain, state, lanes, i):
+    """Whether a lane that slides is where a wall that holds it is open: it is at that wall then, as if it flew."""
     return False
 
 
-@let_out_held.register(Openings)
-def _(openings, method, share, p, held, r, left):
-    if not is_let_out(openings, held, r, crossing.near(method, r)):
+@is_at_opening.register(Openings)
+def _(openings, kind, method, chain, state, lanes, i):
+    rows, r = lanes.rows, column(lanes.rows, compose.R, i)
+    held = hold.of_lane(kind, rows[compose.WALL, i], rows[compose.WALL + 1, i])
+    wall = open_wall_of(openings, held, r, crossing.near(method, r))
+    if wall < 0.0:
+        return False
+    state.contacts.met[lanes.particle[i]] = wall
+    put(rows, compose.V, i, compose.with_kept(kind, chain, lanes, i))
+    rows[compose.KEEP, i] = 0.0
+    return True
+
+
+@by_type_outlined
+def let_out_of(openings, method, share, p, wall, r, left):
+    """Whether a particle at a wall has escaped, since it is open there, with so much of the frame left."""
+    return False
+
+
+@let_out_of.register(Openings)
+def _(openings, method, share, p, wall, r, left):
+    if not is_open(openings, wall, r, crossing.near(method, r)):
         return False
     _escape(share, p, left)
     return True
@@ -53,7 +73,7 @@ def let_out_at(openings, method, chain, share, p, r, left):
 
 @let_out_at.register(Openings)
 def _(openings, method, chain, share, p, r, left):
-    if open_wall(openings, chain, r, events.TOUCH * method.size, crossing.near(method, r)) < 0.0:
+    if open_wall_at(openings, chain, r, events.TOUCH * method.size, crossing.near(method, r)) < 0.0:
         return False
     _escape(share, p, left)
     return True

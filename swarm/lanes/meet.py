@@ -18,7 +18,7 @@ from ..surfaces.moving import Carried, at
 from ..surfaces.openings import Openings
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
-from .escape import let_out_at, let_out_held
+from .escape import let_out_at, let_out_of
 from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
@@ -47,7 +47,7 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
-    if let_out_held(state.openings, method, share, i, One(contacts.met[i]), r, left):
+    if let_out_of(state.openings, method, share, i, contacts.met[i], r, left):
         _leave(share, i)
         return True
     carried, chain = chain, at(chain, left)

@@ -19,7 +19,6 @@ from ..kernel.gravity import potential
 from ..kernel.jit import by_type, index, inlined, kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
-from ..particles import has_escaped
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
@@ -57,9 +56,10 @@ from .compose import (
     lose,
     push,
     twice_after,
+    with_kept,
     work,
 )  # fmt: skip
-from .escape import let_out_held
+from .escape import is_at_opening
 from .stay import phase_of, stay
 from .wrap import return_particle, return_sliding
 
@@ -98,7 +98,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             account(method, chain, share.state, lanes, i)
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
-            phase = _next_phase(kind, method, chain, gravity, share, lanes, i)
+            phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
             phase = return_sliding(lanes.period, chain, share.state, lanes, i, phase)
             if phase != phase_of(kind):
                 _retire(kind, moving, chain, share, lanes, i, phase)
@@ -132,11 +132,11 @@ def _refill(kind, method, chain, gravity, share, lanes, lane, at):
 
 
 @inlined
-def _next_phase(kind, method, chain, gravity, share, lanes, i):
+def _next_phase(kind, method, chain, gravity, state, lanes, i):
     """What a lane does after a step."""
     phase = phase_of(kind)
     if lanes.event[i] != 0:
-        phase = _decide(kind, method, chain, gravity, share, lanes, i)
+        phase = _decide(kind, method, chain, gravity, state, lanes, i)
     return phase if lanes.rows[LEFT, i] > 0.0 else ARRIVED
 
 
@@ -162,7 +162,7 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
         v = hold.split_at(held, now, hold.drift(wall_laws.moving(methods.laws(method)), held, now, r), r, v).along
     put(rows, R, lane, r)
     put(rows, V, lane, v)
-    phase = _set_going(kind, method, chain, gravity, share, lanes, lane)
+    phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
     if phase != phase_of(kind):
         _retire(kind, wall_laws.moving(methods.laws(method)), chain, share, lanes, lane, phase)
         return False
@@ -170,15 +170,14 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
 
 
 @outlined
-def _set_going(kind, method, chain, gravity, share, lanes, i):
+def _set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; what it does next, which may be to rest."""
-    rows, laws, state = lanes.rows, methods.laws(method), share.state
+    rows, laws = lanes.rows, methods.laws(method)
     held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
-    if let_out_held(state.openings, method, share, lanes.particle[i], held, r, left):
-        rows[LEFT, i] = 0.0
-        return ARRIVED
     now = at(chain, left)
+    if is_at_opening(lanes.openings, kind, method, now, state, lanes, i):
+        return EVENT
     force = slides.force(laws, held, now, gravity, r, v)
     put(rows, A, i, force.acceleration)
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
@@ -204,10 +203,8 @@ def _retire(kind, moving, chain, share, lanes, i, phase):
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
     v, keep = column(rows, V, i), rows[KEEP, i]
     slid = phase != FLYING and phase != CAREFUL
-    if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
-        held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-        taken = hold.split_at(held, at(chain, rows[LEFT, i]), None, column(rows, R, i), v)
-        v = v + keep * hold.inward(held, taken.n, taken.m)
+    if not (slid and rows[LEFT, i] > 0.0):
+        v = with_kept(kind, at(chain, rows[LEFT, i]), lanes, i)
     if phase == FLYING:
         now, r = at(chain, rows[LEFT, i]), column(rows, R, i)
         v = events.off_the_wall(now, rows[WALL, i], r, v, wall_velocity(moving, now, rows[WALL, i], r))
@@ -217,8 +214,6 @@ def _retire(kind, moving, chain, share, lanes, i, phase):
     contacts.walls[1, p] = rows[WALL + 1, i] if slid else -1.0
     if phase != ARRIVED:
         contacts.phase[p] = phase if slid else FLYING
-    elif has_escaped(share.state.escape_time, p):
-        contacts.phase[p] = FLYING
     elif contacts.phase[p] != ARRIVED:
         contacts.phase[p] = phase_of(kind)
     contacts.left[p] = rows[LEFT, i] if phase != ARRIVED else 0.0
@@ -242,15 +237,15 @@ def _move(lanes, source, target):
 
 
 @outlined
-def _decide(kind, method, chain, gravity, share, lanes, i):
+def _decide(kind, method, chain, gravity, state, lanes, i):
     """What a lane does whose step may not be taken as it is.
 
     The step is cut where the event is, and taken again, until the event is at its start.
     """
-    rows, event, h, state = lanes.rows, lanes.event[i], lanes.rows[H, i], share.state
+    rows, event, h = lanes.rows, lanes.event[i], lanes.rows[H, i]
     if event & STOPPED:
         _stop(wall_laws.moving(methods.laws(method)), chain, gravity, state, lanes, i)
-        return _set_going(kind, method, chain, gravity, share, lanes, i)
+        return _set_going(kind, method, chain, gravity, state, lanes, i)
     if event & STUCK:
         return _give_up(state, lanes, i)
     if event & FAILED:
@@ -278,7 +273,7 @@ def _decide(kind, method, chain, gravity, share, lanes, i):
         cut = min(cut, part_until_open(lanes.openings, held, path, crossing.near(method, r)))
     if not cut < 1.0:
         # It passes near a wall.
-        return _take(kind, method, chain, gravity, share, lanes, i)
+        return _take(kind, method, chain, gravity, state, lanes, i)
     rows[CUT, i] = cut * h
     rows[TRIALS, i] += 1.0
     return phase_of(kind) if rows[TRIALS, i] <= _MOST_TRIALS else _give_up(state, lanes, i)
@@ -309,7 +304,7 @@ def _(moving, chain, gravity, state, lanes, i):
 
 
 @outlined
-def _take(kind, method, chain, gravity, share, lanes, i):
+def _take(kind, method, chain, gravity, state, lanes, i):
     """Take a step after all."""
     rows = lanes.rows
     put(rows, R, i, column(rows, R1, i))
@@ -317,8 +312,8 @@ def _take(kind, method, chain, gravity, share, lanes, i):
     rows[LEFT, i], rows[CUT, i] = rows[LEFT, i] - rows[H, i], np.inf
     rows[TWICE, i] = twice_after(wall_laws.moving(methods.laws(method)), rows[TWICE, i] - rows[WORK, i], lanes.after[i])
     lanes.unsolved[i] = True
-    account(method, chain, share.state, lanes, i)
-    return _set_going(kind, method, chain, gravity, share, lanes, i)
+    account(method, chain, state, lanes, i)
+    return _set_going(kind, method, chain, gravity, state, lanes, i)
 
 
 @inlined
