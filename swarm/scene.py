@@ -25,6 +25,7 @@ from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
 from .surfaces.moving import Carried, carried
+from .surfaces.openings import Openings, openings_in, require_few, volumes_of
 from .surfaces.period import Period
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.room import has_room
@@ -64,6 +65,8 @@ class Scene:
     period: Lengths | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    # The volumes in which every surface is open.
+    volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -84,7 +87,10 @@ class Scene:
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "period", lengths_of(period))
         object.__setattr__(self, "_images", tuple(self._images_of(i) for i in range(len(surfaces))))
+        named = ((surface, self.period, f"surfaces[{i}]") for i, surface in enumerate(surfaces))
+        object.__setattr__(self, "volumes", tuple(volumes_of(*one) for one in named))
         self._require_few_walls("")
+        require_few(self.volumes)
         for i in self._fields() if self.moves() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where a surface moves, got {surfaces[i]}; "
@@ -183,6 +189,10 @@ class Scene:
             Moves(0.0) if self.moves() else None,
         )
         return None if laws == (None, None, None, None) else laws
+
+    def openings(self) -> Openings | None:
+        """The openings of every wall of the chain as kernels take them, None where there are none."""
+        return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self._owner])
 
     def _of_walls(self, values: list[Any], neutral: Any) -> Chain | Span | None:
         """The value of the owner of every wall as a chain, None where all are neutral."""

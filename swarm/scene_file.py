@@ -162,6 +162,9 @@ def _with_bodies(surfaces: Any, path: Path) -> Any:
 
 
 def _bodies_of(table: Any, where: str, path: Path) -> Any:
+    if isinstance(table, dict) and isinstance(table.get("openings"), list):
+        volumes = [_bodies_of(one, f"{where}.openings[{k}]", path) for k, one in enumerate(table["openings"])]
+        table = {**table, "openings": volumes}
     if not isinstance(table, dict) or "from" not in table or table.get("kind") not in ALL_FIELDS:
         return table
     kind, name = ALL_FIELDS[table["kind"]], table["from"]

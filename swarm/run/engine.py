@@ -21,6 +21,7 @@ from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
+from ..surfaces.openings import Openings
 from ..surfaces.period import Period
 from . import failures
 from .tiers import Tier
@@ -69,6 +70,7 @@ class Run:
             None if laws is None or laws.thermal is None else np.zeros((len(self._owners), n)),
             particles.image,
             *_cell(scene, n),
+            *_none_escaped(scene, n),
         )
         self._scene, self._method = scene, method
         self._numbers, self._law = method.numbers(scene), method.law()
@@ -228,6 +230,8 @@ class Run:
                 # What is at rest costs this much.
                 self.state.impulse[: len(contacts.load)] += contacts.load * (span * self.state.mass)
                 contacts.sliding[:] += span * rests
+        if self.state.escape_time is not None:
+            self._phase[~np.isnan(self.state.escape_time)] = ARRIVED
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
@@ -252,7 +256,9 @@ class Run:
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """What a thread shares with the others, and its counts."""
         pending = np.zeros(PHASES, np.int64)
-        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed)
+        return lanes.Share(
+            self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed, self._moment
+        )
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
@@ -267,7 +273,7 @@ class Run:
                 self._gravity,
                 share,
             )
-        mine = compose.empty(self.state.period)
+        mine = compose.empty(self.state.period, self.state.openings)
         return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, mine)
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
@@ -322,6 +328,8 @@ class Run:
         seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
         is_open = self._far < math.inf
         escaped = self._tier.kernel(observables.count_escaped)(*self._escaping) if is_open else 0
+        if self.state.escape_time is not None:
+            escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
         return {**seen, **self._poses(), "escaped": int(escaped)}
 
     def _poses(self) -> dict[str, NDArray[Any]]:
@@ -353,6 +361,12 @@ def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | No
     """What the state needs besides images where a scene repeats."""
     period = scene.cell()
     return None if period is None or period.fall is None else np.zeros(n), period
+
+
+def _none_escaped(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Openings | None]:
+    """What the state needs besides where walls have openings."""
+    openings = scene.openings()
+    return None if openings is None else np.full(n, math.nan), openings
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:
