@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.jit import Array
+from .spline import MARGIN
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -21,8 +22,6 @@ _BERNSTEIN = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.
 _BATCH = 16_384
 # Of the largest coefficient of a cell, the round-off that a sign may have.
 _NOISE = 64.0 * np.finfo(np.float64).eps
-# Bounds of second derivatives hold this part of a cell beyond the cell, where a flight ends that leaves it.
-MARGIN = 1e-6
 # The clearance is known up to this many cells: a flight through empty space takes a step for each.
 _FARTHEST = 63
 # The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and how far H is from it at most.

@@ -16,8 +16,8 @@ from .. import contract
 from ..course import rise_time
 from ..march import bisected
 from . import spline as splines
-from .cells import MARGIN, SPREAD, Cells
-from .spline import Spline
+from .cells import SPREAD, Cells
+from .spline import MARGIN, Spline
 
 _EPSILON = float(np.finfo(np.float64).eps)
 # Steps of one flight; what is not found by then goes on in the next pass.

@@ -14,6 +14,9 @@ from ...kernel.vector import Symmetric, Vec, norm, times
 Floats = NDArray[np.float64]
 # Samples along each axis, at least: the ends of the spline take four.
 LEAST = 4
+# A flight that leaves a cell ends this part of a cell beyond it, where no round-off takes it back: so far is known what
+# is known of the cell, and so far outside of the grid the spline goes on.
+MARGIN = 1e-6
 
 
 class Spline(NamedTuple):
@@ -91,12 +94,12 @@ def place_of(spline, r):
 
 @inlined
 def _within(u, count):
-    return np.minimum(np.maximum(u, 0.0), count)
+    return np.minimum(np.maximum(u, -MARGIN), count + MARGIN)
 
 
 @inlined
 def _whole(u, count):
-    return np.minimum(np.floor(u), count - 1.0)
+    return np.maximum(np.minimum(np.floor(u), count - 1.0), 0.0)
 
 
 # --- Values ----------------------------------------------------------------------------------------------
@@ -192,7 +195,7 @@ def value_and_slope(spline, r):
     sideways = _over(x, _plane(table, place, _slopes(place.at.y)))
     # Outside of the grid phi goes on with the value at its border, and rises.
     away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
-    further = place.off * (spline.steepness / np.maximum(away, np.finfo(np.float64).tiny))
+    further = (place.off / np.maximum(away, np.finfo(np.float64).tiny)) * spline.steepness
     slope = Vec(
         inside.x * k.x * _sum(z, across) + further.x,
         inside.y * k.y * _sum(z, sideways) + further.y,
