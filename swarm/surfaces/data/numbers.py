@@ -96,7 +96,7 @@ def _is_in(u, count):
 
 @inlined
 def _layer(u, count):
-    return min(max(math.floor(u), 0.0), count - 1.0)
+    return min(max(np.floor(u), 0.0), count - 1.0)
 
 
 @inlined
@@ -205,6 +205,8 @@ def march(surface, r, v, pull):
     if norm(v) == 0.0 and g == 0.0:
         return math.inf, True
     for i in range(_MARCH):
+        if g == 0.0:
+            t = _through_empty(surface, r, v, t)
         p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
         cell = _cell_of(surface, p)
         if not cell.inside or cell.clear >= 0.0:
@@ -221,14 +223,7 @@ def march(surface, r, v, pull):
             if level * speed <= 2.0 * _ROUND_OFF * half * room:
                 return t, True
             return bisected(surface, r, v, pull, before, t), True
-        out = _until_out(surface, cell.low, 1.0, p, w, pull)
-        bent = _bent(surface, cell.row, n, w, pull, out)
-        step = min(rise_time(level, half, bent.most), out)
-        if g > 0.0 and 2.0 * step < out:
-            # Again with the bounds of a shorter time
-            out = 2.0 * step
-            bent = _bent(surface, cell.row, n, w, pull, out)
-            step = min(max(step, rise_time(level, half, bent.most)), out)
+        step, out, bent = _safe_step(surface, cell, Near(level, half, n), p, w, pull)
         before, t = t, t + step
         # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
         # least this.
@@ -237,6 +232,63 @@ def march(surface, r, v, pull):
         if step < out and arrives and (i > 0 or rising > 0.0 or step == 0.0):
             return t, True
     return t, False
+
+
+class Near(NamedTuple):
+    """The level, half of its slope along a flight, and the gradient of phi."""
+
+    level: float
+    half: float
+    slope: Vec
+
+
+@inlined
+def _safe_step(surface, cell, near, r, v, pull):
+    """(a time during which a flight surely stays admissible, within which its bounds hold, these as `Bent`)."""
+    # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
+    speed, falls = norm(v), norm(pull) > 0.0
+    out = _least(surface.spline.width) / speed if speed > 0.0 else 0.0
+    bent = _bent(surface, cell.row, near.slope, v, pull, 0.0)
+    step = rise_time(near.level, near.half, bent.most)
+    if falls or not step < out:
+        out = _until_out(surface, cell.low, 1.0, r, v, pull)
+        bent = _bent(surface, cell.row, near.slope, v, pull, out)
+        step = min(rise_time(near.level, near.half, bent.most), out)
+    if falls and 2.0 * step < out:
+        # Again with the bounds of a shorter time
+        out = 2.0 * step
+        bent = _bent(surface, cell.row, near.slope, v, pull, out)
+        step = min(max(step, rise_time(near.level, near.half, bent.most)), out)
+    return step, out, bent
+
+
+@outlined
+def _through_empty(surface, r, v, t):
+    """The time from t on at which a straight flight comes to a cell where the surface may be, or out of the grid.
+
+    A step is as long as the clearance or as the way out of the cell, in units of cells, and without a branch: most of
+    the steps of a flight are these.
+    """
+    made, cells = surface.spline, surface.cells
+    u, w, n = times(r - made.low, made.inverse), times(v, made.inverse), made.shape
+    # By each part of the clearance, and by each cell along an axis
+    rate, pace = cells.unit / norm(v), Vec(_inverse(w.x), _inverse(w.y), _inverse(w.z))
+    for _i in range(_MARCH):
+        p = u + t * w
+        low = Vec(_layer(p.x, n.x), _layer(p.y, n.y), _layer(p.z, n.z))
+        clear = float(cells.clear[index(int(low.x)), index(int(low.y)), index(int(low.z))])
+        if clear == 0.0 or not (_is_in(p.x, n.x) & _is_in(p.y, n.y) & _is_in(p.z, n.z)):
+            break
+        x = (low.x + select(w.x >= 0.0, 1.0 + MARGIN, -MARGIN) - p.x) * pace.x
+        y = (low.y + select(w.y >= 0.0, 1.0 + MARGIN, -MARGIN) - p.y) * pace.y
+        z = (low.z + select(w.z >= 0.0, 1.0 + MARGIN, -MARGIN) - p.z) * pace.z
+        t += max((clear - 1.0) * rate, min(x, y, z), _EPSILON * t)
+    return t
+
+
+@inlined
+def _inverse(x):
+    return select(x != 0.0, 1.0 / select(x != 0.0, x, 1.0), math.inf)
 
 
 @inlined
@@ -310,5 +362,5 @@ def _safe_time(surface, r, v, pull):
     level, half = surface.side * value, 0.5 * surface.side * dot(n, v)
     if level > 0.0:
         return 0.0
-    out = _until_out(surface, cell.low, 1.0, r, v, pull)
-    return min(rise_time(level, half, _bent(surface, cell.row, n, v, pull, out).most), out)
+    step, _out, _bent_there = _safe_step(surface, cell, Near(level, half, n), r, v, pull)
+    return step

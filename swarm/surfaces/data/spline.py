@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernel.fours import Four, over_block, sum_of
 from ...kernel.jit import Array, inlined, outlined
 from ...kernel.vector import Symmetric, Vec, norm, times
 
@@ -105,15 +106,6 @@ def _whole(u, count):
 # --- Values ----------------------------------------------------------------------------------------------
 
 
-class Four(NamedTuple):
-    """The four basis functions that are not 0 in a cell, or a derivative of them."""
-
-    a: Any
-    b: Any
-    c: Any
-    d: Any
-
-
 @inlined
 def basis(t):
     """The basis functions at a place in the cell."""
@@ -142,74 +134,29 @@ def _bends(t):
 
 
 @inlined
-def _row(table, i, j, k):
-    return Four(table[i, j, k], table[i, j, k + 1], table[i, j, k + 2], table[i, j, k + 3])
-
-
-@inlined
-def _sum(w, c):
-    return (w.a * c.a + w.b * c.b) + (w.c * c.c + w.d * c.d)
-
-
-@inlined
-def _combined(w, p, q, s, t):
-    """w.a p + w.b q + w.c s + w.d t, of four."""
-    return Four(
-        (w.a * p.a + w.b * q.a) + (w.c * s.a + w.d * t.a),
-        (w.a * p.b + w.b * q.b) + (w.c * s.b + w.d * t.b),
-        (w.a * p.c + w.b * q.c) + (w.c * s.c + w.d * t.c),
-        (w.a * p.d + w.b * q.d) + (w.c * s.d + w.d * t.d),
-    )
-
-
-@inlined
-def _layer(table, i, j, k, y):
-    """Along z, the sums over y of one layer of a cell's coefficients."""
-    return _combined(
-        y, _row(table, i, j, k), _row(table, i, j + 1, k), _row(table, i, j + 2, k), _row(table, i, j + 3, k)
-    )
-
-
-@inlined
-def _plane(table, place, y):
-    """The four layers of a cell."""
-    i, j, k = place.x, place.y, place.z
-    return Four(
-        _layer(table, i, j, k, y), _layer(table, i + 1, j, k, y), _layer(table, i + 2, j, k, y),
-        _layer(table, i + 3, j, k, y),
-    )  # fmt: skip
-
-
-@inlined
-def _over(w, plane):
-    return _combined(w, plane.a, plane.b, plane.c, plane.d)
-
-
-@outlined
 def value_and_slope(spline, r):
     """phi and its gradient."""
     place, table, k = place_of(spline, r), spline.coefficients, spline.inverse
     x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
-    plane = _plane(table, place, y)
-    column, across = _over(x, plane), _over(_slopes(place.at.x), plane)
-    sideways = _over(x, _plane(table, place, _slopes(place.at.y)))
+    column, across = over_block(table, place, x, y), over_block(table, place, _slopes(place.at.x), y)
+    sideways = over_block(table, place, x, _slopes(place.at.y))
     # Outside of the grid phi goes on with the value at its border, and rises.
     away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
     further = (place.off / np.maximum(away, np.finfo(np.float64).tiny)) * spline.steepness
     slope = Vec(
-        inside.x * k.x * _sum(z, across) + further.x,
-        inside.y * k.y * _sum(z, sideways) + further.y,
-        inside.z * k.z * _sum(_slopes(place.at.z), column) + further.z,
+        inside.x * k.x * sum_of(z, across) + further.x,
+        inside.y * k.y * sum_of(z, sideways) + further.y,
+        inside.z * k.z * sum_of(_slopes(place.at.z), column) + further.z,
     )
-    return _sum(z, column) + spline.steepness * away, slope
+    return sum_of(z, column) + spline.steepness * away, slope
 
 
 @outlined
 def value(spline, r):
     """phi alone."""
     place = place_of(spline, r)
-    column = _over(basis(place.at.x), _plane(spline.coefficients, place, basis(place.at.y)))
-    return _sum(basis(place.at.z), column) + spline.steepness * norm(place.off)
+    column = over_block(spline.coefficients, place, basis(place.at.x), basis(place.at.y))
+    return sum_of(basis(place.at.z), column) + spline.steepness * norm(place.off)
 
 
 @outlined
@@ -218,15 +165,13 @@ def half_bend(spline, r):
     place, table, k = place_of(spline, r), spline.coefficients, spline.inverse
     x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
     dx, dy, dz = _slopes(place.at.x), _slopes(place.at.y), _slopes(place.at.z)
-    plane, tilted = _plane(table, place, y), _plane(table, place, dy)
-    column, across = _over(x, plane), _over(dx, plane)
     return Symmetric(
-        0.5 * k.x * k.x * _sum(z, _over(_bends(place.at.x), plane)),
-        0.5 * k.y * k.y * _sum(z, _over(x, _plane(table, place, _bends(place.at.y)))),
-        0.5 * k.z * k.z * _sum(_bends(place.at.z), column),
-        0.5 * k.x * k.y * _sum(z, _over(dx, tilted)),
-        0.5 * k.y * k.z * _sum(dz, _over(x, tilted)),
-        0.5 * k.z * k.x * _sum(dz, across),
+        0.5 * k.x * k.x * sum_of(z, over_block(table, place, _bends(place.at.x), y)),
+        0.5 * k.y * k.y * sum_of(z, over_block(table, place, x, _bends(place.at.y))),
+        0.5 * k.z * k.z * sum_of(_bends(place.at.z), over_block(table, place, x, y)),
+        0.5 * k.x * k.y * sum_of(z, over_block(table, place, dx, dy)),
+        0.5 * k.y * k.z * sum_of(dz, over_block(table, place, x, dy)),
+        0.5 * k.z * k.x * sum_of(dz, over_block(table, place, dx, y)),
     )
 
 
@@ -259,6 +204,6 @@ def difference(spline, r0, r1):
     # x1 y1 z1 - x0 y0 z0 = (x1 - x0) y1 z1 + x0 (y1 - y0) z1 + x0 y0 (z1 - z0)
     table, x0, y0 = spline.coefficients, basis(a.at.x), basis(a.at.y)
     y1, z1, d = basis(b.at.y), basis(b.at.z), times(r1 - r0, spline.inverse)
-    along_x = _sum(z1, _over(_steps(a.at.x, b.at.x, d.x), _plane(table, a, y1)))
-    along_y = _sum(z1, _over(x0, _plane(table, a, _steps(a.at.y, b.at.y, d.y))))
-    return along_x + along_y + _sum(_steps(a.at.z, b.at.z, d.z), _over(x0, _plane(table, a, y0)))
+    along_x = sum_of(z1, over_block(table, a, _steps(a.at.x, b.at.x, d.x), y1))
+    along_y = sum_of(z1, over_block(table, a, x0, _steps(a.at.y, b.at.y, d.y)))
+    return along_x + along_y + sum_of(_steps(a.at.z, b.at.z, d.z), over_block(table, a, x0, y0))
