@@ -5,7 +5,12 @@ from collections.abc import Iterator
 
 from .errors import SceneError
 
-_PACKAGES = {"record": "rerun-sdk scikit-image contourpy", "plot": "matplotlib scikit-image", "bodies": "scipy"}
+_PACKAGES = {
+    "record": "rerun-sdk scikit-image contourpy",
+    "plot": "matplotlib scikit-image",
+    "bodies": "scipy",
+    "mesh": "trimesh libigl",
+}
 
 
 @contextlib.contextmanager

@@ -19,6 +19,7 @@ from .kernel.vector import Vec
 from .particles import Particles
 from .surfaces import required
 from .surfaces import rotation as rotations
+from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, chain_in, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
@@ -29,7 +30,7 @@ from .surfaces.openings import Openings, openings_in, require_few, volumes_of
 from .surfaces.period import Period
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.room import has_room
-from .surfaces.surface import SIDES, Box, HalfSpace, Surface
+from .surfaces.surface import SIDES, UNBOUNDED, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
@@ -97,6 +98,7 @@ class Scene:
                 f"list its bodies one by one, at most {MOST_WALLS} walls in all"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
+        require_known(surfaces, lambda held: self._bounds(0.0, held))
         if not self._has_volume():
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
@@ -299,15 +301,20 @@ class Scene:
 
     def bounds(self, time: float = 0.0) -> Box:
         """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
-        boxes = np.array([_box(surface, time) for surface in self.surfaces])
+        low, high = self._bounds(time, self.surfaces)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A box around the volume that some of the surfaces leave, and the cell that repeats."""
+        boxes = np.array([_box(surface, time) for surface in surfaces] or [UNBOUNDED])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
         if self.period is not None:
             corners = np.array(cell_of(self.period))
             low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
-        planes = [plane for surface in self.surfaces for plane in _placed(surface, surface.half_spaces(), time)]
+        planes = [plane for surface in surfaces for plane in _placed(surface, surface.half_spaces(), time)]
         if planes:
             low, high = polyhedron_bounds(planes, low, high)
-        return tuple(low.tolist()), tuple(high.tolist())
+        return low, high
 
     def _has_volume(self) -> bool:
         low, high = (np.array(corner) for corner in self.bounds())

@@ -16,7 +16,7 @@ from .errors import SceneError
 from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
-from .surfaces import ALL_SURFACES, OwnSurface, Surface
+from .surfaces import ALL_SURFACES, OwnSurface, Sampled, Surface
 
 T = TypeVar("T")
 
@@ -51,7 +51,8 @@ def table_of(described: Surface | Method) -> dict[str, Any]:
         return _with_openings(described.table(), described)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
-    table = {keys[name]: value for name, value in dataclasses.asdict(described).items() if value is not None}
+    given = described.arguments() if isinstance(described, Sampled) else dataclasses.asdict(described)
+    table = {keys[name]: value for name, value in given.items() if value is not None}
     table = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]

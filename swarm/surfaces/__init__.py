@@ -12,6 +12,7 @@ run.
 from . import approach as _approach  # noqa: F401
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
+from .data.sampled import Sampled
 from .fields.boxes import Boxes
 from .fields.capsules import Capsules
 from .fields.cylinders import Cylinders
@@ -51,6 +52,7 @@ __all__ = [
     "Paraboloid",
     "Plane",
     "Quadric",
+    "Sampled",
     "Slab",
     "Sphere",
     "Spheres",
@@ -79,5 +81,6 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "quadric": Quadric,
     "slab": Slab,
     "formula": Formula,
+    "sampled": Sampled,
     **ALL_FIELDS,
 }

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -129,6 +129,15 @@ class Surface:
     def open_faces(self) -> list[HalfSpace]:
         """Where the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
         return []
+
+    def known_in(self) -> Box | None:
+        """The box that particles must not leave, for outside of it the surface is not known; None: it is everywhere."""
+        return None
+
+    def shifted(self, shift: Vector) -> "Surface":
+        """The same surface elsewhere."""
+        x, y, z = (a + b for a, b in zip(self.center, shift, strict=True))  # type: ignore[attr-defined]
+        return replace(self, center=(x, y, z))  # type: ignore[call-arg]
 
     def is_solid(self) -> bool:
         """Whether particles are kept out of it rather than in it."""
