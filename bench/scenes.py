@@ -41,7 +41,9 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
     "sphere, 2 balls, gravity": (_balls(2), GRAVITY, ""),
     "sphere, restitution 0.999": ([swarm.Sphere(0.5, restitution=0.999)], None, ""),
     "capsule": ([swarm.Capsule(0.3, 0.6)], None, ""),
-    "torus": ([swarm.Torus(0.5, 0.2)], None, ""),
+    "capsule, gravity": ([swarm.Capsule(0.3, 0.6)], GRAVITY, ""),
+    "torus": ([swarm.Torus(0.5, 0.2)], None, "40"),
+    "torus, gravity": ([swarm.Torus(0.5, 0.2)], GRAVITY, "150"),
     "formula of the ellipsoid": ([swarm.Formula("x**2/0.09 + y**2/0.09 + z**2/0.36 - 1")], None, "12 x 8"),
     "sphere, box, cylinder, capsule, torus, gravity": (
         [
@@ -52,7 +54,7 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
             swarm.Torus(0.1, 0.03, (0.0, -0.25, 0.0), "outside"),
         ],
         GRAVITY,
-        "",
+        "300",
     ),
 }
 
@@ -67,9 +69,7 @@ def main(quick: bool) -> None:
     measures = {}
     for name in QUICK if quick else SCENES:
         surfaces, gravity, _bar = SCENES[name]
-        # Scenes without vectorised lanes are an order slower.
-        slow = any(isinstance(surface, swarm.Torus | swarm.Capsule | swarm.Formula) for surface in surfaces)
-        measures[name] = advance_seconds(swarm.Scene(surfaces, gravity), swarm.Impact(), n // 10 if slow else n, until)
+        measures[name] = advance_seconds(swarm.Scene(surfaces, gravity), swarm.Impact(), n, until)
     figures = in_turn({name: lambda one=one: 1e9 * per_impact(one) for name, one in measures.items()}, rounds)
     first, _median = figures[next(iter(figures))]
     rows = [

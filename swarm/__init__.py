@@ -41,11 +41,13 @@ if TYPE_CHECKING:
         Paraboloid,
         Plane,
         Quadric,
+        Sampled,
         Slab,
         Sphere,
         Spheres,
         Torus,
     )  # fmt: skip
+    from .surfaces.data.mesh import from_mesh
 
 __version__ = VERSION
 
@@ -68,9 +70,10 @@ _HOMES = {
     "particles": ("Particles",),
     "scene": ("Scene",),
     "run.simulation": ("Result", "simulate"),
+    "surfaces.data.mesh": ("from_mesh",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "OwnSurface", "Paraboloid", "Plane", "Quadric", "Slab", "Sphere", "Spheres", "Torus",
+        "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -79,10 +82,10 @@ __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
     "Impact", "ImpactLog", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty",
-    "Plane", "Quadric", "Result", "Rotation", "RunError", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Strain",
-    "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError", "__version__",
-    "chain", "contact_history", "dumbbell", "elastic", "fill", "load", "load_impacts", "place", "rigid", "simulate",
-    "tetrahedron",
+    "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres",
+    "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
+    "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts",
+    "place", "rigid", "simulate", "tetrahedron",
 ]  # fmt: skip
 
 

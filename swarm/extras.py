@@ -9,6 +9,7 @@ _PACKAGES = {
     "record": "rerun-sdk scikit-image contourpy",
     "plot": "matplotlib scikit-image",
     "bodies": "scipy",
+    "mesh": "trimesh libigl",
     "table": "pandas",
 }
 

@@ -11,7 +11,7 @@ from .contact.energy import contact_energy
 from .kernel.gravity import Nothing, potential
 from .kernel.jit import by_type, inlined, kernel, scratch, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
-from .particles import Floats, State
+from .particles import Floats, State, has_escaped
 from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
@@ -141,7 +141,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                     e = _energies(law, at(chain, 0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = penetration(at(chain, 0.0), r)
+                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(at(chain, 0.0), r))
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * _whole_fall(_fall_of(state.period), state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
@@ -168,7 +168,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
 
 @kernel
 def count_escaped(chain, gravity, far, faces, state):
-    """The number of particles that leave an open scene and do not come back.
+    """The number of particles that leave an open scene and do not come back, not through an opening of a wall.
 
     Those farther from the origin than `far`; those in a straight flight that hits no wall; and those beyond one of the
     open `faces`, rows (n, offset), that fly in its direction n: the walls beside that face are endless, and a particle
@@ -181,7 +181,8 @@ def count_escaped(chain, gravity, far, faces, state):
         for k in range(faces.shape[0]):
             n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
-        count += out or _escapes_from(state.period, gravity, chain, r, v)
+        leaves = out or _escapes_from(state.period, gravity, chain, r, v)
+        count += leaves and not has_escaped(state.escape_time, i)
     return count
 
 

@@ -1,5 +1,6 @@
 """Particles: arrays with one row per component."""
 
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from .columns import read_columns
 from .errors import SceneError
+from .kernel.jit import by_type
 
 Floats = NDArray[np.float64]
 
@@ -141,6 +143,18 @@ class State(NamedTuple):
     image: NDArray[np.int64] | None = None  # (3, N) how many cells away it is
     carry: Floats | None = None  # (N,) what is lost of the energy by round-off at these changes
     period: Any = None  # `Period` of the cell
+    # Where a wall has openings:
+    escape_time: Floats | None = None  # (N,) when each has passed one [s], NaN of those that are inside
+    openings: Any = None  # `Openings` of the walls
+
+
+@by_type
+def has_escaped(escape_time, i):
+    """Whether particle i has passed an opening, and is no more among the walls."""
+    return not math.isnan(escape_time[i])
+
+
+has_escaped.register(type(None), lambda escape_time, i: False)
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -19,16 +19,18 @@ from .kernel.vector import Vec
 from .particles import Particles
 from .surfaces import required
 from .surfaces import rotation as rotations
+from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, chain_in, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
 from .surfaces.moving import Carried, carried
+from .surfaces.openings import Openings, openings_in, require_few, volumes_of
 from .surfaces.period import Period
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.room import has_room
-from .surfaces.surface import SIDES, Box, HalfSpace, Surface
+from .surfaces.surface import SIDES, UNBOUNDED, Box, HalfSpace, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
@@ -64,6 +66,8 @@ class Scene:
     period: Lengths | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    # The volumes in which every surface is open.
+    volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -84,13 +88,17 @@ class Scene:
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "period", lengths_of(period))
         object.__setattr__(self, "_images", tuple(self._images_of(i) for i in range(len(surfaces))))
+        named = ((surface, self.period, f"surfaces[{i}]") for i, surface in enumerate(surfaces))
+        object.__setattr__(self, "volumes", tuple(volumes_of(*one) for one in named))
         self._require_few_walls("")
+        require_few(self.volumes)
         for i in self._fields() if self.moves() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where a surface moves, got {surfaces[i]}; "
                 f"list its bodies one by one, at most {MOST_WALLS} walls in all"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
+        require_known(surfaces, lambda held: self._bounds(0.0, held))
         if not self._has_volume():
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
@@ -183,6 +191,10 @@ class Scene:
             Moves(0.0) if self.moves() else None,
         )
         return None if laws == (None, None, None, None) else laws
+
+    def openings(self) -> Openings | None:
+        """The openings of every wall of the chain as kernels take them, None where there are none."""
+        return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self._owner])
 
     def _of_walls(self, values: list[Any], neutral: Any) -> Chain | Span | None:
         """The value of the owner of every wall as a chain, None where all are neutral."""
@@ -293,15 +305,20 @@ class Scene:
 
     def bounds(self, time: float = 0.0) -> Box:
         """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
-        boxes = np.array([_box(surface, time) for surface in self.surfaces])
+        low, high = self._bounds(time, self.surfaces)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A box around the volume that some of the surfaces leave, and the cell that repeats."""
+        boxes = np.array([_box(surface, time) for surface in surfaces] or [UNBOUNDED])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
         if self.period is not None:
             corners = np.array(cell_of(self.period))
             low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
-        planes = [plane for surface in self.surfaces for plane in _placed(surface, surface.half_spaces(), time)]
+        planes = [plane for surface in surfaces for plane in _placed(surface, surface.half_spaces(), time)]
         if planes:
             low, high = polyhedron_bounds(planes, low, high)
-        return tuple(low.tolist()), tuple(high.tolist())
+        return low, high
 
     def _has_volume(self) -> bool:
         low, high = (np.array(corner) for corner in self.bounds())

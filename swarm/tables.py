@@ -16,7 +16,7 @@ from .errors import SceneError
 from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
-from .surfaces import ALL_SURFACES, OwnSurface, Surface
+from .surfaces import ALL_SURFACES, OwnSurface, Sampled, Surface
 
 T = TypeVar("T")
 
@@ -25,8 +25,19 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None) -> Scene:
     """A scene from its tables: a list of surface tables, gravity or None, and the period or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
-    built = [of_kind(table, f"surface[{i}]", ALL_SURFACES) for i, table in enumerate(surfaces)]
+    built = [_surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     return Scene(surfaces=built, gravity=gravity, period=period)
+
+
+def _surface_of(table: Any, where: str) -> Surface:
+    """A surface from its table, in which those of its openings may be."""
+    if isinstance(table, Mapping) and "openings" in table:
+        given = table["openings"]
+        if not isinstance(given, list):
+            raise SceneError(f"{where}.openings: expected [[surface.openings]] tables, got {given!r:.200}")
+        openings = [_surface_of(one, f"{where}.openings[{k}]") for k, one in enumerate(given)]
+        table = {**table, "openings": openings}
+    return of_kind(table, where, ALL_SURFACES)
 
 
 def method_of(table: Any) -> Method:
@@ -37,14 +48,24 @@ def method_of(table: Any) -> Method:
 def table_of(described: Surface | Method) -> dict[str, Any]:
     """The table of a surface or a method: its kind, and every argument that is not None."""
     if isinstance(described, OwnSurface):
-        return described.table()
+        return _with_openings(described.table(), described)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
-    table = {keys[name]: value for name, value in dataclasses.asdict(described).items() if value is not None}
+    given = described.arguments() if isinstance(described, Sampled) else dataclasses.asdict(described)
+    table = {keys[name]: value for name, value in given.items() if value is not None}
     table = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
-    return {"kind": kinds[type(described)], **table}
+    return _with_openings({"kind": kinds[type(described)], **table}, described)
+
+
+def _with_openings(table: dict[str, Any], described: Surface | Method) -> dict[str, Any]:
+    """The table of a surface, with those of its openings if it has any."""
+    if isinstance(described, Surface):
+        del table["openings"]
+        if described.openings:
+            table["openings"] = [table_of(opening) for opening in described.openings]
+    return table
 
 
 def scene_table(scene: Scene) -> dict[str, Any]:

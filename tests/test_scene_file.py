@@ -85,6 +85,50 @@ def test_motions_of_walls(tmp_path, text):
     assert read(tmp_path, again).scene == job.scene
 
 
+HOLES = """
+[[surface.openings]]
+kind = "sphere"
+radius = 0.1
+center = [0.0, 0.0, 0.5]
+
+[[surface.openings]]
+kind = "spheres"
+from = "holes.csv"
+"""
+
+
+def test_openings_of_walls(tmp_path):
+    """And back into a file, without the one of bodies from a file."""
+    (tmp_path / "holes.csv").write_text("x,y,z,radius\n0.5,0,0,0.1\n0,0.5,0,0.05\n")
+    job = read(tmp_path, GOOD.replace("radius = 0.5\n", f"radius = 0.5\n{HOLES}"))
+    first, second = job.scene.surfaces[0].openings
+    assert first == swarm.Sphere(0.1, center=(0.0, 0.0, 0.5))
+    assert (second.centers.tolist(), second.radii.tolist()) == ([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]], [0.1, 0.05])
+    again = read(tmp_path, tomli_w.dumps({**tomllib.loads(GOOD), **tables.scene_table(job.scene)}))
+    assert tables.scene_table(again.scene) == tables.scene_table(job.scene)
+    assert again.scene.surfaces[0].openings[0] == first
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("radius = 0.1", "radius = -0.1", r"surface\[0\]\.openings\[0\]\.radius must be above 0, got -0\.1"),
+        ("radius = 0.1", "radios = 0.1", r"surface\[0\]\.openings\[0\]\.radios: unknown key.*did you mean 'radius'"),
+        ("radius = 0.1", "radius = 0.1\nfriction = 0.1", r"surface\[0\]\.openings\[0\]\.friction must be left out"),
+        ('kind = "spheres"', 'kind = "sphres"', r"surface\[0\]\.openings\[1\]\.kind must be one of .* mean 'spheres'"),
+        ("holes.csv", "hole.csv", r"surface\[0\]\.openings\[1\]\.from: cannot read .*hole\.csv"),
+        ("0.0, 0.0, 0.5]", "0.0, 0.0, 0.9]", r"surfaces\[0\]\.openings\[0\] must reach the wall that it opens"),
+        (HOLES, "openings = 3\n", r"surface\[0\]\.openings: expected \[\[surface\.openings\]\] tables, got 3"),
+        (HOLES, "openings = [3]\n", r"surface\[0\]\.openings\[0\]: expected a table with a kind, got 3"),
+    ],
+)
+def test_bad_openings_name_the_key(tmp_path, old, new, message):
+    assert old in HOLES
+    (tmp_path / "holes.csv").write_text("x,y,z,radius\n0.5,0,0,0.1\n")
+    with pytest.raises(swarm.SceneError, match=message):
+        read(tmp_path, GOOD.replace("radius = 0.5\n", f"radius = 0.5\n{HOLES.replace(old, new)}"))
+
+
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("examples/scenes/*.toml")), ids=lambda p: p.stem)
 def test_shipped_scenes_are_read(path):
     job = scene_file.read(path)

@@ -285,9 +285,9 @@ def _smooth(name: str, surface: Any) -> Surface:
         raise SceneError(
             f"{name} must be a surface without edges, got {surface!r} of {walls} walls; give one for each wall"
         )
-    if surface.motion is not None or surface.reacts():
+    if surface.motion is not None or surface.reacts() or surface.openings:
         raise SceneError(
-            f"{name} must have no motion, mass or inertia, got {surface!r}; a cavity moves with its carrier, and "
-            "anchors lead points"
+            f"{name} must have no motion, mass, inertia or openings, got {surface!r}; a cavity moves with its carrier, "
+            "and anchors lead points"
         )
     return surface

@@ -58,7 +58,7 @@ def _meets_one(members, number, held, path, near):
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
         return True
-    block = _block_of(grid, path, near)
+    block = block_of_path(grid, path, near)
     for k in range(size_of(block)):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
@@ -70,7 +70,7 @@ def _meets_one(members, number, held, path, near):
 
 
 @inlined
-def _block_of(grid, path, near):
+def block_of_path(grid, path, near):
     """The cells that the control points of a step reach into."""
     third = path.h / 3.0
     a, b = path.r0 + third * path.v0, path.r1 - third * path.v1
@@ -146,7 +146,7 @@ def _(chain, number, held, path, near, left):
 def _first_of(members, number, held, path, near, later):
     """The first of that and of what a step meets of a field that has so many walls before it."""
     grid, found = members.grid, later
-    block = _block_of(grid, path, near)
+    block = block_of_path(grid, path, near)
     for k in range(size_of(block)):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
@@ -182,7 +182,7 @@ def _deep_later(chain, wall, path, near, left):
     low, high = 0.0, math.inf
     for k in range(1, _PLACES + 1):
         s = k / _PLACES
-        if walls.distance(at(chain, left - s * path.h), wall, _at(path, s)) > near:
+        if walls.distance(at(chain, left - s * path.h), wall, at_part(path, s)) > near:
             high = s
             break
         low = s
@@ -190,7 +190,7 @@ def _deep_later(chain, wall, path, near, left):
         return high
     for _i in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if walls.distance(at(chain, left - middle * path.h), wall, _at(path, middle)) > 0.0:
+        if walls.distance(at(chain, left - middle * path.h), wall, at_part(path, middle)) > 0.0:
             high = middle
         else:
             low = middle
@@ -205,7 +205,7 @@ def _deep_after(surface, path, near):
         return 0.0
     low, high = 0.0, math.inf
     for k in range(1, _PLACES + 1):
-        if contract.distance(surface, _at(path, k / _PLACES)) > near:
+        if contract.distance(surface, at_part(path, k / _PLACES)) > near:
             high = k / _PLACES
             break
         low = k / _PLACES
@@ -214,7 +214,7 @@ def _deep_after(surface, path, near):
         return time if found and 0.0 < time < 1.0 else math.inf
     for _i in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if contract.distance(surface, _at(path, middle)) > 0.0:
+        if contract.distance(surface, at_part(path, middle)) > 0.0:
             high = middle
         else:
             low = middle
@@ -222,7 +222,7 @@ def _deep_after(surface, path, near):
 
 
 @inlined
-def _at(path, s):
+def at_part(path, s):
     """Where the cubic through both ends of a step is."""
     r0, a, b, c = cubic(path)
     return r0 + s * (a + s * (b + s * c))

@@ -85,6 +85,7 @@ class Share(NamedTuple):
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
     seed: int  # of random numbers
+    moment: float  # at which the frame ends [s]
     log: Any = None  # `log.Log` of impacts
 
 

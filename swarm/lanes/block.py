@@ -41,6 +41,7 @@ from .arrays import (
 from .arrays import (
     heat as book_heat,
 )
+from .escape import let_out_lanes
 from .fly import go, marked_lanes, put_end
 from .solve import solution, solve
 from .wrap import return_lanes
@@ -165,6 +166,7 @@ def _pass(method, chain, gravity, share, lanes, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     return_lanes(lanes.period, share.state, lanes, live)
+    let_out_lanes(share.state.openings, share, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     impact_log.keep_before(share.log, lanes, live)

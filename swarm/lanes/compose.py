@@ -8,9 +8,10 @@ import numpy as np
 from ..contact import crossing, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
+from ..contact.passing import may_pass
 from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import Array, by_type, inlined, select
+from ..kernel.jit import Array, by_type, inlined, outlined, select
 from ..kernel.vector import ZERO, column, either, put, square
 from ..methods import contract as methods
 from ..surfaces import fold as walls
@@ -44,13 +45,14 @@ class Lanes(NamedTuple):
     gained: Array  # twice what walls that move give in the step of this pass, per mass
     after: Array  # twice the energy per mass at its end
     period: Any  # the cell where it repeats
+    openings: Any  # of the walls, or None
 
 
 # What a step may end with.
-LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES = 1, 2, 4, 8, 16, 32
+LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES = 1, 2, 4, 8, 16, 32, 64
 
 
-def empty(period: Any = None) -> Lanes:
+def empty(period: Any = None, openings: Any = None) -> Lanes:
     """Lanes for one block."""
     return Lanes(
         table(ROWS),
@@ -60,6 +62,7 @@ def empty(period: Any = None) -> Lanes:
         table(1)[0],
         table(1)[0],
         period,
+        openings,
     )
 
 
@@ -219,8 +222,10 @@ def end_steps(kind, method, chain, gravity, lanes, live):
         met = crossing.meets(start, now, 0.0, held, path, crossing.near(method, r1))
         good = (ratio <= 1.0) & (lanes.event[i] == 0)
         leaves = is_beyond(lanes.period, r1)
-        fine = good & (not lifted) & (not met) & (not leaves)
+        passes = may_pass(lanes.openings, held, path)
+        fine = good & (not lifted) & (not met) & (not leaves) & (not passes)
         happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
+        happened |= select(passes, PASSES, 0)
         lanes.event[i] |= select(good, happened, 0)
         lanes.unsolved[i] = fine
         # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
@@ -327,3 +332,14 @@ def lose(state, lanes, i, twice):
     p = lanes.particle[i]
     state.energy[p] = 0.5 * lanes.rows[TWICE, i]
     state.dissipated[p] += 0.5 * twice * state.mass[p]
+
+
+@outlined
+def with_kept(kind, chain, lanes, i):
+    """The velocity of a lane with the speed that it keeps across its walls."""
+    rows, v, keep = lanes.rows, column(lanes.rows, V, i), lanes.rows[KEEP, i]
+    if not keep > 0.0:
+        return v
+    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    taken = hold.split_at(held, chain, None, column(rows, R, i), v)
+    return v + keep * hold.inward(held, taken.n, taken.m)

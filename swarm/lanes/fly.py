@@ -1,6 +1,6 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
-from ..kernel.gravity import Gravity, Nothing, as_vector
+from ..kernel.gravity import Gravity, Nothing
 from ..kernel.jit import by_type, index, inlined
 from ..kernel.vector import column, put
 from ..methods import contract as methods
@@ -71,7 +71,18 @@ def _fly(gravity, method, chain, lanes, live):
 
 @_fly.register(Nothing)
 def _(gravity, method, chain, lanes, live):
-    rows = lanes.rows
+    _fly_straight(flights.in_steps(chain), method, chain, lanes, live)
+
+
+@by_type
+def _fly_straight(steps, method, chain, lanes, live):
+    """The same without gravity, where a wall is met by steps or where none is."""
+    _fly_by_steps(None, method, chain, lanes, live)
+
+
+@_fly_straight.register(Nothing)
+def _(steps, method, chain, lanes, live):
+    rows, gravity = lanes.rows, None
     for i in range(index(live)):
         hit = flights.first_hit(at(chain, rows[LEFT, i]), gravity, column(rows, R, i), column(rows, V, i))
         _flight(method, chain, gravity, lanes, i, hit)
@@ -79,29 +90,36 @@ def _(gravity, method, chain, lanes, live):
 
 @_fly.register(Gravity)
 def _(gravity, method, chain, lanes, live):
-    _fall(chain, gravity, lanes, live)
+    _fly_by_steps(gravity, method, chain, lanes, live)
+
+
+@inlined
+def _fly_by_steps(gravity, method, chain, lanes, live):
+    _go_by_steps(chain, gravity, lanes, live)
     for i in range(index(live)):
-        hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
+        hit = flights.end(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
         _flight(method, chain, gravity, lanes, i, hit)
 
 
 @inlined
-def _fall(chain, gravity, lanes, live):
+def _go_by_steps(chain, gravity, lanes, live):
     """The course of every lane to its first hit, by safe steps."""
     rows, course, marked = lanes.rows, lanes.course, lanes.marked
     for i in range(index(live)):
         now = at(chain, rows[LEFT, i])
-        flights.begin_fall(now, course, 0, i, column(rows, R, i), column(rows, V, i), as_vector(gravity))
+        flights.begin(now, gravity, course, 0, i, column(rows, R, i), column(rows, V, i))
     for _step in range(SAFE_STEPS):
         for i in range(index(live)):
-            flights.step_fall(at(chain, rows[LEFT, i]), course, 0, i)
+            now = at(chain, rows[LEFT, i])
+            flights.step(now, gravity, course, 0, i, column(rows, R, i), column(rows, V, i))
     # The few that need more, one by one: a flight in two parts would look like a short one.
     for i in range(index(live)):
         marked[i] = _needs_more(chain, lanes, i)
     for k in range(marked_lanes(lanes, live)):
         lane = lanes.order[k]
         for _step in range(MORE_STEPS):
-            flights.step_fall(at(chain, rows[LEFT, lane]), course, 0, lane)
+            now = at(chain, rows[LEFT, lane])
+            flights.step(now, gravity, course, 0, lane, column(rows, R, lane), column(rows, V, lane))
             if not _needs_more(chain, lanes, lane):
                 break
 
@@ -109,7 +127,7 @@ def _fall(chain, gravity, lanes, live):
 @inlined
 def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
-    hit = flights.end_fall(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
+    hit = flights.end(at(chain, lanes.rows[LEFT, i]), lanes.course, 0, i)
     return (hit.wall < 0.0) & (hit.time < lanes.rows[LEFT, i])
 
 

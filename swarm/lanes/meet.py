@@ -15,9 +15,11 @@ from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
+from ..surfaces.openings import Openings
 from . import log as impact_log
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
+from .escape import let_out_at, let_out_of
 from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
@@ -49,6 +51,9 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    if let_out_of(state.openings, method, share, i, contacts.met[i], r, left):
+        _leave(share, i)
+        return True
     carried, chain = chain, at(chain, left)
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
@@ -93,6 +98,17 @@ def _decide(method, chain, gravity, share, i):
     share.phase[i] = phase
     share.pending[phase] += 1
     return again < _MOST
+
+
+@outlined
+def _leave(share, i):
+    """Particle i has escaped."""
+    contacts = share.state.contacts
+    contacts.left[i], contacts.keep[i] = 0.0, 0.0
+    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+    contacts.phase[i] = FLYING
+    share.phase[i] = ARRIVED
+    share.pending[ARRIVED] += 1
 
 
 @by_type_outlined
@@ -216,13 +232,17 @@ def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     impulses = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    now = at(chain, left)
+    if let_out_at(state.openings, method, now, share, i, r, left):
+        _leave(share, i)
+        return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
-    now = at(chain, left)
     if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
         _rest(method, chain, gravity, share, i, p, held)
         return
     contacts.short_steps[i] += 1.0
+    p = _looked_at(state.openings, method, p)
     end = events.careful(method, chain, gravity, contacts.met[i], p, impulses)
     for s in range(impulses.shape[0]):
         state.impulse[s, i] += impulses[s, 0] * state.mass[i]
@@ -237,6 +257,19 @@ def _step(method, chain, gravity, share, i):
     contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
     share.phase[i] = phase
     share.pending[phase] += 1
+
+
+@by_type
+def _looked_at(openings, method, p):
+    """A particle whose step may have any length, or a short one where the places on its way are looked at."""
+    return p
+
+
+@_looked_at.register(Openings)
+def _(openings, method, p):
+    most = 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))
+    moves_on = square(p.v) > 0.0
+    return events.Particle(p.r, p.v, min(p.left, most) if moves_on else p.left, p.twice, p.scale2)
 
 
 @by_type_outlined

@@ -13,6 +13,7 @@ from ..contact import crossing, events, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
+from ..contact.passing import part_until_open
 from ..contact.reflection import wall_velocity
 from ..kernel.gravity import potential
 from ..kernel.jit import by_type, index, inlined, kernel, outlined
@@ -31,6 +32,7 @@ from .compose import (
     LEFT,
     LIFTED,
     MET,
+    PASSES,
     PRESS,
     PRESS1,
     R1,
@@ -54,8 +56,10 @@ from .compose import (
     lose,
     push,
     twice_after,
+    with_kept,
     work,
 )  # fmt: skip
+from .escape import is_at_opening
 from .stay import phase_of, stay
 from .wrap import return_particle, return_sliding
 
@@ -172,6 +176,8 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
     r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
     now = at(chain, left)
+    if is_at_opening(lanes.openings, kind, method, now, state, lanes, i):
+        return EVENT
     force = slides.force(laws, held, now, gravity, r, v)
     put(rows, A, i, force.acceleration)
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
@@ -197,10 +203,8 @@ def _retire(kind, moving, chain, share, lanes, i, phase):
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
     v, keep = column(rows, V, i), rows[KEEP, i]
     slid = phase != FLYING and phase != CAREFUL
-    if keep > 0.0 and not (slid and rows[LEFT, i] > 0.0):
-        held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-        taken = hold.split_at(held, at(chain, rows[LEFT, i]), None, column(rows, R, i), v)
-        v = v + keep * hold.inward(held, taken.n, taken.m)
+    if not (slid and rows[LEFT, i] > 0.0):
+        v = with_kept(kind, at(chain, rows[LEFT, i]), lanes, i)
     if phase == FLYING:
         now, r = at(chain, rows[LEFT, i]), column(rows, R, i)
         v = events.off_the_wall(now, rows[WALL, i], r, v, wall_velocity(moving, now, rows[WALL, i], r))
@@ -263,9 +267,10 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
             put(rows, R, i, walls.settle(at(chain, rows[LEFT, i]), met.wall, r))
             return EVENT
         cut = min(cut, met.time)
-    if event & LEAVES:
+    if event & (LEAVES | PASSES):
         path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
         cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
+        cut = min(cut, part_until_open(lanes.openings, held, path, crossing.near(method, r)))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(kind, method, chain, gravity, state, lanes, i)

@@ -125,6 +125,11 @@ def _require_reacting(scene: Scene) -> None:
                 f"surfaces[{i}].temperature must be None where a wall has a mass, got {surface.temperature:g}; heat "
                 "the particles at the start, or give the wall a motion instead of a mass"
             )
+        if surface.openings:
+            raise SceneError(
+                f"surfaces[{i}].openings must be left out where a wall has a mass, got {len(surface.openings)}; give "
+                "that wall a motion instead of a mass"
+            )
         if surface.friction > 0.0 and surface.reacts():
             raise SceneError(
                 f"surfaces[{i}].friction must be 0 of a wall with a mass, which is pushed along its normals, got "

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..particles import State
-from .layout import COUNTS, IMAGES, PARTS
+from .layout import COUNTS, ESCAPES, IMAGES, PARTS
 from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
@@ -24,7 +24,7 @@ _PATIENCE = 0.05
 _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
 # What is copied of a state, for the writers, as far as it is there, and its bytes a particle.
-_COPIED, _PARTICLE = (*PARTS, COUNTS, IMAGES), 80
+_COPIED, _PARTICLE = (*PARTS, COUNTS, IMAGES, ESCAPES), 88
 
 Job = Callable[[], None]
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]

@@ -12,6 +12,8 @@ PARTS = ("position", "velocity")
 COUNTS = "impacts"
 # The cells that each particle has come through, where the scene repeats.
 IMAGES = "image"
+# When each particle has escaped [s], where walls have openings.
+ESCAPES = "escape_time"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
@@ -76,6 +78,8 @@ def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
         require_fits(dataset(file, f"particles/all/{IMAGES}/value", _INTEGER, (n, len(kept), 3)), n, path)
     if f"particles/all/{COUNTS}" in file:
         require_fits(dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
+    if f"particles/all/{ESCAPES}" in file:
+        require_fits(dataset(file, f"particles/all/{ESCAPES}/value", _REAL, (n, len(kept))), n, path)
 
 
 def require_index(file: Any) -> None:

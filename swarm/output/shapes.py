@@ -13,6 +13,7 @@ from ..motion import Pose
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import Spheres
+from ..surfaces.openings import are_open
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
@@ -157,9 +158,12 @@ def _of_surface(
 
 
 def _owner(scene: Still, points: Floats) -> NDArray[np.int64]:
-    """The surface that each of the points (3, N) near a wall lies on."""
+    """The surface that each of the points (3, N) near a wall lies on, -1 where that is open."""
     with np.errstate(all="ignore"):
-        return np.asarray(np.nan_to_num(scene.scene.gaps(points, scene.time), nan=-np.inf).argmax(axis=0))
+        owner = np.asarray(np.nan_to_num(scene.scene.gaps(points, scene.time), nan=-np.inf).argmax(axis=0))
+        for i, volumes in enumerate(scene.scene.volumes):
+            owner[(owner == i) & are_open(volumes, points)] = -1
+    return owner
 
 
 def _wires(scene: Still, i: int, vertices: Floats, box: Corners) -> list[Floats]:

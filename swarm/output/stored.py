@@ -81,7 +81,8 @@ class Stored:
         with self._reading("its scene"):
             table = tomllib.loads(self._text("scene"))
             surfaces = table["surface"]
-            own = any(surface["kind"] == "own" for surface in surfaces)
+            every = [one for surface in surfaces for one in (surface, *surface.get("openings", ()))]
+            own = any(surface["kind"] == "own" for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
             return tables.scene_of(surfaces, table.get("gravity"), table.get("period"))

@@ -1,12 +1,13 @@
 """Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read on demand.
 
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
-start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3);
-particles/all/{mass,id} (N,); observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML
-text, parameters/particles, the number that were run, parameters/start, a digest of them at the start, and
-parameters/seed, of thermal walls. Of bodies: parameters/body, the table of one as TOML text, parameters/copies, their
-number n, and connectivity/bonds (B n, 2); point p of copy i is particle p n + i. All elements share one step and one
-time dataset by hard links. writer.py writes it.
+start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
+walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside; particles/all/{mass,id} (N,);
+observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
+number that were run, parameters/start, a digest of them at the start, and parameters/seed, of thermal walls. Of bodies:
+parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
+point p of copy i is particle p n + i. All elements share one step and one time dataset by hard links. writer.py
+writes it.
 """
 
 import functools
@@ -135,6 +136,16 @@ class Trajectory(Stored):
             if (counts < 0).any():
                 raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
         return np.asarray(counts)
+
+    def escape_times(self, k: int) -> NDArray[np.float64]:
+        """When each of the particles of frame k has passed an opening of a wall [s], (N,); NaN of those inside."""
+        k, name = self._number(k), f"particles/all/{layout.ESCAPES}"
+        with self._reading(f"the escapes of frame {k}") as file:
+            kept = len(file["particles/all/mass"])
+            times = file[f"{name}/value"][k].astype(np.float64) if name in file else np.full(kept, np.nan)
+            if (times < 0.0).any():
+                raise ValueError(f"expected 0 or later, got {np.nanmin(times)} of particle {np.nanargmin(times)}")
+        return np.asarray(times)
 
     def _number(self, k: int) -> int:
         """The number of a frame whose particles are kept, from 0 on."""

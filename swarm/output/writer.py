@@ -1,6 +1,6 @@
 """Writing trajectories: frames are appended, the times last. There are as many complete frames as times."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import COUNTS, IMAGES, PARTS
+from .layout import COUNTS, ESCAPES, IMAGES, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -123,22 +123,15 @@ class TrajectoryWriter:
         # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
         deep = 1 if options else _CHUNK[0]
         options = {**options, "rdcc_nbytes": self._cache()}
-        for name in PARTS:
+        for name, width, kind in _kept_of(self._scene, self._storage.precision):
             self._values[name] = self._element(
-                f"particles/all/{name}", (n, 3), self._storage.precision, (deep, min(n, _CHUNK[1]), 3), **options,
-            )  # fmt: skip
-        if repeats is not None:
-            self._values[IMAGES] = self._element(
-                f"particles/all/{IMAGES}", (n, 3), np.int64, (deep, min(n, _CHUNK[1]), 3), **options
+                f"particles/all/{name}", (n, *width), kind, (deep, min(n, _CHUNK[1]), *width), **options
             )
-        self._values[COUNTS] = self._element(
-            f"particles/all/{COUNTS}", (n,), np.int64, (deep, min(n, _CHUNK[1])), **options
-        )
 
     def _open(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
-        kept = [name for name in (*PARTS, IMAGES, COUNTS) if f"particles/all/{name}" in self._file]
+        kept = [name for name in (*PARTS, IMAGES, COUNTS, ESCAPES) if f"particles/all/{name}" in self._file]
         self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (
@@ -173,7 +166,7 @@ class TrajectoryWriter:
                 self._grown.begin()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
-                put(dataset, first, parts if name == COUNTS else rows(parts, dataset.dtype))
+                put(dataset, first, parts if name in (COUNTS, ESCAPES) else rows(parts, dataset.dtype))
             if self._edges is not None:
                 put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():
@@ -191,6 +184,17 @@ class TrajectoryWriter:
             self._file = self._grown.file
             self._open()
         paths.checkpoint_of(self._path).unlink(missing_ok=True)
+
+
+def _kept_of(scene: Scene, precision: str) -> Iterator[tuple[str, tuple[int, ...], Any]]:
+    """What a frame has of each particle: its name, the shape of one entry, and its type."""
+    for name in PARTS:
+        yield name, (3,), precision
+    if scene.period is not None:
+        yield IMAGES, (3,), np.int64
+    yield COUNTS, (), np.int64
+    if any(scene.volumes):
+        yield ESCAPES, (), np.float64
 
 
 def rows(frames: list[NDArray[Any]], dtype: DTypeLike) -> NDArray[Any]:

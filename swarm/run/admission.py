@@ -44,7 +44,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     _require_period(scene, method)
     check_surfaces(method, scene)
     if options.compile != "never":
-        require_compiled(scene.surfaces)
+        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.openings)])
     method.check(scene, particles)
     times = options.times
     assert times.every is not None
@@ -71,6 +71,11 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
             raise SceneError(
                 f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
                 "anchors, in the frame of the wall"
+            )
+        if surface.openings:
+            raise SceneError(
+                f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
+                f"{len(surface.openings)}; use particles, or a box with an open face"
             )
         if surface.reacts():
             raise SceneError(

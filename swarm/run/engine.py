@@ -230,6 +230,8 @@ class Run:
                 # What is at rest costs this much.
                 self.state.impulse[: len(contacts.load)] += contacts.load * (span * self.state.mass)
                 contacts.sliding[:] += span * rests
+        if self.state.escape_time is not None:
+            self._phase[~np.isnan(self.state.escape_time)] = ARRIVED
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
@@ -255,7 +257,9 @@ class Run:
         """What a thread shares with the others, and its counts."""
         pending = np.zeros(PHASES, np.int64)
         log = None if self._impacts is None else self._impacts.example
-        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed, log)
+        return lanes.Share(
+            self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed, self._moment, log
+        )
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
@@ -270,7 +274,7 @@ class Run:
                 self._gravity,
                 share,
             )
-        mine = compose.empty(self.state.period)
+        mine = compose.empty(self.state.period, self.state.openings)
         return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, mine)
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
@@ -325,6 +329,8 @@ class Run:
         seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
         is_open = self._far < math.inf
         escaped = self._tier.kernel(observables.count_escaped)(*self._escaping) if is_open else 0
+        if self.state.escape_time is not None:
+            escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
         return {**seen, **self._poses(), "escaped": int(escaped)}
 
     def _poses(self) -> dict[str, NDArray[Any]]:

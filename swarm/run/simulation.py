@@ -50,6 +50,7 @@ class Result:
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
+        escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
     """
 
@@ -59,6 +60,7 @@ class Result:
     trajectory: Path | None
     multipliers: Multipliers | None
     impacts_per_particle: NDArray[np.int64]
+    escape_time: NDArray[np.float64]
     bodies: Bodies | None = None
 
 
@@ -189,6 +191,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
             options.trajectory,
             run.state.multipliers,
             run.state.impacts,
+            np.full(len(task.particles), np.nan) if run.state.escape_time is None else run.state.escape_time,
             None if task.bodies is None else task.bodies.moved(task.particles),
         )
 

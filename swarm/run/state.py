@@ -1,11 +1,14 @@
 """The state of a run at its start, of particles that are independent of one another."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
+from ..surfaces.openings import Openings
 from ..surfaces.period import Period
 
 
@@ -26,6 +29,7 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         None if laws is None or laws.thermal is None else np.zeros((surfaces, n)),
         particles.image,
         *_cell(scene, n),
+        *_none_escaped(scene, n),
     )
 
 
@@ -33,6 +37,12 @@ def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | No
     """What the state needs besides images where a scene repeats."""
     period = scene.cell()
     return None if period is None or period.fall is None else np.zeros(n), period
+
+
+def _none_escaped(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Openings | None]:
+    """What the state needs besides where walls have openings."""
+    openings = scene.openings()
+    return None if openings is None else np.full(n, math.nan), openings
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:

@@ -8,9 +8,11 @@ examples/own_surface.py is a complete surface; if a method needs a function that
 run.
 """
 
-# First, so that what follows from `bend` and from `hessian` is registered with them.
+# First, so that what follows from `near`, from `bend` and from `hessian` is registered with them.
+from . import approach as _approach  # noqa: F401
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
+from .data.sampled import Sampled
 from .fields.boxes import Boxes
 from .fields.capsules import Capsules
 from .fields.cylinders import Cylinders
@@ -50,6 +52,7 @@ __all__ = [
     "Paraboloid",
     "Plane",
     "Quadric",
+    "Sampled",
     "Slab",
     "Sphere",
     "Spheres",
@@ -78,5 +81,6 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "quadric": Quadric,
     "slab": Slab,
     "formula": Formula,
+    "sampled": Sampled,
     **ALL_FIELDS,
 }

@@ -10,6 +10,7 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 Required are `phi`, `gradient` and one of
     first_hit (and falling_hit under gravity)   the first hit of a flight in closed form,
     course                                      the level along a fall as a quartic: falling_hit and safe_time follow,
+    near                                        a polynomial above the level from a place on: the hits follow by steps,
     bend                                        how strongly q bends at most: march.py finds the hits by safe steps;
 for methods with steps in contact also `farthest_push` and one of
     push, rise and resolve                      the step in closed form,
@@ -233,6 +234,15 @@ def is_quartic(surface):
 def may_be_far(surface):
     """Whether its `course` may be one from afar: a constant for the compiler."""
     return True
+
+
+@by_type
+def near(surface, gravity, r, v):
+    """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
+
+    A `Near` or `NearFall` of approach.py; `gravity` is None where the flight is straight.
+    """
+    raise NotImplementedError
 
 
 @course.implies(is_quartic)

@@ -99,19 +99,43 @@ def level_and_window(c, own, size, speed2, pull2):
 def safe_rise_time(level):
     """A time up to |window| during which a level surely stays <= 0."""
     window = abs(level.window)
-    time = rise_time(level.c, level.b, level.a2 + _rise_by(_steepest(level.a3, level.a4, window), window))
+    time = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, window), window))
     return select(level.c > 0.0, 0.0, select(time < window, time, window))
+
+
+@inlined
+def rise_near(level):
+    """(a time up to |window| during which a level surely stays <= 0, whether it rises then), near to its first rise.
+
+    The parabola of twice the time that the one of the window gives is less far above the level.
+    """
+    window = abs(level.window)
+    first = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, window), window))
+    rises, leaving = first <= window, leave(level)[0]
+    time = select(rises, first, window)
+    rises, time = rises & (leaving <= time), select(leaving > time, leaving, time)
+    reach = 2.0 * time
+    again = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, reach), reach))
+    within = select(again < reach, again, reach)
+    later = within > time
+    return select(later, within, time), select(later, again <= reach, rises) & (level.window > 0.0)
 
 
 @inlined
 def _steepest(a3, a4, window):
     """s >= 0 with a3 t^3 + a4 t^4 <= s t^3 up to the window: c + 2 b t + (a2 + s window) t^2 rises first."""
     slope = a3 + select(a4 > 0.0, a4 * window, 0.0)
-    return select(slope > 0.0, slope, 0.0)
+    return positive(slope)
 
 
 @inlined
-def _rise_by(slope, window):
+def positive(a):
+    """max(a, 0)"""
+    return select(a > 0.0, a, 0.0)
+
+
+@inlined
+def rise_by(slope, window):
     """slope * window, 0 where the window is infinite because the level is a parabola."""
     return select(slope > 0.0, slope * window, 0.0)
 
@@ -164,7 +188,7 @@ def safe_step(may_be_far, level, nearly, t, last):
     a2t = a2t + t * a3t
     a3t = a3t + t * a4
     slope = _steepest(a3t, a4, reach)
-    time = rise_time(ct, bt, a2t + _rise_by(slope, reach))
+    time = rise_time(ct, bt, a2t + rise_by(slope, reach))
     step = select(time < reach, time, reach)
     # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
     at_root = time <= reach

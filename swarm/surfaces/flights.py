@@ -88,64 +88,119 @@ def sooner(time, found, later):
     return Hit(select(sooner, later.time, time), select(sooner, wall, select(found, 0.0, -1.0)))
 
 
-# --- Falls in lanes --------------------------------------------------------------------------------------
+# --- In lanes, by steps ----------------------------------------------------------------------------------
 
-# A falling flight in lanes: what the safe steps of each wall know, in this many rows a wall.
+# A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
 COURSE = 9
-_WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
+_WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
 
 
 @by_type
-def begin_fall(chain, course, row, lane, r, v, pull):
-    """The course of a falling flight for every wall into course[row:, lane]."""
+def in_steps(surface):
+    """A number where a straight flight to a wall, or to any of a chain, takes steps in lanes: a type for the compiler.
+
+    None where its hit has a closed form, or is asked for as a whole.
+    """
+    return
 
 
-@begin_fall.register(Chain)
-def _(chain, course, row, lane, r, v, pull):
-    if contract.is_quartic(chain.first):
-        level = contract.course(chain.first, r, v, pull)
+in_steps.register(Chain, lambda surface: _one_of(in_steps(surface.first), surface.rest))
+
+
+@by_type
+def _one_of(steps, rest):
+    return steps
+
+
+_one_of.register(Nothing, lambda steps, rest: in_steps(rest))
+
+
+@by_type
+def begin(chain, gravity, course, row, lane, r, v):
+    """The start of a flight for every wall into course[row:, lane]."""
+
+
+@begin.register(Chain)
+def _(chain, gravity, course, row, lane, r, v):
+    begin_wall(chain.first, gravity, course, row, lane, r, v)
+    begin(chain.rest, gravity, course, row + COURSE, lane, r, v)
+
+
+@by_type
+def begin_wall(surface, gravity, course, row, lane, r, v):
+    """The same of one wall."""
+    begin_whole(gravity, surface, course, row, lane, r, v)
+
+
+@by_type
+def begin_whole(gravity, surface, course, row, lane, r, v):
+    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
+    time, found = hit(gravity, surface, r, v)
+    course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
+
+
+@begin_whole.register(Gravity)
+def _(gravity, surface, course, row, lane, r, v):
+    pull = as_vector(gravity)
+    if contract.is_quartic(surface):
+        level = contract.course(surface, r, v, pull)
         course[row, lane], course[row + 1, lane], course[row + 2, lane] = level.c, level.b, level.a2
         course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane] = level.a3, level.a4, level.window
-        course[row + _TIME, lane], course[row + _LAST, lane] = leave(level)
+        course[row + TIME, lane], course[row + LAST, lane] = leave(level)
         course[row + _CLOSE, lane] = close(level.window)
     else:
-        time, found = contract.falling_hit(chain.first, r, v, pull)
-        course[row + _TIME, lane], course[row + _LAST, lane] = time, select(found, 0.0, math.inf)
-    begin_fall(chain.rest, course, row + COURSE, lane, r, v, pull)
+        time, found = contract.falling_hit(surface, r, v, pull)
+        course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
 
 
 @by_type
-def step_fall(chain, course, row, lane):
-    """One safe step of every wall that needs steps."""
+def step(chain, gravity, course, row, lane, r, v):
+    """One safe step of every wall that needs steps, of the flight that starts at r."""
 
 
-@step_fall.register(Chain)
-def _(chain, course, row, lane):
-    if contract.is_quartic(chain.first):
+@step.register(Chain)
+def _(chain, gravity, course, row, lane, r, v):
+    step_wall(chain.first, gravity, course, row, lane, r, v)
+    step(chain.rest, gravity, course, row + COURSE, lane, r, v)
+
+
+@by_type
+def step_wall(surface, gravity, course, row, lane, r, v):
+    """The same of one wall."""
+    _step_whole(gravity, surface, course, row, lane)
+
+
+@by_type
+def _step_whole(gravity, surface, course, row, lane):
+    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
+
+
+@_step_whole.register(Gravity)
+def _(gravity, surface, course, row, lane):
+    if contract.is_quartic(surface):
         level = Quartic(
             course[row, lane], course[row + 1, lane], course[row + 2, lane],
             course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane],
         )  # fmt: skip
-        course[row + _TIME, lane], course[row + _LAST, lane] = safe_step(
-            contract.may_be_far(chain.first), level, course[row + _CLOSE, lane],
-            course[row + _TIME, lane], course[row + _LAST, lane],
+        course[row + TIME, lane], course[row + LAST, lane] = safe_step(
+            contract.may_be_far(surface), level, course[row + _CLOSE, lane],
+            course[row + TIME, lane], course[row + LAST, lane],
         )  # fmt: skip
-    step_fall(chain.rest, course, row + COURSE, lane)
 
 
 @by_type
-def end_fall(chain, course, row, lane):
+def end(chain, course, row, lane):
     """`first_hit` from the course."""
     raise NotImplementedError
 
 
-@end_fall.register(Chain)
+@end.register(Chain)
 def _(chain, course, row, lane):
-    found = arrived(course[row + _LAST, lane])
-    return sooner(course[row + _TIME, lane], found, end_fall(chain.rest, course, row + COURSE, lane))
+    found = arrived(course[row + LAST, lane])
+    return sooner(course[row + TIME, lane], found, end(chain.rest, course, row + COURSE, lane))
 
 
-end_fall.register(Nothing, lambda chain, course, row, lane: NEVER)
+end.register(Nothing, lambda chain, course, row, lane: NEVER)
 
 
 # --- Of one wall, and of all but one ---------------------------------------------------------------------

@@ -116,10 +116,7 @@ def _body(surface: Surface) -> Surface:
 
 
 def _shifted(surface: Surface, shift: Sequence[float]) -> Surface:
-    if not any(shift):
-        return surface
-    x, y, z = (a + b for a, b in zip(surface.center, shift, strict=True))  # type: ignore[attr-defined]
-    return replace(surface, center=(x, y, z))  # type: ignore[call-arg]
+    return surface.shifted(tuple(shift)) if any(shift) else surface  # type: ignore[arg-type]
 
 
 def _is_same_along(surface: Surface, k: int, period: Lengths) -> bool:

@@ -28,8 +28,11 @@ _LOOPS = (march, newton)
 _OWN = tuple(module.__name__ for module in (contract, *_LOOPS))
 
 
-def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[Any]) -> None:
-    """Raise a `SceneError` where a surface does not give what the functions `asked` of its walls are made of."""
+def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[Any], name: str | None = None) -> None:
+    """Raise a `SceneError` where a surface does not give what the functions `asked` of its walls are made of.
+
+    `name` is that of the only surface, where it is none of a scene's.
+    """
     asked = tuple(asked)
     for i, surface in enumerate(surfaces):
         for wall in surface.walls():
@@ -37,13 +40,13 @@ def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[Any]) -> 
                 lacking = sorted({name for function in functions for name in _lacking(part, function)})
                 if lacking:
                     raise SceneError(
-                        f"surfaces[{i}] ({type(surface).__name__}) must give what {purpose} needs, got "
+                        f"{name or f'surfaces[{i}]'} ({type(surface).__name__}) must give what {purpose} needs, got "
                         f"{type(part).__name__} without {' and '.join(lacking)}; register what is missing as the files "
                         "in swarm/surfaces/shapes do"
                     )
 
 
-def require_description(surfaces: Sequence[Surface]) -> None:
+def require_description(surfaces: Sequence[Surface], name: str | None = None) -> None:
     """Raise a `SceneError` where the class of a surface lacks a method, or its walls phi and gradient."""
     for i, surface in enumerate(surfaces):
         kind = type(surface)
@@ -52,8 +55,9 @@ def require_description(surfaces: Sequence[Surface]) -> None:
             lacking.append("numbers")
         if lacking:
             names = " and ".join(f"{name}()" for name in lacking)
-            raise SceneError(f"surfaces[{i}] must have every method of a surface, got {kind.__name__} without {names}")
-    require(surfaces, "a scene", (contract.phi, contract.gradient))
+            where = name or f"surfaces[{i}]"
+            raise SceneError(f"{where} must have every method of a surface, got {kind.__name__} without {names}")
+    require(surfaces, "a scene", (contract.phi, contract.gradient), name)
 
 
 def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any, ...]]]:

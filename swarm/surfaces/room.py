@@ -52,5 +52,6 @@ def has_room(
         near = found > -worst
         normals = (gradients / lengths[:, None] * near[:, None]).transpose(2, 0, 1)
         wanted = ((found + (_PAST - 1.0) * worst) * near).T[:, :, None]
-        points = points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T
+        # Where normals are all but parallel and the volumes are apart, the step leads far away.
+        points = np.clip(points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T, 2.0 * low - high, 2.0 * high - low)
     return False

@@ -1,7 +1,8 @@
 """What a surface is for a user: a description, checked. The functions of its numbers are in contract.py."""
 
 import math
-from dataclasses import MISSING, dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,9 @@ class Surface:
             `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the start.
         inertia: of a wall that impacts turn about the axis of its `Rotation`, with that rate at the start [kg m^2],
             above 0. With a mass as well it is a pendulum, whose weight is at its `center`; without, on the axis.
+        openings: surfaces without openings, laws and motion, inside which the wall is not there (with side "outside":
+            outside of which; of many bodies, such as `Spheres`: in each of them). A particle that reaches the wall
+            there has escaped, and stays as it is then. Of a wall at rest.
     """
 
     rotation: Any = field(default=None, kw_only=True)
@@ -51,6 +55,7 @@ class Surface:
     motion: Any = field(default=None, kw_only=True)
     mass: float | None = field(default=None, kw_only=True)
     inertia: float | None = field(default=None, kw_only=True)
+    openings: Any = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
@@ -79,6 +84,12 @@ class Surface:
             raise SceneError(
                 f"mass must be None where an inertia is given to a {type(self).__name__}, which has no center that its "
                 f"weight could be at, got {self.mass:g}"
+            )
+        object.__setattr__(self, "openings", _openings(self.openings))
+        if self.openings and (self.motion is not None or self.reacts()):
+            raise SceneError(
+                f"openings must be of a wall at rest, got {len(self.openings)} of a {type(self).__name__} with a "
+                "motion, a mass or an inertia; leave these out, or the openings"
             )
 
     def __repr__(self) -> str:
@@ -118,6 +129,15 @@ class Surface:
     def open_faces(self) -> list[HalfSpace]:
         """Where the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
         return []
+
+    def known_in(self) -> Box | None:
+        """The box that particles must not leave, for outside of it the surface is not known; None: it is everywhere."""
+        return None
+
+    def shifted(self, shift: Vector) -> "Surface":
+        """The same surface elsewhere."""
+        x, y, z = (a + b for a, b in zip(self.center, shift, strict=True))  # type: ignore[attr-defined]
+        return replace(self, center=(x, y, z))  # type: ignore[call-arg]
 
     def is_solid(self) -> bool:
         """Whether particles are kept out of it rather than in it."""
@@ -168,6 +188,21 @@ def is_on_axis(point: Vector, axis: Vector, center: Vector) -> bool:
 def is_along(direction: Vector, axis: Vector) -> bool:
     """Whether a unit vector is along the axis, another one, or against it."""
     return bool(np.abs(np.cross(direction, axis)).max() <= TILT)
+
+
+def _openings(value: Any) -> tuple[Surface, ...]:
+    """The argument `openings`, checked."""
+    if isinstance(value, Surface) or not isinstance(value, Iterable):
+        raise SceneError(f"openings must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
+    given = tuple(value)
+    for k, opening in enumerate(given):
+        if not isinstance(opening, Surface):
+            raise SceneError(f"openings[{k}] must be a surface such as swarm.Sphere, got {opening!r:.200}")
+        for law in fields(Surface):
+            came = getattr(opening, law.name)
+            if law.name != "rotation" and came != law.default:
+                raise SceneError(f"openings[{k}].{law.name} must be left out, an opening is no wall, got {came!r:.200}")
+    return given
 
 
 def _part(name: str, value: Any) -> float:

@@ -50,6 +50,14 @@ def test_areas(name):
     np.testing.assert_allclose(areas, AREAS[name], rtol=0.015)
 
 
+def test_where_a_wall_is_open_nothing_is_drawn():
+    hole = swarm.Sphere(0.3, (0.0, 0.0, 0.5))
+    (shape,) = shapes_of(swarm.Scene([swarm.Sphere(0.5, openings=[hole])]), NOWHERE)
+    # Of the sphere a ball about one of its points, of radius a, cuts pi a^2.
+    assert shape.area() == pytest.approx(math.pi * (1.0 - 0.09), rel=0.01)
+    assert hole.phi(np.vstack(shape.wires).T).min() > 0.0
+
+
 def test_an_open_volume_is_drawn_as_far_as_its_particles():
     floor = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], gravity=(0.0, 0.0, -1.0))
     (shape,) = shapes_of(floor, np.array([[3.0], [0.0], [1.0]]))

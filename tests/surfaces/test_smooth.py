@@ -1,4 +1,4 @@
-"""Surfaces whose first hit is found by a march, the torus and the capsule among them."""
+"""Surfaces that are no quadrics, the torus and the capsule among them: steps and marches to their first hits."""
 
 import math
 
@@ -6,16 +6,23 @@ import numpy as np
 import pytest
 from conftest import EPSILON, ITERATED, TURN, body_of, call, numbers_of
 from exact import TOUCH, Flight
-from walls import hit_of, start
+from walls import falling, hit_of, start, straight
 
 import swarm
-from swarm.surfaces import contract
+from swarm.kernel.gravity import Gravity
+from swarm.surfaces import approach, contract
 from swarm.surfaces import march as marches
 from swarm.surfaces import rotation as rotations
+from swarm.surfaces.shapes.capsule import CapsuleNumbers
 
 every_march = pytest.mark.parametrize("name", ITERATED)
 DEPTHS = [0.1, 1e-3, 1e-9, 1e-12, 1e-15, 0.0, -1e-15]
 LEANS = [0.7, 1e-5, 1e-9, 1e-15, 0.0, -1e-15, -1e-9, -1e-5, -0.7]
+
+
+def own_hit(surface, position, velocity, pull):
+    """Ask the surface, which may not march."""
+    return (falling if pull.any() else straight)(surface, position, velocity, pull)
 
 
 @every_march
@@ -30,13 +37,52 @@ def test_grazing_starts_next_to_the_wall(name, scale, heavy):
         surface, position, velocity = start(name, rng.uniform(-1, 1, 3), rng.normal(size=3), depth, lean, scale, 1.0)
         pull = heavy * scale * rng.uniform(-1.0, 1.0, 3)
         until = 10.0 if heavy == 0.0 else 5.0 / max(1.0, math.sqrt(heavy))
-        hit_of(march, surface, position, velocity, pull, until, 100)
+        for ask in (march, own_hit):
+            hit_of(ask, surface, position, velocity, pull, until, 100)
 
 
 def march(surface, *flight):
     """Ask the march itself, in the surface's own frame."""
     turn = np.array(surface[1:]) if surface is not body_of(surface) else np.eye(3)
     return call(marches.march, body_of(surface), *(turn.T @ vector for vector in flight))
+
+
+@pytest.mark.parametrize(
+    ("name", "gravity"),
+    [
+        ("torus", None),
+        ("ring", None),
+        *((name, Gravity(0.4, -0.3, -1.0)) for name in ("torus", "ring", "capsule", "rod")),
+    ],
+)
+def test_the_level_is_nowhere_above_its_polynomial(name, gravity):
+    """Up to any time within its window; and both touch where it is asked."""
+    surface, rng = body_of(numbers_of(name)), np.random.default_rng(5)
+    pull, seen = np.zeros(3) if gravity is None else np.array(gravity), 0
+    while seen < 40:
+        position, velocity = rng.uniform(-1.2, 1.2, 3), rng.normal(size=3)
+        near = call(contract.near, surface, gravity, position, velocity)
+
+        def level(t, r=position, v=velocity):
+            return _level(surface, r + t * v + 0.5 * t * t * pull)
+
+        if level(0.0) > 0.0 or not near.meets:
+            continue
+        seen += 1
+        assert near.c == pytest.approx(level(0.0), abs=1e-14)
+        assert near.b == pytest.approx((level(1e-6) - level(-1e-6)) / 4e-6, abs=1e-8)
+        for within in near.window * np.array([1e-3, 0.1, 1.0]):
+            rise, _size, a2 = approach._slopes_within(near, within)
+            for t in within * rng.uniform(0.0, 1.0, 10):
+                assert level(t) <= near.c + 2.0 * near.b * t + a2 * t**2 + rise * t**3 + 1e-13
+
+
+def _level(surface, r):
+    d = r - np.array(surface.center)
+    if isinstance(surface, CapsuleNumbers):
+        return surface.side * (call(contract.inner, surface, r) - surface.radius2)
+    both = d @ d + surface.major**2 - surface.radius2
+    return surface.side * (both**2 - 4.0 * surface.major**2 * (d[0] ** 2 + d[1] ** 2))
 
 
 @pytest.mark.parametrize("name", ["ring", "rod"])

@@ -69,4 +69,4 @@ def chain_in(order: Order, surfaces: Sequence[Surface], groups: Sequence[Members
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:
-    return surface.restitution, surface.friction, surface.temperature, surface.accommodation
+    return surface.restitution, surface.friction, surface.temperature, surface.accommodation, surface.openings

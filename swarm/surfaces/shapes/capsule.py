@@ -1,18 +1,26 @@
 """Capsule: phi = sqrt(q) - R, the distance; q, the inner function, is the squared distance to a segment along z."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...checks import Vector, at_least, length
+from ...kernel.gravity import as_vector
 from ...kernel.jit import inlined, select
-from ...kernel.vector import Symmetric, Vec, square, vec
-from .. import contract
+from ...kernel.vector import Symmetric, Vec, dot, square, vec
+from .. import contract, flights
+from ..approach import NearPiece
 from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
 from .common import root_gap
 from .revolved import Revolved
+
+# The last step of a fall leaves this part of R^2.
+_CLOSE = 1e-16
+# From farther than the root of this many times the thickness a fall first goes so much nearer.
+_AFAR = 1024.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,6 +119,31 @@ def _(surface, r, v):
     from_end = Vec(d.x, d.y, d.z - select(height > 0.0, half, -half))
     cap = ball_rise_time(side, surface.radius2, from_end, v)
     return select(abs(height) > half, cap, tube), True
+
+
+# Without gravity the hit has a closed form.
+flights.in_steps.register(CapsuleNumbers, lambda surface: None)
+
+
+@contract.near.register(CapsuleNumbers)
+def _(surface, gravity, r, v):
+    # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by the
+    # square of the way beyond: higher than the tube's, lower than the sphere's.
+    g, side, e = as_vector(gravity), surface.side, _from_segment(surface, r)
+    past = abs(r.z - surface.center.z) - surface.half
+    in_tube, q = past <= 0.0, square(e)
+    speed, pull = select(in_tube, 0.0, v.z), select(in_tube, 0.0, g.z)
+    s2 = v.x * v.x + v.y * v.y + speed * speed + e.x * g.x + e.y * g.y + e.z * pull
+    s3, s4 = v.x * g.x + v.y * g.y + speed * pull, 0.25 * (g.x * g.x + g.y * g.y + pull * pull)
+    # From afar to a thicker one: of a small distance round-off leaves nothing.
+    far = q > _AFAR * surface.radius2
+    radius2 = select(far, q * (1.0 / _AFAR), surface.radius2)
+    size2 = select(q > radius2, q, radius2)
+    return NearPiece(
+        side * (q - radius2), side * dot(e, v), side * s2, side * s3, side * s4,
+        abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube,
+        2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * surface.radius2, not far,
+    )  # fmt: skip
 
 
 # 0 <= H <= I everywhere; the distance only bounds the speed of a fall.

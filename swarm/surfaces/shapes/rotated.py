@@ -6,9 +6,10 @@ A surface that is not rotated has no `Rotated` around it and pays nothing.
 from collections.abc import Callable
 from typing import Any
 
-from ...kernel.jit import inlined
+from ...kernel.gravity import Gravity, as_vector
+from ...kernel.jit import by_type, inlined
 from ...kernel.vector import Vec, dot
-from .. import contract
+from .. import contract, flights
 from ..rotation import Rotated
 
 
@@ -24,6 +25,18 @@ def scene(surface, a):
     return Vec(dot(surface.x, a), dot(surface.y, a), dot(surface.z, a))
 
 
+@by_type
+def _own_gravity(gravity, surface):
+    """The same of gravity."""
+    return gravity
+
+
+@_own_gravity.register(Gravity)
+def _(gravity, surface):
+    turned = own(surface, as_vector(gravity))
+    return Gravity(turned.x, turned.y, turned.z)
+
+
 def _turned(made: Callable[[Any], Any], *functions: Any) -> None:
     for function in functions:
         function.register(Rotated, made(function))
@@ -33,6 +46,7 @@ def _turned(made: Callable[[Any], Any], *functions: Any) -> None:
 _turned(
     lambda f: lambda surface: f(surface.body),
     contract.flat, contract.is_quartic, contract.may_be_far, contract.chord_sweeps, contract.farthest_push,
+    flights.in_steps,
 )  # fmt: skip
 _turned(lambda f: lambda surface, q: f(surface.body, q), contract.gap_of, contract.level_of)
 _turned(lambda f: lambda surface, q0, q1: f(surface.body, q0, q1), contract.gap_slope)
@@ -72,3 +86,9 @@ _turned(
     lambda f: lambda surface, r, p, kappa: scene(surface, f(surface.body, own(surface, r), own(surface, p), kappa)),
     contract.chord_normal,
 )
+_turned(
+    lambda f: lambda surface, gravity, course, row, lane, r, v: f(
+        surface.body, _own_gravity(gravity, surface), course, row, lane, own(surface, r), own(surface, v)
+    ),
+    flights.begin_wall, flights.step_wall,
+)  # fmt: skip

@@ -204,13 +204,22 @@ def _(surface, r, v):
     return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
 
-@contract.falling_hit.register(SlabNumbers)
-def _(surface, r, v, pull):
+@inlined
+def near_face_hit(surface, r, v, pull):
+    """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
     d = _off(surface, r)
     sign = math.copysign(0.5, d)
     b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
-    # The near wall and, between them, the far one: each is a plane.
-    near = rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
+    return rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
+
+
+@contract.falling_hit.register(SlabNumbers)
+def _(surface, r, v, pull):
+    near = near_face_hit(surface, r, v, pull)
+    d = _off(surface, r)
+    sign = math.copysign(0.5, d)
+    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
+    # Between them the far one too
     far = rise_time(-abs(d) - surface.radius, -b, -a)
     return select((surface.side > 0.0) & (far < near), far, near), True
 

@@ -9,20 +9,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.gravity import Gravity, Nothing, accelerated, displacement
-from ...kernel.jit import by_type, inlined, outlined
+from ...kernel.gravity import Gravity, Nothing, as_vector, displacement
+from ...kernel.jit import by_type, inlined, outlined, select
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
-from .. import contract
-from ..flights import hit
+from .. import contract, flights
+from ..approach import place, under_way
+from ..course import rise_near
 from ..fold import Chain
 from ..rotation import Rotated
 from .plane import PlaneNumbers
+from .slab import SlabNumbers, near_face_hit
 
 _EPSILON = 2.220446049250313e-16
+# A step that is no hit has a length, even if it is of none.
+_TINY = float(np.finfo(np.float64).tiny)
 # Round-off of a part's level, in units of the last place of its largest terms.
 _ULPS = 32.0
-# Times that a flight may find a part still to be entered, or entered again, before it goes on in the next pass.
-_ENTRIES = 50
+# Steps of a flight that is asked for alone, each to where a part is still to be entered, or entered again, before it
+# goes on in the next pass.
+_ENTRIES = 100
 # Part of the coordinates over which the gradient is differenced: the cube root of the round-off.
 _SPACING = 6e-6
 
@@ -117,6 +122,22 @@ _bend_of_largest.register(Nothing, lambda parts, r, h: (-math.inf, Symmetric(0.0
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
+flights.in_steps.register(SolidNumbers, lambda surface: 1.0)
+
+
+@flights.begin_wall.register(SolidNumbers)
+def _(surface, gravity, course, row, lane, r, v):
+    time, last = _entry_step(surface, gravity, r, v, 0.0, math.inf)
+    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
+
+
+@flights.step_wall.register(SolidNumbers)
+def _(surface, gravity, course, row, lane, r, v):
+    time, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
+    time, last = _entry_step(surface, gravity, r, v, time, last)
+    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
+
+
 contract.first_hit.register(SolidNumbers, lambda surface, r, v: _entry(surface, None, r, v))
 
 
@@ -128,20 +149,29 @@ def _(surface, r, v, pull):
 @outlined
 def _entry(surface, gravity, r, v):
     """When the flight is inside of all parts for the first time: (time, whether it is then)."""
-    t = 0.0
+    t, last = 0.0, math.inf
     for _i in range(_ENTRIES):
-        p, w = r + displacement(gravity, v, t), accelerated(gravity, v, t)
-        # Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
-        wait, found = _last_entry(surface.parts, gravity, surface.extent, p, w)
-        if not found or not wait < math.inf:
-            return t + wait, found
-        moved = total(absolute(displacement(gravity, w, wait)))
-        # The place is known to round-off of its own coordinates and of those the flight comes from.
-        coordinates = total(absolute(p)) + abs(r.x) + abs(r.y) + abs(r.z)
-        if moved <= 4.0 * _EPSILON * (coordinates + surface.extent):
-            return t + wait, True
-        t += wait
-    return t, False
+        t, last = _entry_step(surface, gravity, r, v, t, last)
+        if not under_way(t, last):
+            break
+    return t, not under_way(t, last)
+
+
+@inlined
+def _entry_step(surface, gravity, r, v, t, last):
+    """One step more: (t, its length, 0 if the flight is inside of all parts then).
+
+    Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
+    """
+    p, w = place(gravity, r, v, t, last)
+    wait, found = _last_entry(surface.parts, gravity, surface.extent, p, w)
+    moved = total(absolute(displacement(gravity, w, wait)))
+    # The place is known to round-off of its own coordinates and of those the flight comes from.
+    coordinates = total(absolute(p)) + abs(r.x) + abs(r.y) + abs(r.z)
+    is_in = found & (moved <= 4.0 * _EPSILON * (coordinates + surface.extent))
+    goes_on = under_way(t, last)
+    length = select(is_in, 0.0, select(wait > 0.0, wait, _TINY))
+    return select(goes_on, t + wait, t), select(goes_on, length, last)
 
 
 @by_type
@@ -153,17 +183,45 @@ def _last_entry(parts, gravity, extent, r, v):
 @_last_entry.register(Chain)
 def _(parts, gravity, extent, r, v):
     time, found = _last_entry(parts.rest, gravity, extent, r, v)
+    here, found_here = _entry_of(parts.first, gravity, r, v)
     # On the face of a part, which is left or entered now, the sign of the approach decides.
     depth = contract.gap_of(parts.first, contract.inner(parts.first, r))
-    if depth > noise(parts.first, extent, r):
-        return time, found
-    here, found_here = hit(gravity, parts.first, r, v)
-    if here > time:
-        return here, found_here
-    return time, found
+    later = (here > time) & (not (depth > noise(parts.first, extent, r)))
+    return select(later, here, time), select(later, found_here, found)
 
 
 _last_entry.register(Nothing, lambda parts, gravity, extent, r, v: (0.0, True))
+
+
+@by_type
+def _entry_of(part, gravity, r, v):
+    """A time until which a flight surely does not enter a part: (time, whether it does then)."""
+    return _part_hit(gravity, part, r, v)
+
+
+@_entry_of.register(SlabNumbers)
+def _(part, gravity, r, v):
+    return _slab_hit(gravity, part, r, v)
+
+
+@by_type
+def _part_hit(gravity, part, r, v):
+    return contract.first_hit(part, r, v)
+
+
+@_part_hit.register(Gravity)
+def _(gravity, part, r, v):
+    if contract.is_quartic(part):
+        return rise_near(contract.course(part, r, v, as_vector(gravity)))
+    return contract.falling_hit(part, r, v, as_vector(gravity))
+
+
+@by_type
+def _slab_hit(gravity, part, r, v):
+    return contract.first_hit(part, r, v)
+
+
+_slab_hit.register(Gravity, lambda gravity, part, r, v: (near_face_hit(part, r, v, as_vector(gravity)), True))
 
 
 @inlined

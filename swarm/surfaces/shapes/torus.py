@@ -1,5 +1,6 @@
 """Torus: phi = sqrt(q) - a, the distance; inner function q = (rho - R)^2 + z^2, not a quadric."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -7,12 +8,21 @@ import numpy as np
 
 from ...checks import Vector, length
 from ...errors import SceneError
-from ...kernel.jit import inlined, select
+from ...kernel.gravity import Gravity, Nothing, as_vector
+from ...kernel.jit import by_type, inlined, select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract
+from ..approach import Near, NearFall
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from .common import root_gap
+
+# The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.
+_CLOSE = 4e-16
+# From farther than the root of this many times the thickness a flight first goes so much nearer.
+_AFAR = 1024.0
+# Squares: of a ball around the torus, in its radii, within which its own level is asked, and of one in that.
+_OUTER, _NEARER = 1.3, 1.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,6 +125,97 @@ def _(surface, r0, r1):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
+#
+# Of the same sign as the gap is F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho), along a flight
+# a polynomial of degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without what cancels on the wall.
+
+
+@contract.near.register(TorusNumbers)
+def _(surface, gravity, r, v):
+    return _near(gravity, surface, r, v)
+
+
+@by_type
+def _near(gravity, surface, r, v):
+    raise NotImplementedError
+
+
+@inlined
+def _tube2(surface, q):
+    """a^2, or that of a thicker tube that is near: from afar round-off of F is that of the distance."""
+    return select(q > _AFAR * surface.radius2, q * (1.0 / _AFAR), surface.radius2)
+
+
+@inlined
+def _nearly(surface):
+    return _CLOSE * surface.major * surface.major * surface.radius2
+
+
+@_near.register(Nothing)
+def _(gravity, surface, r, v):
+    d, major, side = r - surface.center, surface.major, surface.side
+    rho = _from_axis(surface, r)
+    across = rho - major
+    q, d2 = across * across + d.z * d.z, square(d)
+    tube2 = _tube2(surface, q)
+    level, bp, wp, wz = q - tube2, d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y, v.z * v.z
+    b, w = bp + d.z * v.z, wp + wz
+    # |d|^2 + R^2 - a^2 and its powers: level + 2 R rho, 2 b, w
+    f0 = level * (level + 4.0 * major * rho)
+    f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * d.z * v.z))
+    f2 = 4.0 * b * b + 2.0 * level * w + 4.0 * major * (across * wp + rho * wz)
+    far, ball2 = _ball(surface, d2)
+    size2 = major * surface.radius + q
+    window = 2.0 * math.sqrt(size2 / w)
+    return Near(
+        select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -w, side * f2),
+        select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w),
+        select(far, math.inf, window), _nearly(surface), (not far) & (tube2 == surface.radius2),
+    )  # fmt: skip
+
+
+@_near.register(Gravity)
+def _(gravity, surface, r, v):
+    d, g, major, side = r - surface.center, as_vector(gravity), surface.major, surface.side
+    rho = _from_axis(surface, r)
+    across = rho - major
+    q, d2 = across * across + d.z * d.z, square(d)
+    tube2 = _tube2(surface, q)
+    # |d + v t + G t^2/2|^2 by powers of t, and that of its components across the axis
+    bp, p2 = d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y + d.x * g.x + d.y * g.y
+    bz, z2 = d.z * v.z, v.z * v.z + d.z * g.z
+    b, s2 = bp + bz, p2 + z2
+    p3, p4 = v.x * g.x + v.y * g.y, 0.25 * (g.x * g.x + g.y * g.y)
+    s3, s4 = p3 + v.z * g.z, p4 + 0.25 * g.z * g.z
+    level, four = q - tube2, 4.0 * major * major
+    s0 = level + 2.0 * major * rho
+    f0 = level * (level + 4.0 * major * rho)
+    f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * bz))
+    f2 = 4.0 * b * b + 2.0 * level * s2 + 4.0 * major * (across * p2 + rho * z2)
+    f3 = 2.0 * (s0 * s3 + 2.0 * b * s2) - four * p3
+    f4 = 2.0 * (s0 * s4 + 2.0 * b * s3) + s2 * s2 - four * p4
+    far, ball2 = _ball(surface, d2)
+    size2 = major * surface.radius + q
+    window = 2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * 4.0 * s4)))
+    return NearFall(
+        select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -s2, side * f2),
+        select(far, -s3, side * f3), select(far, -s4, side * f4),
+        select(far, 0.0, side * 2.0 * (2.0 * b * s4 + s2 * s3)), select(far, 0.0, side * (2.0 * s2 * s4 + s3 * s3)),
+        select(far, 0.0, side * 2.0 * s3 * s4), select(far, 0.0, side * s4 * s4),
+        window, _nearly(surface), (not far) & (tube2 == surface.radius2),
+    )  # fmt: skip
+
+
+@inlined
+def _ball(surface, d2):
+    """Whether a point is outside of a ball around the torus, and the square radius of one that is nearer to it.
+
+    To that ball the level is a quartic, or a parabola.
+    """
+    wide2 = surface.major + surface.radius
+    wide2 = wide2 * wide2
+    ball2 = select(d2 > _AFAR * wide2, d2 * (1.0 / _AFAR), _NEARER * wide2)
+    return d2 > _OUTER * wide2, ball2
 
 
 @contract.bend.register(TorusNumbers)

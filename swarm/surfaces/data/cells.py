@@ -1,0 +1,180 @@
+"""Which cells of a spline the surface is in, how far it is from all others, and how much phi bends near it.
+
+In a cell a cubic is between the least and the largest of its Bernstein coefficients, and so are its derivatives, whose
+coefficients are differences of these: bounds that hold, not samples.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.jit import Array
+from .spline import MARGIN
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Places = NDArray[np.int64]
+
+# From the B-spline coefficients of a cell to its Bernstein coefficients, along one axis.
+_BERNSTEIN = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
+# Cells whose coefficients are looked at together.
+_BATCH = 16_384
+# Of the largest coefficient of a cell, the round-off that a sign may have.
+_NOISE = 64.0 * np.finfo(np.float64).eps
+# The clearance is known up to this many cells: a flight through empty space takes a step for each.
+_FARTHEST = 63
+# The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and how far H is from it at most.
+SPREAD, _COLUMNS = 6, 8
+# Of the entries of a symmetric matrix the two axes, and which of them are the matrix.
+_SECOND = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+_MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+
+
+# The clearance of a cell is kept in this part of the width of a cell.
+_PARTS = 4.0
+
+
+class Cells(NamedTuple):
+    """What is known of each cell, in few bytes: a flight comes through many."""
+
+    clear: Array  # uint8 (cells along x, y, z): 0 if the surface may be in it, else 1 + the clearance/unit
+    unit: float  # [m]
+    row: Array  # int32 (cells along x, y, z): where the surface may be, the row of
+    bends: Array  # float32 (rows, 8): the bend H = grad grad phi/2 in the cell and all around it
+
+
+def cells_of(coefficients: Floats, width: Floats) -> Cells:
+    """The `Cells` of a spline with these coefficients and this width (3,) of a cell [m]."""
+    near = _near(coefficients)
+    around = _grown(near)
+    low, high = _bends(coefficients, width, around)
+    rows = np.argwhere(near)
+    unit = float(width.min()) / _PARTS
+    # Less a little for round-off
+    clear = 1 + np.floor(_distance(around, width) * ((1.0 - 1e-5) / unit)).astype(np.uint8)
+    clear[near] = 0
+    row = np.zeros(near.shape, np.int32)
+    row[near] = np.arange(len(rows))
+    return Cells(clear, unit, row, _rows(low, high, rows))
+
+
+def _near(c: Floats) -> Mask:
+    """The cells that the surface may be in."""
+    low, high = c, c
+    for axis in range(3):
+        low, high = _window(low, axis, np.minimum), _window(high, axis, np.maximum)
+    found = _holds_zero(low, high)
+    for places in _batches(np.argwhere(found)):
+        b = bernstein(c, places).reshape(len(places), -1)
+        found[tuple(places.T)] = _holds_zero(b.min(axis=1), b.max(axis=1))
+    return found
+
+
+def _holds_zero(low: Floats, high: Floats) -> Mask:
+    """Whether 0 may be between these bounds in a cell or, by a slope of nine times their range at most, next to it."""
+    room = 9.0 * MARGIN * (high - low) + _NOISE * np.maximum(np.abs(low), np.abs(high))
+    return np.asarray((low <= room) & (high >= -room))
+
+
+def _window(values: Floats, axis: int, which: np.ufunc) -> Floats:
+    """The least or the largest of four neighbours along an axis."""
+    v = np.moveaxis(values, axis, 0)
+    return np.moveaxis(which(which(v[:-3], v[1:-2]), which(v[2:-1], v[3:])), 0, axis)
+
+
+def _batches(places: Places) -> list[Places]:
+    return [places[i : i + _BATCH] for i in range(0, len(places), _BATCH)]
+
+
+def bernstein(c: Floats, places: Places) -> Floats:
+    """The Bernstein coefficients (cells, 4, 4, 4) of the cells at these places (cells, 3)."""
+    four = np.arange(4)
+    i, j, k = (places[:, axis, None] + four for axis in range(3))
+    found = c[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
+    for axis in (1, 2, 3):
+        found = np.moveaxis(np.moveaxis(found, axis, -1) @ _BERNSTEIN.T, -1, axis)
+    return np.asarray(found)
+
+
+def least_at_border(c: Floats, axis: int, end: int) -> float:
+    """A lower bound of phi where the grid begins along an axis (end 0) or ends (-1)."""
+    layer = np.zeros([n - 3 for n in c.shape], np.bool_)
+    layer[(slice(None),) * axis + (end,)] = True
+    found = (np.take(bernstein(c, places), end, axis=1 + axis).min() for places in _batches(np.argwhere(layer)))
+    return float(min(found))
+
+
+def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
+    """Bounds of the entries of H in these cells, (6, cells along x, y, z) each; of no value in the others."""
+    low, high = np.full((6, *of.shape), np.inf), np.full((6, *of.shape), -np.inf)
+    for places in _batches(np.argwhere(of)):
+        b = bernstein(c, places)
+        for n, (i, j) in enumerate(_SECOND):
+            # 3 (b[i+1] - b[i]) along each of two axes, or 6 (b[i+2] - 2 b[i+1] + b[i]) along one
+            second = np.diff(np.diff(b, axis=1 + i), axis=1 + j).reshape(len(places), -1)
+            factor = (6.0 if i == j else 9.0) * 0.5 / (width[i] * width[j])
+            noise = 8.0 * _NOISE * np.abs(b).reshape(len(places), -1).max(axis=1)
+            index = (n, *places.T)
+            low[index] = factor * (second.min(axis=1) - noise)
+            high[index] = factor * (second.max(axis=1) + noise)
+    return low, high
+
+
+def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
+    """`Cells.bends` of the cells at these places: bounds of each with its neighbours."""
+    all_low, all_high = low, high
+    for axis in (1, 2, 3):
+        all_low, all_high = _neighbours(all_low, axis, np.minimum), _neighbours(all_high, axis, np.maximum)
+    index = (slice(None), *places.T)
+    least, most = all_low[index].T, all_high[index].T
+    # H changes by no more than its range from one side of a cell to the other.
+    room = 4.0 * MARGIN * (most - least)
+    least, most = least - room, most + room
+    table = np.zeros((len(places), _COLUMNS), np.float32)
+    table[:, :6] = 0.5 * (least + most)
+    # |E| is at most the largest sum of a row.
+    off = np.maximum(most - table[:, :6], table[:, :6] - least)[:, _MATRIX].reshape(-1, 3, 3)
+    table[:, SPREAD] = off.sum(axis=2).max(axis=1) * (1.0 + 1e-6)
+    return table
+
+
+def eigenvalues(cells: Cells) -> tuple[float, float]:
+    """The least and the largest eigenvalue of H where the surface is, at least and at most."""
+    bends = cells.bends.astype(np.float64)
+    values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + _NOISE)
+    return float((values[:, 0] - spread).min()), float((values[:, 2] + spread).max())
+
+
+def _neighbours(values: Floats, axis: int, which: np.ufunc) -> Floats:
+    """The least or the largest of each cell and its two neighbours along an axis."""
+    v = np.moveaxis(values, axis, 0)
+    found = v.copy()
+    which(found[1:], v[:-1], out=found[1:])
+    which(found[:-1], v[1:], out=found[:-1])
+    return np.moveaxis(found, 0, axis)
+
+
+def _grown(cells: Mask) -> Mask:
+    """These cells and all around them."""
+    for axis in range(3):
+        cells = _neighbours(cells, axis, np.logical_or)  # type: ignore[arg-type, assignment]
+    return cells
+
+
+def _distance(grown: Mask, width: Floats) -> NDArray[np.float32]:
+    """How far each cell is at least from those that `grown` was grown from: as far as centres are from `grown`."""
+    farthest = float(_FARTHEST * width.min())
+    squares = np.where(grown, np.float32(0.0), np.float32(farthest * farthest))
+    for axis in range(3):
+        before = np.moveaxis(squares, axis, 0)
+        after = before.copy()
+        most = float(before.max())
+        for step in range(1, min(_FARTHEST, len(before) - 1) + 1):
+            way = np.float32((step * width[axis]) ** 2)
+            if way >= most:
+                break
+            np.minimum(after[step:], before[:-step] + way, out=after[step:])
+            np.minimum(after[:-step], before[step:] + way, out=after[:-step])
+        squares = np.moveaxis(after, 0, axis)
+    return np.sqrt(squares)

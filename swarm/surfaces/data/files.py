@@ -1,0 +1,50 @@
+"""Surfaces from files that a scene file names."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ...checks import closest, listed
+from ...errors import SceneError
+from ..surface import Surface
+from .mesh import from_mesh
+from .sampled import read
+
+_MESH = ("kind", "file", "spacing", "side", "scale", *(one.name for one in fields(Surface)))
+
+
+def samples_of(table: Any, where: str, path: Path) -> Any:
+    """The table of a surface, with the samples of one that takes them from a file or a mesh.
+
+    Args:
+        table: as it is in the scene file.
+        where: what it is called in errors, such as "surface[0]".
+        path: of the scene file.
+
+    Raises:
+        SceneError: a file cannot be read, or a key of a mesh is unknown or missing.
+    """
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if kind not in ("sampled", "mesh") or (kind == "sampled" and "file" not in table):
+        return table
+    name = table.get("file")
+    if not isinstance(name, str):
+        raise SceneError(f"{where}.file: expected the name of a file, got {'nothing' if name is None else repr(name)}")
+    given = {key: value for key, value in table.items() if key != "file"}
+    try:
+        if kind == "sampled":
+            if "values" in table:
+                raise SceneError(f"values: cannot be combined with file = {name!r}; remove one of them")
+            return {**given, "values": read(path.parent / name)}
+        for key in table:
+            if key not in _MESH:
+                raise SceneError(f"{key}: unknown key of a mesh, expected {listed(_MESH)}{closest(key, _MESH)}")
+        if "spacing" not in table:
+            raise SceneError("spacing: expected a number, got nothing; add spacing = ...")
+        made = from_mesh(
+            path.parent / name, table["spacing"], table.get("side", "inside"), scale=table.get("scale", 1.0)
+        )
+    except SceneError as error:
+        raise SceneError(f"{where}.{error}") from None
+    samples = {"values": made.values, "spacing": made.spacing, "origin": made.origin, "mesh_error": made.mesh_error}
+    return {**{key: value for key, value in given.items() if key != "scale"}, "kind": "sampled", **samples}

@@ -1,0 +1,264 @@
+"""A surface by samples of phi on a regular grid."""
+
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import checks
+from ...checks import Vector
+from ...errors import SceneError
+from ...kernel.vector import vec
+from .. import rotation as rotations
+from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
+from . import spline
+from .cells import Cells, cells_of, eigenvalues, least_at_border
+from .numbers import SampledNumbers
+from .packed import packed, unpacked
+from .spline import Spline
+
+Floats = NDArray[np.float64]
+
+# A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a
+# cell where it does most, has a feature that the samples do not resolve; by less, as next to an edge, it is a ripple.
+_RIPPLE = 0.1
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Sampled(Surface):
+    """The surface where samples of phi on a regular grid are 0, joined by a tricubic spline (C2).
+
+    In a scene file: kind = "sampled" and file = "phi.npy" or "phi.h5", relative to the scene file, for the values.
+
+    Args:
+        values: phi (nx, ny, nz), four or more along each axis, in any unit: below 0 inside, above 0 outside. Or the
+            path of a .npy file, or of an HDF5 file with one such dataset.
+        spacing: between samples [m], one number or three.
+        origin: where values[0, 0, 0] is, three numbers [m].
+        side: "inside" or "outside", the admissible part.
+        rotation: about the middle of the grid.
+        mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
+
+    Where the surface reaches the border of the grid, other surfaces must keep particles in the grid.
+
+    Raises:
+        SceneError: an argument is out of its range, the file cannot be read, a sample is not finite, all have the same
+            sign, or the grid is too coarse: the surface comes through an edge of a cell twice.
+
+    Accuracy: of order 4 in the spacing where phi is smooth. First hits are those of the spline, none is skipped.
+
+    >>> import numpy as np
+    >>> x = np.linspace(-1.0, 1.0, 16)
+    >>> values = x[:, None, None]**2 + x[:, None]**2 + x**2 - 0.64
+    >>> Sampled(values, x[1] - x[0], (-1.0, -1.0, -1.0)).phi([[0.8], [0.0], [0.0]]).round(9)
+    array([0.])
+    """
+
+    values: Any
+    spacing: Any
+    origin: Vector
+    side: str = "inside"
+    mesh_error: float | None = field(default=None, kw_only=True)
+    # What is made of the samples, also for a copy with another side or place.
+    _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "spacing", _spacing(self.spacing))
+        object.__setattr__(self, "origin", checks.vector("origin", self.origin))
+        if self._made is None or self._made.values is not self.values or self._made.spacing != self.spacing:
+            object.__setattr__(self, "values", _samples(self.values))
+            object.__setattr__(self, "_made", Samples(self.values, self.spacing, self.origin))
+
+    def __repr__(self) -> str:
+        """How many samples there are, and where."""
+        shape = " x ".join(map(str, self.values.shape))
+        parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
+        named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]
+        own = [one for one in fields(self) if one.name in ("side", "mesh_error")]
+        said = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
+        return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in said)])})"
+
+    # --- For kernels -------------------------------------------------------------------------------------
+
+    def numbers(self) -> SampledNumbers:
+        made, sign = self._made, side_sign(self.side)
+        return SampledNumbers(self._spline(), made.cells, sign, float(made.is_closed), made.most_bent[int(sign < 0.0)])
+
+    def _spline(self) -> Spline:
+        made = self._made
+        low = np.array(rotations.turned_back(self.rotation, self._middle())) - 0.5 * made.widths
+        width, cells = np.array(self.spacing), np.array(self.values.shape) - 1.0
+        first, wide, inverse, shape = (vec(row.tolist()) for row in (low, width, 1.0 / width, cells))
+        return Spline(first, wide, inverse, shape, made.steepness, made.coefficients)
+
+    def _middle(self) -> Vector:
+        x, y, z = (np.array(self.origin) + 0.5 * self._made.widths).tolist()
+        return x, y, z
+
+    # --- For users ---------------------------------------------------------------------------------------
+
+    def size(self) -> float:
+        low, high = self._made.inner_box
+        return 0.5 * float((high - low).min())
+
+    def bounds(self) -> Box:
+        if self.side == "outside" or not self._made.is_closed:
+            return UNBOUNDED
+        return self._placed(*self._made.inner_box)
+
+    def known_in(self) -> Box | None:
+        """The box outside of which nothing is known of the surface; None: it is nowhere else."""
+        return None if self._made.is_closed else self._placed(np.zeros(3), self._made.widths)
+
+    def _placed(self, low: Floats, high: Floats) -> Box:
+        box = tuple(tuple((np.array(self.origin) + corner).tolist()) for corner in (low, high))
+        return rotated_box(self.rotation, box, self._middle())  # type: ignore[arg-type]
+
+    def extent(self) -> float:
+        low, high = self._placed(np.zeros(3), self._made.widths)
+        return max(farthest(low), farthest(high))
+
+    def shifted(self, shift: Any) -> "Sampled":
+        x, y, z = (a + b for a, b in zip(self.origin, shift, strict=True))
+        return replace(self, origin=(x, y, z))
+
+    def arguments(self) -> dict[str, Any]:
+        """What a file keeps of it: its samples too, unless they are too many."""
+        given = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("values", "_made")}
+        return {"values": packed(self.values), **given}
+
+
+class Samples:
+    """What is made of the samples of a surface, once."""
+
+    def __init__(self, values: Floats, spacing: Vector, origin: Vector) -> None:
+        self.values, self.spacing = values, spacing
+        width = np.array(spacing)
+        self.widths = (np.array(values.shape) - 1.0) * width
+        _require_resolved(values, width, np.array(origin))
+        self.coefficients = spline.coefficients(values)
+        self.steepness = float(max(np.abs(np.diff(values, axis=k)).max() / width[k] for k in range(3)))
+
+    @cached_property
+    def cells(self) -> Cells:
+        """Which cells the surface is in, and how far it is from the others."""
+        return cells_of(self.coefficients, np.array(self.spacing))
+
+    @cached_property
+    def most_bent(self) -> tuple[float, float]:
+        """The least eigenvalue of H, and of -H, anywhere on the surface, at least."""
+        least, most = eigenvalues(self.cells)
+        return least, -most
+
+    @cached_property
+    def is_closed(self) -> bool:
+        """Whether phi is above 0 all over the border of the grid."""
+        return all(least_at_border(self.coefficients, k, end) > 0.0 for k in range(3) for end in (0, -1))
+
+    @cached_property
+    def inner_box(self) -> tuple[Floats, Floats]:
+        """Corners of a box around all points where phi is below 0, from the first sample on."""
+        inside = self.cells.clear == 0
+        for corner in np.ndindex(2, 2, 2):
+            part = tuple(slice(k, n - 1 + k) for k, n in zip(corner, self.values.shape, strict=True))
+            inside = inside | (self.values[part] < 0.0)
+        places = np.argwhere(inside)
+        width = np.array(self.spacing)
+        return places.min(axis=0) * width, (places.max(axis=0) + 1.0) * width
+
+
+# --- Checks ----------------------------------------------------------------------------------------------
+
+
+def _spacing(value: Any) -> Vector:
+    if np.ndim(value) == 0 or isinstance(value, str | bytes):
+        one = checks.length("spacing", value)
+        return one, one, one
+    x, y, z = (checks.length(f"spacing[{k}]", part) for k, part in enumerate(checks.vector("spacing", value)))
+    return x, y, z
+
+
+def _samples(values: Any) -> Floats:
+    """The argument `values`, checked: an array, a path, or what a trajectory keeps of it."""
+    if isinstance(values, dict):
+        values = unpacked(values)
+    if isinstance(values, str | Path):
+        values = read(values)
+    found = np.ascontiguousarray(checks.array("values", values))
+    if found.ndim != 3 or min(found.shape) < spline.LEAST:
+        raise SceneError(
+            f"values must have the shape (nx, ny, nz), {spline.LEAST} samples or more along each axis, got "
+            f"{found.shape}"
+        )
+    wrong = ~np.isfinite(found)
+    if wrong.any():
+        i, j, k = np.argwhere(wrong)[0]
+        raise SceneError(
+            f"values must be finite, got {found[i, j, k]} at values[{i}, {j}, {k}] and {np.count_nonzero(wrong) - 1} "
+            "more that are not"
+        )
+    if not found.min() < 0.0 < found.max():
+        sign = "below" if found.max() <= 0.0 else "above"
+        raise SceneError(
+            f"values must be below 0 inside the surface and above 0 outside, got {sign} 0 everywhere, from "
+            f"{found.min():.4g} to {found.max():.4g}: there is no surface in the grid"
+        )
+    return found if found is not values else found.copy()
+
+
+def _require_resolved(values: Floats, width: Floats, origin: Floats) -> None:
+    """Raise if the spline changes its sign twice along an edge of a cell, between samples of the same sign."""
+    for axis in range(3):
+        f = np.moveaxis(values, axis, 0)
+        c = spline.along(f, 0)
+        first, last = f[:-1], f[1:]
+        # The Bernstein coefficients of an edge, between which a cubic is
+        second, third = (4.0 * c[1:-2] + 2.0 * c[2:-1]) / 6.0, (2.0 * c[1:-2] + 4.0 * c[2:-1]) / 6.0
+        ripple = _RIPPLE * np.abs(np.diff(f, axis=0)).max()
+        sign = np.where(first > 0.0, 1.0, -1.0)
+        turned = np.minimum(sign * second, sign * third) < -ripple
+        for place in np.argwhere((sign * last > 0.0) & (first != 0.0) & turned):
+            at = tuple(place)
+            s = np.linspace(0.0, 1.0, 65)[1:-1]
+            r = 1.0 - s
+            seen = r**3 * first[at] + 3 * r * r * s * second[at] + 3 * r * s * s * third[at] + s**3 * last[at]
+            if (sign[at] * seen).min() < -ripple:
+                ends = np.array([at, at])
+                ends[1, 0] += 1
+                start, end = np.moveaxis(ends[:, [*range(1, axis + 1), 0, *range(axis + 1, 3)]], 0, 0)
+                where = ", ".join(f"{x:.4g}" for x in origin + width * 0.5 * (start + end))
+                raise SceneError(
+                    f"values must resolve the surface, got a grid that is too coarse: between values{start.tolist()} = "
+                    f"{first[at]:.4g} and values{end.tolist()} = {last[at]:.4g}, at ({where}), phi changes its sign "
+                    "twice; sample it with a smaller spacing"
+                )
+
+
+# --- Files -----------------------------------------------------------------------------------------------
+
+
+def read(path: str | Path) -> Floats:
+    """The samples in a .npy file, or in the one dataset with three axes of an HDF5 file.
+
+    Raises:
+        SceneError: the file cannot be read, or holds no such array.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".npy":
+            return np.asarray(np.load(path, allow_pickle=False))
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            found: list[Any] = []
+            file.visititems(lambda _name, one: found.append(one) if getattr(one, "ndim", 0) == 3 else None)
+            if len(found) != 1:
+                named = checks.listed(one.name for one in found) or "none"
+                raise SceneError(f"{path} must hold one dataset with three axes, got {named}")
+            return np.asarray(found[0][()])
+    except (OSError, ValueError, EOFError) as error:
+        raise SceneError(f"cannot read the samples in {path}: {error}") from error

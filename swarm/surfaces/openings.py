@@ -1,0 +1,194 @@
+"""Openings: volumes inside which a wall is not there. Who reaches the wall there has passed.
+
+A volume is where a particle would be admissible among the walls of the surface that gives it; of many bodies (`Spheres`
+and the like) it is the inside of each.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..kernel.gravity import Nothing
+from ..kernel.jit import by_type, select
+from . import contract, required
+from .fields.many import Many
+from .fields.members import deepest
+from .fold import Chain, Field, chain_of
+from .images import Lengths, images_of
+from .room import has_room
+from .surface import SIDES, Surface
+
+# Most walls that all openings of a scene may be compiled for.
+_MOST = 24
+# A volume without end is searched as far as this many times the wall and what gives the volume extend.
+_REACH = 2.0
+
+
+class Openings(NamedTuple):
+    """Of so many walls in a row the volumes in which they are open, a Chain or None; then those of the next walls."""
+
+    volumes: Any
+    walls: float
+    rest: Any
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]]) -> Openings | None:
+    """The openings of a chain as kernels take them, None where there are none.
+
+    `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece.
+    """
+    if not any(volumes):
+        return None
+    found: Openings | None = None
+    for given, some in itertools.groupby(reversed(spans), lambda span: volumes[span[0]]):
+        found = Openings(_chain_of(given), float(sum(walls for _piece, walls in some)), found)
+    return found
+
+
+def _chain_of(volumes: Sequence[Surface]) -> Chain | None:
+    chain = None
+    for volume in reversed(volumes):
+        chain = Chain(Field(volume.members, None) if isinstance(volume, Many) else chain_of([volume]), chain)
+    return chain
+
+
+def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
+    """What is open in a surface: what its openings say and, where the scene repeats, the images of that.
+
+    Raises:
+        SceneError: an opening has no phi, or no point of the wall in it, or it does not go with the period.
+    """
+    found: list[Surface] = []
+    for k, opening in enumerate(surface.openings):
+        where = f"{name}.openings[{k}]"
+        required.require_description([opening], where)
+        if not _reaches(surface, opening):
+            raise SceneError(
+                f"{where} must reach the wall that it opens, got {opening}, in which no point of {name} "
+                f"({type(surface).__name__}) is; move it, or make it larger"
+            )
+        found += [opening] if period is None else _images(opening, period, where)
+    return tuple(found)
+
+
+def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
+    """The volume in every cell, as far as it reaches into this one."""
+    side = getattr(opening, "side", None)
+    if isinstance(opening, Many) or side is None:
+        return images_of(opening, period, name)
+    if side == "outside":
+        raise SceneError(
+            f'{name}.side must be "inside" where the scene has a period, got "outside": the images of what is open '
+            "would cover one another's walls"
+        )
+    # The images of a solid are those of what it fills.
+    solid = replace(opening, side="outside")  # type: ignore[call-arg]
+    return [replace(image, side="inside") for image in images_of(solid, period, name)]  # type: ignore[call-arg]
+
+
+def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
+    """Raise a `SceneError` where there are more openings than kernels can be compiled for."""
+    walls = sum(len(volume.walls()) for given in volumes for volume in given)
+    if walls > _MOST:
+        raise SceneError(
+            f"openings must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
+            "openings of one kind make one of many bodies, such as swarm.Spheres, in each of which the wall is open"
+        )
+
+
+def _reaches(surface: Surface, opening: Surface) -> bool:
+    """Whether a volume has points on both sides of a wall."""
+    both = _gap(opening, _sign(opening)), _gap(surface, SIDES[getattr(surface, "side", "inside")])
+    reach = _REACH * max(surface.extent(), opening.extent())
+    low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
+    # Also where the box of a flat volume has no width
+    room = 1e-9 * reach
+    low, high = np.maximum(low - room, -reach), np.minimum(high + room, reach)
+    return all(
+        has_room(
+            low,
+            high,
+            lambda points, sign=sign: np.array([both[0][0](points), sign * both[1][0](points)]),  # type: ignore[misc]
+            lambda i, points, sign=sign: (sign if i else 1.0) * both[i][1](points),  # type: ignore[misc]
+        )
+        for sign in (1.0, -1.0)
+    )
+
+
+def _gap(surface: Surface, sign: float) -> Any:
+    """The gap of a surface, and its gradient, at points."""
+    return lambda points: sign * surface.phi(points), lambda points: sign * surface.gradient(points)
+
+
+def _sign(opening: Surface) -> float:
+    """That of phi where the volume is not."""
+    return 1.0 if isinstance(opening, Many) else SIDES[getattr(opening, "side", "inside")]
+
+
+def _box_of(opening: Surface) -> Any:
+    if isinstance(opening, Many):
+        low, high = opening.corners()
+        return low.min(axis=1), high.max(axis=1)
+    return opening.bounds()
+
+
+def are_open(volumes: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of the points (3, N) are in any of the volumes."""
+    found = np.zeros(points.shape[1], np.bool_)
+    for volume in volumes:
+        found |= _sign(volume) * volume.phi(points) <= 0.0
+    return found
+
+
+# --- In kernels ------------------------------------------------------------------------------------------
+
+
+@by_type
+def outside(volume, r):
+    """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
+
+    What is neither a `Chain` of walls nor a `Field` is the inside of one body of a field, whose admissible side is
+    outside of it.
+    """
+    return -contract.distance(volume, r)
+
+
+@outside.register(Chain)
+def _(volume, r):
+    here, other = contract.distance(volume.first, r), outside(volume.rest, r)
+    return select(here <= other, other, here)
+
+
+outside.register(Nothing, lambda volume, r: -math.inf)
+outside.register(Field, lambda volume, r: -deepest(volume.first, r))
+
+
+@by_type
+def is_open(openings, wall, r, near):
+    """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
+    return False
+
+
+@is_open.register(Openings)
+def _(openings, wall, r, near):
+    here = (wall >= 0.0) & (wall < openings.walls) & _is_in_any(openings.volumes, r, near)
+    return here | is_open(openings.rest, wall - openings.walls, r, near)
+
+
+@by_type
+def _is_in_any(volumes, r, near):
+    return False
+
+
+@_is_in_any.register(Chain)
+def _(volumes, r, near):
+    return (outside(volumes.first, r) <= near) | _is_in_any(volumes.rest, r, near)

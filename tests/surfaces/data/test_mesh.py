@@ -1,0 +1,135 @@
+"""Surfaces from meshes: how far they are from them, and which meshes are refused."""
+
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+import swarm
+from swarm import scene_file
+
+
+def written(folder, mesh, name="part.stl"):
+    mesh.export(folder / name)
+    return folder / name
+
+
+def test_a_sphere_of_triangles(tmp_path):
+    path = written(tmp_path, trimesh.creation.icosphere(4, radius=0.5))
+    made = [swarm.from_mesh(path, spacing) for spacing in (0.1, 0.05)]
+    for surface in made:
+        # Between the triangles' corners, on the sphere, and their middles
+        assert 0.0 < surface.mesh_error < 2e-3
+        assert f"mesh_error={surface.mesh_error}" in repr(surface)
+    points = np.random.default_rng(1).normal(size=(3, 200))
+    points *= 0.5 / np.sqrt((points**2).sum(axis=0))
+    assert np.abs(made[1].phi(points)).max() < 2e-3
+    end = swarm.simulate(
+        swarm.Scene([made[1]]), swarm.fill(swarm.Scene([made[1]]), 5, speed=1.0, seed=1), swarm.Impact(), until=2.0,
+        compile="never",
+    )  # fmt: skip
+    assert end.observables["impacts"][-1] > 10
+    assert end.observables["energy_error"].max() < 1e-14
+
+
+def test_edges_become_round_within_a_cell(tmp_path):
+    surface = swarm.from_mesh(
+        written(tmp_path, trimesh.creation.box((1.0, 0.8, 0.6)), "box.off"), 0.043, side="outside"
+    )
+    assert 0.1 * 0.043 < surface.mesh_error < 0.043
+    flat = surface.phi([[0.5, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, -0.3]])
+    assert np.abs(flat).max() < 1e-4
+
+
+def test_millimetres_and_triangles_seen_from_inside(tmp_path):
+    mesh = trimesh.creation.icosphere(3, radius=500.0)
+    mesh.invert()
+    surface = swarm.from_mesh(written(tmp_path, mesh), 0.1, scale=1e-3, friction=0.2)
+    assert surface.phi([0.0, 0.0, 0.0]) == pytest.approx(-0.5, abs=0.05)
+    assert surface.friction == 0.2
+
+
+def test_a_vessel_with_a_wall_of_two_sides(tmp_path):
+    outer, inner = trimesh.creation.icosphere(3, radius=0.6), trimesh.creation.icosphere(3, radius=0.4)
+    inner.invert()
+    surface = swarm.from_mesh(written(tmp_path, trimesh.util.concatenate([outer, inner])), 0.05)
+    assert surface.phi([[0.5, 0.0, 0.8], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) == pytest.approx([-0.1, 0.4, 0.2], abs=0.03)
+
+
+def test_bad_meshes_are_one_sentence(tmp_path):
+    sphere = trimesh.creation.icosphere(2)
+    whole = written(tmp_path, sphere)
+    open_mesh = trimesh.Trimesh(sphere.vertices, sphere.faces[1:])
+    turned = sphere.faces.copy()
+    turned[0] = turned[0, ::-1]
+    (tmp_path / "text.stl").write_text("no mesh")
+    (tmp_path / "part.foo").write_text("no mesh")
+    cases = [
+        (lambda: swarm.from_mesh(tmp_path / "no.stl", 0.1), "cannot read the mesh .*no.stl"),
+        (lambda: swarm.from_mesh(tmp_path / "part.foo", 0.1), "cannot read the mesh .*part.foo"),
+        (lambda: swarm.from_mesh(tmp_path / "text.stl", 0.1), "mesh .*text.stl"),
+        (
+            lambda: swarm.from_mesh(written(tmp_path, open_mesh, "open.stl"), 0.1),
+            "closed .*got 3 edges of one triangle",
+        ),
+        (
+            lambda: swarm.from_mesh(
+                written(tmp_path, trimesh.Trimesh(sphere.vertices, turned, process=False), "turned.stl"), 0.1
+            ),
+            "turned the same way",
+        ),
+        (lambda: swarm.from_mesh(whole, 0.0), "spacing must be above 0"),
+        (lambda: swarm.from_mesh(whole, 1e-6), "samples fit in memory, got 1e-06 m .* take"),
+        (lambda: swarm.from_mesh(whole, 3.0), "spacing must resolve the mesh .*got 3 m"),
+        (lambda: swarm.from_mesh(whole, 0.1, "in"), "side must be one of"),
+        (lambda: swarm.from_mesh(whole, 0.1, scale=-1.0), "scale must be above 0"),
+    ]
+    for make, said in cases:
+        with pytest.raises(swarm.SceneError, match=said) as caught:
+            make()
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["trimesh", "igl"])
+def test_a_missing_library_is_said(tmp_path, monkeypatch, name):
+    path = written(tmp_path, trimesh.creation.icosphere(2))
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(swarm.SceneError, match=f"from_mesh needs the package '{name}'.*pip install trimesh libigl"):
+        swarm.from_mesh(path, 0.2)
+
+
+TEXT = """
+[particles]
+count = 3
+speed = 1.0
+[[surface]]
+kind = "mesh"
+{more}
+[method]
+kind = "impact"
+[run]
+until = 1.0
+every = 0.5
+"""
+
+
+def test_a_mesh_in_a_scene_file(tmp_path):
+    (tmp_path / "parts").mkdir()
+    written(tmp_path / "parts", trimesh.creation.icosphere(2, radius=0.5))
+
+    def read(more):
+        (tmp_path / "scene.toml").write_text(TEXT.format(more=more))
+        return scene_file.read(tmp_path / "scene.toml").scene.surfaces[0]
+
+    surface = read('file = "parts/part.stl"\nspacing = 0.1\nrestitution = 0.9')
+    assert (surface.restitution, surface.mesh_error > 0.0, surface.spacing) == (0.9, True, (0.1, 0.1, 0.1))
+    for more, said in {
+        'file = "part.stl"\nspacing = 0.1': r"surface\[0\].cannot read the mesh .*part.stl",
+        'file = "parts/part.stl"': r"surface\[0\].spacing: expected a number, got nothing",
+        "spacing = 0.1": r"surface\[0\].file: expected the name of a file, got nothing",
+        'file = "parts/part.stl"\nspacing = "a"': r"surface\[0\].spacing must be",
+        'file = "parts/part.stl"\nspacing = 0.1\norigin = [0, 0, 0]': r"surface\[0\].origin: unknown key of a mesh",
+    }.items():
+        with pytest.raises(swarm.SceneError, match=said):
+            read(more)
