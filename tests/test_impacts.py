@@ -124,6 +124,25 @@ def test_where_it_has_gone_is_told_by_the_images(tmp_path):
     assert np.abs(table["image"]).max() > 0
 
 
+@pytest.mark.parametrize("gravity", [None, DOWN])
+def test_who_escapes_has_a_last_row(tmp_path, gravity):
+    hole = swarm.Sphere(0.3, center=(0.0, 0.0, -0.5))
+    vessel = swarm.Scene([swarm.Sphere(0.5, friction=0.1, restitution=0.8, openings=[hole])], gravity)
+    result = run(tmp_path / "i.h5", vessel, until=6.0)
+    table = table_of(tmp_path / "i.h5")
+    out = table[table["impulse"] == 0.0]
+    gone = np.flatnonzero(~np.isnan(result.escape_time))
+    assert 3 < len(gone) == len(out) == len(table) - result.impacts_per_particle.sum()
+    order = np.argsort(out["particle"])
+    assert out["particle"][order].tolist() == gone.tolist()
+    assert np.abs(out["time"][order] - result.escape_time[gone]).max() < 1e-14
+    assert (out["position"][order] == result.particles.position[:, gone].T).all()
+    assert (out["velocity_after"] == out["velocity_before"]).all()
+    assert (out["slip"] == 0.0).all()
+    last = {int(row["particle"]): row["impulse"] for row in table}
+    assert all(last[p] == 0.0 for p in gone)
+
+
 @pytest.mark.parametrize("name", ["fall, friction", "thermal"])
 def test_the_rows_are_the_same_for_any_threads_and_blocks(tmp_path, monkeypatch, name):
     """And for logs of any size: here a frame fills several."""

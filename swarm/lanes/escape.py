@@ -6,14 +6,16 @@ from ..kernel.jit import by_type, by_type_outlined, index, inlined
 from ..kernel.vector import column, put
 from ..surfaces.openings import Openings, is_open
 from . import compose
-from .arrays import LEFT, R
+from . import log as impact_log
+from .arrays import LEFT, R, V
 from .fly import marked_lanes
 
 
 @inlined
-def _escape(share, p, left):
+def _escape(share, p, wall, r, v, left):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
     share.state.escape_time[p] = share.moment - left
+    impact_log.add_escape(share.log, share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
 
 
 @by_type
@@ -28,7 +30,8 @@ def _(openings, share, lanes, live):
         lanes.marked[i] = is_open(openings, lanes.wall[i], column(rows, R, i), 0.0)
     for k in range(marked_lanes(lanes, live)):
         lane = index(lanes.order[k])
-        _escape(share, index(lanes.particle[lane]), rows[LEFT, lane])
+        r, v = column(rows, R, lane), column(rows, V, lane)
+        _escape(share, index(lanes.particle[lane]), lanes.wall[lane], r, v, rows[LEFT, lane])
         rows[LEFT, lane], lanes.wall[lane] = 0.0, -1.0
 
 
@@ -61,7 +64,7 @@ def let_out_of(openings, method, share, p, wall, r, left):
 def _(openings, method, share, p, wall, r, left):
     if not is_open(openings, wall, r, crossing.near(method, r)):
         return False
-    _escape(share, p, left)
+    _escape(share, p, wall, r, column(share.state.velocity, 0, p), left)
     return True
 
 
@@ -73,7 +76,8 @@ def let_out_at(openings, method, chain, share, p, r, left):
 
 @let_out_at.register(Openings)
 def _(openings, method, chain, share, p, r, left):
-    if open_wall_at(openings, chain, r, events.TOUCH * method.size, crossing.near(method, r)) < 0.0:
+    wall = open_wall_at(openings, chain, r, events.TOUCH * method.size, crossing.near(method, r))
+    if wall < 0.0:
         return False
-    _escape(share, p, left)
+    _escape(share, p, wall, r, column(share.state.velocity, 0, p), left)
     return True

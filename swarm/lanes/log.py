@@ -11,7 +11,7 @@ from ..contact import laws as wall_laws
 from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import Nothing
 from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined
-from ..kernel.vector import Vec, column, dot, put
+from ..kernel.vector import ZERO, Vec, column, dot, put
 from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
@@ -162,8 +162,25 @@ def _(log, method, chain, state, particle, struck):
         _add(log, method, chain, state, particle, struck)
 
 
+@by_type_outlined
+def add_escape(log, state, particle, struck):
+    """A row, without an impulse, for a particle that passes an opening."""
+
+
+@add_escape.register(Log)
+def _(log, state, particle, struck):
+    if _is_chosen(log.chosen, particle):
+        _no_slip(log.slip, _add_struck(log, state, particle, struck))
+
+
 @inlined
 def _add(log, method, chain, state, particle, struck):
+    _add_slip(log.slip, _add_struck(log, state, particle, struck), method, chain, struck)
+
+
+@inlined
+def _add_struck(log, state, particle, struck):
+    """What every row has; its number."""
     k, p = index(log.filled[0]), index(particle)
     log.filled[0] += 1
     log.time[k] = max(log.begin, log.end - struck.left)
@@ -172,8 +189,8 @@ def _add(log, method, chain, state, particle, struck):
     _put(log.velocity_before, k, struck.before)
     _put(log.velocity_after, k, struck.after)
     log.impulse[k] = struck.impulse * state.mass[p]
-    _add_slip(log.slip, k, method, chain, struck)
     _add_image(log.image, k, state.image, p)
+    return k
 
 
 @inlined
@@ -190,6 +207,14 @@ def _add_slip(slip, k, method, chain, struck):
 
 
 _add_slip.register(Nothing, lambda slip, k, method, chain, struck: None)
+
+
+@by_type
+def _no_slip(slip, k):
+    _put(slip, k, ZERO)
+
+
+_no_slip.register(Nothing, lambda slip, k: None)
 
 
 @by_type

@@ -191,11 +191,14 @@ def _(chain, state, i, wall, given):
 @kernel
 def careful_block(method, chain, gravity, share):
     """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    following, stop, drawn = 0, 0, 0
+    following, stop, drawn, _live, _passes = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
         if following == stop:
             return Status.DONE.value, 0, drawn
+        if impact_log.is_full(share.log):
+            impact_log.keep_going(share.log, following, stop, drawn, 0, 0)
+            return Status.LOG_FULL.value, 0, drawn
         _step(method, chain, gravity, share, following)
         return_particle(share.state.period, chain, share.state, following)
         contacts = share.state.contacts

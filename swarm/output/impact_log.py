@@ -143,6 +143,8 @@ class ImpactLog(Stored):
             surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
             scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
 
+            Who passes an opening of a surface has a last row there, with an impulse of 0.
+
             A contact step begins at the impact, and `velocity_after` is that at its end. After an impact that is the
             last of a series, `velocity_after` is the velocity along the wall. What slides, rests or is pressed into an
             edge by several walls has no impacts: its impulse is in the observable alone.
