@@ -2,8 +2,8 @@
 
 To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a NamedTuple of its numbers,
 for kernels. For the type of the numbers register, with contract.py, which describes all functions: `phi`, `gradient`
-and one of `first_hit`, `course` and `bend`; for `Impact`, which slides along walls, and methods with steps in contact
-also `hessian`, and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES below.
+and one of `first_hit`, `course`, `near` and `bend`; for `Impact`, which slides along walls, and methods with steps in
+contact also `hessian`, and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES.
 examples/own_surface.py is a complete surface; if a method needs a function that is missing, an error says so before the
 run.
 """
