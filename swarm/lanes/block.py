@@ -41,6 +41,7 @@ from .arrays import (
     heat as book_heat,
 )
 from .fly import go, marked_lanes, put_end
+from .picked import of_lane, pick, picks
 from .solve import solution, solve
 from .wrap import return_lanes
 
@@ -67,7 +68,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     which the next call takes as `share.halted`. Particles that are done are left alone, and those that arrive become
     it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     """
-    lanes, state = with_distances(lanes), share.state
+    lanes, state, picked = with_distances(lanes), share.state, picks(chain)
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
         following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
@@ -81,7 +82,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
             leave(lanes, live)
             return Status.INTERRUPTED.value, live, drawn
         passes += 1
-        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
+        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
         if some_hard or (methods.holds(method) and passes % _LOOK == 0):
             status, lane = _rare(hard, method, chain, gravity, state, lanes, live)
             if status != Status.DONE.value:
@@ -147,17 +148,18 @@ def _(contacts, lanes, i):
 
 
 @inlined
-def _pass(method, chain, gravity, share, lanes, live):
+def _pass(method, chain, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     return_lanes(lanes.period, share.state, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
+    pick(chain, 0.0, lanes, picked, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
-        here = methods.walls_of(method, chain, lane.left)
+        here = methods.walls_of(method, of_lane(chain, picked, i), lane.left)
         contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..kernel.gravity import Gravity, Nothing, as_vector
-from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined, scratch, select
+from ..kernel.jit import Array, by_type, by_type_outlined, copy_row, index, inlined, scratch, select
 from ..kernel.vector import column
 from ..surfaces import contract, flights, fold
 from ..surfaces.fields.grid import cell_of, until_next
-from ..surfaces.fields.members import member
+from ..surfaces.fields.members import gathered, member, width
 from .arrays import STRIDE, R, V
 
 # What a lane knows of its flight, in rows of `course`: when it ends, and at which wall, or -1.
@@ -28,6 +28,8 @@ class Seen(NamedTuple):
     first: Array  # int64, the first entry of the cell
     number: Array  # int64, how many it has
     k: int
+    body: Array
+    which: Array
 
 
 @inlined
@@ -63,6 +65,7 @@ def _(chain, before, gravity, lanes, live):
     time, wall = scratch(STRIDE, np.float64), scratch(STRIDE, np.float64)
     first, number = scratch(STRIDE, np.int64), scratch(STRIDE, np.int64)
     grid, most = members.grid, 0
+    body, which = scratch((STRIDE, width(members.like)), np.float64), scratch(STRIDE, np.float64)
     for i in range(index(live)):
         r = column(rows, R, i)
         cell = cell_of(grid, r)
@@ -75,7 +78,7 @@ def _(chain, before, gravity, lanes, live):
     for i in range(index(live)):
         most = max(most, number[i])
     for k in range(most):
-        _look(gravity, members, before, lanes, live, Seen(time, wall, first, number, k))
+        _look(gravity, members, before, lanes, live, Seen(time, wall, first, number, k, body, which))
     for i in range(index(live)):
         course[_TIME, i], course[_WALL, i] = time[i], wall[i]
 
@@ -87,10 +90,14 @@ def _look(gravity, members, before, lanes, live, seen):
 
 @_look.register(Nothing)
 def _(gravity, members, before, lanes, live, seen):
-    rows = lanes.rows
+    rows, body, which = lanes.rows, seen.body, seen.which
     for i in range(index(live)):
         m = _entry(members, seen, i)
-        time, hits = contract.first_hit(member(members, index(m)), column(rows, R, i), column(rows, V, i))
+        which[i] = m
+        copy_row(body, i, members.table, index(m), width(members.like))
+    for i in range(index(live)):
+        m = which[i]
+        time, hits = contract.first_hit(gathered(members.like, body, i, 0), column(rows, R, i), column(rows, V, i))
         _take(seen, i, time, select(hits, m + before, -1.0))
 
 

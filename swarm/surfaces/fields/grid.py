@@ -112,50 +112,52 @@ def until_next(gravity, grid, cell, r, v):
     x = _along(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
     y = _along(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)
     z = _along(gravity, 2, (grid.low.z, grid.width.z, grid.margin.z, n.z), p.z, r.z, v.z)
-    leaves = select(y.leaves < x.leaves, y.leaves, x.leaves)
-    enters = select(y.enters > x.enters, y.enters, x.enters)
-    leaves, enters = select(z.leaves < leaves, z.leaves, leaves), select(z.enters > enters, z.enters, enters)
-    return select(cell.inside, leaves, enters)
+    leaves = select(y < x, y, x)
+    in_x, in_y, in_z = _comes(x, p.x, n.x), _comes(y, p.y, n.y), _comes(z, p.z, n.z)
+    enters = select(in_y > in_x, in_y, in_x)
+    return select(cell.inside, select(z < leaves, z, leaves), select(in_z > enters, in_z, enters))
 
 
-class Passage(NamedTuple):
-    """When a flight leaves its layer of cells, and before when it does not come into the grid, in one direction."""
-
-    leaves: float
-    enters: float
+@inlined
+def _comes(time, place, count):
+    """When a flight comes into the layers of cells, 0 where it is in them."""
+    return select((place >= 0.0) & (place < count), 0.0, time)
 
 
 @by_type
 def _along(gravity, axis, cells, place, x, v):
-    """The `Passage` along one axis, with (low, width, margin, how many) of its layers."""
+    """When a flight leaves its layer of cells, (low, width, margin, how many) of which are given.
+
+    Of a flight beside them, before when it does not come in.
+    """
     raise NotImplementedError
 
 
 @_along.register(Nothing)
 def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
-    ahead = v > 0.0
+    # One division for both
+    ahead, among, below = v > 0.0, (place >= 0.0) & (place < count), place < 0.0
     edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
-    face = select(place < 0.0, low + margin, low + count * width - margin)
-    comes = (select(place < 0.0, 1.0, -1.0) * v) > 0.0
-    return Passage(
-        select(v != 0.0, (edge - x) / v, np.inf),
-        select((place >= 0.0) & (place < count), 0.0, select(comes, (face - x) / v, np.inf)),
-    )
+    face = select(below, low + margin, low + count * width - margin)
+    comes = (select(below, 1.0, -1.0) * v) > 0.0
+    ends = (among & (v != 0.0)) | ((not among) & comes)
+    return select(ends, (select(among, edge, face) - x) / v, np.inf)
 
 
 @_along.register(Gravity)
 def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
     b, a = 0.5 * v, 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
-    above = rise_time(x - (low + (place + 1.0) * width + margin), b, a)
-    below = rise_time(low + place * width - margin - x, -b, -a)
-    sign, face = select(place < 0.0, 1.0, -1.0), select(place < 0.0, low + margin, low + count * width - margin)
-    comes = rise_time(sign * (x - face), sign * b, sign * a)
-    return Passage(
-        select(above < below, above, below),
-        select((place >= 0.0) & (place < count), 0.0, comes),
+    among, below = (place >= 0.0) & (place < count), place < 0.0
+    sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
+    up = rise_time(
+        select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)),
+        select(among, b, sign * b),
+        select(among, a, sign * a),
     )
+    down = rise_time(low + place * width - margin - x, -b, -a)
+    return select(among & (down < up), down, up)
 
 
 # --- How it is made --------------------------------------------------------------------------------------
@@ -198,7 +200,6 @@ def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) ->
     """The corner of the grid, how many cells it has along each axis, and how wide they are."""
     first, last, bodies = low.min(axis=1), high.max(axis=1), low.shape[1]
     if repeated is not None:
-        # Cells begin and end at the faces.
         first, last = np.maximum(first, repeated[0]), np.minimum(last, repeated[1])
         middle = 0.5 * (low + high)
         bodies = (
@@ -208,13 +209,22 @@ def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) ->
     extent = np.where(endless, 1.0, last - first)
     each = extent[~endless].prod() / (_CELLS_EACH * max(1, bodies))
     side = each ** (1.0 / max(1, (~endless).sum()))
+    if repeated is not None:
+        # Cells begin and end at the faces, if bodies are near: a thin layer in front of a face is one more to cross.
+        first = np.where(first - repeated[0] < side, repeated[0], first)
+        last = np.where(repeated[1] - last < side, repeated[1], last)
+        extent = np.where(endless, 1.0, last - first)
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
     room = 4.0 * _MARGIN * extent
-    if repeated is not None:
-        room = np.where(np.isfinite(repeated[0]), 0.0, room)
-    width = np.where(endless, _ENDLESS, (extent + 2.0 * room) / shape)
-    return np.where(endless, -0.5 * _ENDLESS, first - room), shape, width
+    before, behind = (room, room) if repeated is None else _room_up_to(repeated, first, last, room)
+    width = np.where(endless, _ENDLESS, (extent + before + behind) / shape)
+    return np.where(endless, -0.5 * _ENDLESS, first - before), shape, width
+
+
+def _room_up_to(repeated: tuple[Floats, Floats], first: Floats, last: Floats, room: Floats) -> tuple[Floats, Floats]:
+    """The room before and behind the bodies, none at the faces of a cell that repeats."""
+    return np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)
 
 
 def _pairs(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
