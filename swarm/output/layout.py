@@ -12,6 +12,8 @@ PARTS = ("position", "velocity")
 COUNTS = "impacts"
 # The cells that each particle has come through, where the scene repeats.
 IMAGES = "image"
+# Long arrays of the scene, by their digests.
+ARRAYS = "arrays"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.

@@ -257,9 +257,9 @@ class Trajectory:
     @property
     def scene(self) -> Scene:
         """The scene that was run."""
-        with self._reading("its scene"):
-            table = tomllib.loads(self._text("scene"))
-            surfaces = table["surface"]
+        with self._reading("its scene") as file:
+            table, arrays = tomllib.loads(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
+            surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             own = any(surface["kind"] == "own" for surface in surfaces)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):

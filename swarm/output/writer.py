@@ -23,7 +23,7 @@ from ..particles import Particles, State
 from ..scene import Scene
 from ..version import VERSION
 from . import paths, superblock
-from .layout import COUNTS, IMAGES, PARTS
+from .layout import ARRAYS, COUNTS, IMAGES, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -127,9 +127,10 @@ class TrajectoryWriter:
         creator = h5md.create_group("creator")
         creator.attrs["name"], creator.attrs["version"] = "swarm", VERSION
         parameters = file.create_group("parameters")
-        for name, text in descriptions(self._scene, self._method, self._storage).items():
-            parameters[name] = text
-        for name, value in {"particles": self._count, **self._identity}.items():
+        arrays: dict[str, Any] = {}
+        texts = descriptions(self._scene, self._method, self._storage, arrays)
+        long = {f"{ARRAYS}/{name}": values for name, values in arrays.items()}
+        for name, value in {**texts, **long, "particles": self._count, **self._identity}.items():
             parameters[name] = value
         if self._text is not None:
             parameters["scene_file"] = self._text
@@ -325,10 +326,12 @@ def _put(dataset: Any, first: int, values: Any) -> None:
     handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
 
 
-def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, str]:
-    """The texts that identify a run."""
+def descriptions(
+    scene: Scene, method: Method, storage: Storage, arrays: dict[str, Any] | None = None
+) -> dict[str, str]:
+    """The texts that identify a run; `arrays` get what they name and do not hold."""
     return {
-        "scene": tomli_w.dumps(tables.scene_table(scene)),
+        "scene": tomli_w.dumps(tables.scene_table(scene, {} if arrays is None else arrays)),
         "method": tomli_w.dumps(tables.table_of(method)),
         "storage": tomli_w.dumps(vars(storage)),
     }
