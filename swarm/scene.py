@@ -117,7 +117,7 @@ class Scene:
         for i in self._fields():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
-                f"Impact with contact_step = 0 and particles, or list its bodies one by one, at most {MOST_WALLS} walls"
+                f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
         if not self.order.groups:
             return self
@@ -145,11 +145,19 @@ class Scene:
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity, self.period)
 
-    def chain(self, moment: float = 0.0) -> Chain | Field | Carried | None:
-        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
+    def chain(self, moment: float = 0.0, own: Sequence[Surface] = ()) -> Chain | Field | Carried | None:
+        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s].
+
+        After them those of a body's `own`, where nothing moves.
+        """
         if self.moves():
             return carried(self._pieces, moment)
-        return chain_in(self.order, self._pieces, self._groups)
+        return chain_in(self.order, self._pieces, self._groups, own)
+
+    def walls_of_rows(self) -> NDArray[np.int64]:
+        """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""
+        fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
+        return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
     def cell(self) -> Period | None:
         """The cell that repeats as kernels take it."""

@@ -40,7 +40,8 @@ from .arrays import (
 from .arrays import (
     heat as book_heat,
 )
-from .fly import go, marked_lanes, put_end
+from .fly import go, put_end
+from .marks import marked_lanes
 from .picked import of_lane, pick, picks
 from .solve import solution, solve
 from .wrap import return_lanes

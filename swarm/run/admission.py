@@ -29,7 +29,9 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         if not isinstance(value, allowed):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     if isinstance(particles, Bodies):
-        return _task_of_bodies(scene.apart("bodies"), particles.copy(), method, options)
+        # Of springs each point may be in every wall at once.
+        known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
+        return _task_of_bodies(known, particles.copy(), method, options)
     if not isinstance(method, Impact) or method.contact_step > 0.0:
         name = "a contact_step" if isinstance(method, Impact) else type(method).__name__
         scene = scene.apart(name)

@@ -230,6 +230,12 @@ def is_quartic(surface):
 
 
 @by_type
+def falls_by_steps(surface):
+    """A number where falls take the safe steps of a `course`, else None: a type for the compiler."""
+    return
+
+
+@by_type
 def may_be_far(surface):
     """Whether its `course` may be one from afar: a constant for the compiler."""
     return True
@@ -238,6 +244,11 @@ def may_be_far(surface):
 @course.implies(is_quartic)
 def _(surface):
     return True
+
+
+@course.implies(falls_by_steps)
+def _(surface):
+    return 1.0
 
 
 @course.implies(falling_hit)

@@ -96,6 +96,23 @@ _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 
 
 @by_type
+def by_steps(chain):
+    """A number where falls to a wall of a chain take safe steps, else None: a type for the compiler."""
+    return
+
+
+by_steps.register(Chain, lambda chain: _one_of(contract.falls_by_steps(chain.first), chain.rest))
+
+
+@by_type
+def _one_of(steps, rest):
+    return steps
+
+
+_one_of.register(Nothing, lambda steps, rest: by_steps(rest))
+
+
+@by_type
 def begin_fall(chain, course, row, lane, r, v, pull):
     """The course of a falling flight for every wall into course[row:, lane]."""
 

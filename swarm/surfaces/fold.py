@@ -82,6 +82,24 @@ def outside_of_any(members, wall, r):
 
 
 @by_type
+def others(chain):
+    """The walls of a chain that are in no field: they come after all fields."""
+    return chain
+
+
+others.register(Field, lambda chain: others(chain.rest))
+
+
+@by_type
+def count_in_fields(chain):
+    """How many walls its fields have."""
+    return 0.0
+
+
+count_in_fields.register(Field, lambda chain: count(chain.first) + count_in_fields(chain.rest))
+
+
+@by_type
 def row(chain, wall):
     """The row in which it is booked what this wall gives: a field has one."""
     return int(wall)
@@ -317,6 +335,12 @@ def count_in_cell(members, r):
 @by_type
 def list_in_cell(members, k, before, r, into):
     """Their numbers into into[k:], and how many they are."""
+    raise NotImplementedError
+
+
+@by_type
+def one_in_cell(members, k, r):
+    """The number of one of them."""
     raise NotImplementedError
 
 

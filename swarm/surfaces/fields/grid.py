@@ -1,6 +1,5 @@
 """A uniform grid of cells around many bodies, and which of them reach into each."""
 
-from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -8,22 +7,18 @@ from numpy.typing import NDArray
 
 from ...kernel.gravity import Gravity, Nothing
 from ...kernel.jit import Array, by_type, inlined, select
-from ...kernel.vector import Vec, vec
+from ...kernel.vector import Vec
 from ..course import rise_time
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.
-_MARGIN = 1e-6
+MARGIN = 1e-6
 # Cells for each body: a flight through more of them looks at fewer bodies in each.
 _CELLS_EACH = 1.0
 # An endless direction is one cell of this width, and a body without end has bounds beyond half of it.
 _ENDLESS = 1e200
-# Pairs of bodies and cells that are looked at together.
-_BATCH = 4_000_000
-
 
 Floats = NDArray[np.float64]
-Reaches = Callable[[NDArray[np.int64], Floats, Floats], NDArray[np.bool_]]
 
 
 class Grid(NamedTuple):
@@ -64,7 +59,7 @@ def cell_of(grid, r):
 def _place(d, inverse, count):
     """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther."""
     place = d * inverse
-    low, high = (place < 0.0) & (place >= -0.5 * _MARGIN), (place >= count) & (place < count + 0.5 * _MARGIN)
+    low, high = (place < 0.0) & (place >= -0.5 * MARGIN), (place >= count) & (place < count + 0.5 * MARGIN)
     return select(low, 0.0, select(high, count - 1.0, np.floor(place)))
 
 
@@ -163,40 +158,14 @@ def _(gravity, axis, cells, place, x, v):
 # --- How it is made --------------------------------------------------------------------------------------
 
 
-def grid_of(low: Floats, high: Floats, reaches: Reaches, repeated: tuple[Floats, Floats] | None = None) -> Grid:
-    """The grid of bodies with these bounds (3, n).
-
-    Args:
-        low: lowest corner of the bounds of each body, infinite where it has no end [m].
-        high: highest corner.
-        repeated: the corners (3,) of the cell of the scene that repeats, infinite where it does not; None: none does.
-        reaches: which of so many bodies may have a point in common with the boxes that have these corners (3, pairs).
-    """
-    corner, shape, width = _cells(low, high, repeated)
-    margin = _MARGIN * width
-    last = shape.astype(np.int64) - 1
-    begins, ends = (
-        np.clip(np.floor((edge - corner[:, None]) / width[:, None]), 0, last[:, None]).astype(np.int64)
-        for edge in (low - 2.0 * margin[:, None], high + 2.0 * margin[:, None])
-    )
-    cells, bodies = [], []
-    for body, place in _pairs(begins, ends):
-        near = corner[:, None] + place * width[:, None] - 2.0 * margin[:, None]
-        far = corner[:, None] + (place + 1) * width[:, None] + 2.0 * margin[:, None]
-        there = reaches(body, near, far)
-        cells.append(((place[0] * shape[1] + place[1]) * shape[2] + place[2])[there].astype(np.int64))
-        bodies.append(body[there].astype(np.int32))
-    of_cell, of_body = np.concatenate(cells), np.concatenate(bodies)
-    order = np.argsort(of_cell, kind="stable")
-    first = np.zeros(int(shape.prod()) + 2, np.int32)
-    np.cumsum(np.bincount(of_cell, minlength=first.size - 1), out=first[1:])
-    low_corner, wide, inverse, room, cells_along = (
-        vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape)
-    )
-    return Grid(low_corner, wide, inverse, room, cells_along, first, of_body[order])
+def one_cell(bodies: int) -> Grid:
+    """The grid of so many bodies that all are looked at."""
+    low, width, margin = (Vec(*3 * [size]) for size in (-0.5 * _ENDLESS, _ENDLESS, MARGIN * _ENDLESS))
+    entries, first = np.arange(bodies, dtype=np.int32), np.array([0, bodies, bodies], np.int32)
+    return Grid(low, width, Vec(*3 * [1.0 / _ENDLESS]), margin, Vec(1.0, 1.0, 1.0), first, entries)
 
 
-def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
+def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
     """The corner of the grid, how many cells it has along each axis, and how wide they are."""
     first, last, bodies = low.min(axis=1), high.max(axis=1), low.shape[1]
     if repeated is not None:
@@ -216,7 +185,7 @@ def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) ->
         extent = np.where(endless, 1.0, last - first)
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
-    room = 4.0 * _MARGIN * extent
+    room = 4.0 * MARGIN * extent
     before, behind = (room, room) if repeated is None else _room_up_to(repeated, first, last, room)
     width = np.where(endless, _ENDLESS, (extent + before + behind) / shape)
     return np.where(endless, -0.5 * _ENDLESS, first - before), shape, width
@@ -225,21 +194,3 @@ def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) ->
 def _room_up_to(repeated: tuple[Floats, Floats], first: Floats, last: Floats, room: Floats) -> tuple[Floats, Floats]:
     """The room before and behind the bodies, none at the faces of a cell that repeats."""
     return np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)
-
-
-def _pairs(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Bodies and the places (3, pairs) of the cells from the first to the last of each, in batches."""
-    counts = ends - begins + 1
-    number = counts.prod(axis=0)
-    stops = np.cumsum(number)
-    start = 0
-    while start < number.size:
-        done = stops[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(stops, done + _BATCH, side="right")))
-        some = np.arange(start, stop)
-        body = np.repeat(some, number[start:stop])
-        k = np.arange(body.size) - np.repeat(stops[start:stop] - number[start:stop] - done, number[start:stop])
-        along_z, along_y = counts[2, body], counts[1, body]
-        place = np.stack([k // (along_z * along_y), k // along_z % along_y, k % along_z]) + begins[:, body]
-        yield body, place
-        start = stop

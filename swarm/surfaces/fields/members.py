@@ -35,6 +35,10 @@ class Members(NamedTuple):
     grid: Grid
 
 
+class Few(Members):
+    """So few bodies that each lane looks at all of them, faster than from cell to cell; the grid is one cell."""
+
+
 @inlined
 def member(members, m):
     """The numbers of one body."""
@@ -164,6 +168,11 @@ def _(members, k, before, r, into):
     for i in range(first, stop):
         into[k + i - first] = before + members.grid.entries[i]
     return int(stop - first)
+
+
+@fold.one_in_cell.register(Members)
+def _(members, k, r):
+    return members.grid.entries[members.grid.first[index(cell_of(members.grid, r).number)] + k]
 
 
 @fold.until_next_cell.register(Members)
