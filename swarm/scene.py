@@ -198,13 +198,13 @@ class Scene:
             return None
         chain: Chain | Span | None = None
         for i, walls in reversed(self.order.spans(self._pieces)):
-            value = values[self._owner[i]]
+            value = values[self.owners_of_pieces[i]]
             chain = Chain(value, chain) if walls == 1 else Span(value, float(walls), chain)
         return chain
 
     def owners(self) -> list[int]:
         """The surface that each row of the chain belongs to, one for a field."""
-        return [self._owner[i] for i in self.order.owners(self._pieces)]
+        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
 
     @cached_property
     def _pieces(self) -> tuple[Surface, ...]:
@@ -212,7 +212,7 @@ class Scene:
         return tuple(image for images in self._images for image in images)
 
     @cached_property
-    def _owner(self) -> list[int]:
+    def owners_of_pieces(self) -> list[int]:
         """The surface that each of these is an image of."""
         return [i for i, images in enumerate(self._images) for _image in images]
 
@@ -229,7 +229,7 @@ class Scene:
 
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""
-        return [self._owner[i] for i in self.order.fields]
+        return [self.owners_of_pieces[i] for i in self.order.fields]
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
