@@ -125,7 +125,7 @@ class Scene:
         for i in self._fields():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
-                f"Impact with contact_step = 0 and particles, or list its bodies one by one, at most {MOST_WALLS} walls"
+                f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
         if not self.order.groups:
             return self
@@ -153,11 +153,19 @@ class Scene:
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity, self.period)
 
-    def chain(self, moment: float = 0.0) -> Chain | Field | Carried | None:
-        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s]."""
+    def chain(self, moment: float = 0.0, own: Sequence[Surface] = ()) -> Chain | Field | Carried | None:
+        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s].
+
+        After them those of a body's `own`, where nothing moves.
+        """
         if self.moves():
             return carried(self._pieces, moment)
-        return chain_in(self.order, self._pieces, self._groups)
+        return chain_in(self.order, self._pieces, self._groups, own)
+
+    def walls_of_rows(self) -> NDArray[np.int64]:
+        """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""
+        fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
+        return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
     def cell(self) -> Period | None:
         """The cell that repeats as kernels take it."""
@@ -202,13 +210,13 @@ class Scene:
             return None
         chain: Chain | Span | None = None
         for i, walls in reversed(self.order.spans(self._pieces)):
-            value = values[self._owner[i]]
+            value = values[self.owners_of_pieces[i]]
             chain = Chain(value, chain) if walls == 1 else Span(value, float(walls), chain)
         return chain
 
     def owners(self) -> list[int]:
         """The surface that each row of the chain belongs to, one for a field."""
-        return [self._owner[i] for i in self.order.owners(self._pieces)]
+        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
 
     def members(self) -> NDArray[np.int64]:
         """Of each wall of the chain its surface, and its number in the field that this is or -1: (2, walls)."""
@@ -220,7 +228,7 @@ class Scene:
         return tuple(image for images in self._images for image in images)
 
     @cached_property
-    def _owner(self) -> list[int]:
+    def owners_of_pieces(self) -> list[int]:
         """The surface that each of these is an image of."""
         return [i for i, images in enumerate(self._images) for _image in images]
 
@@ -237,7 +245,7 @@ class Scene:
 
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""
-        return [self._owner[i] for i in self.order.fields]
+        return [self.owners_of_pieces[i] for i in self.order.fields]
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""

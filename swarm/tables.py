@@ -4,12 +4,14 @@ Every error names the key by its full path, such as surface[1].radius.
 """
 
 import dataclasses
+import hashlib
 import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from .checks import closest, listed, one_of
 from .errors import SceneError
@@ -19,6 +21,8 @@ from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Sampled, Surface
 
 T = TypeVar("T")
+# An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
+_LONG, _ARRAY = 1000, "sha256:"
 
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None) -> Scene:
@@ -45,35 +49,55 @@ def method_of(table: Any) -> Method:
     return of_kind(table, "method", ALL_METHODS)
 
 
-def table_of(described: Surface | Method) -> dict[str, Any]:
-    """The table of a surface or a method: its kind, and every argument that is not None."""
+def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The table of a surface or a method: its kind, and every argument that is not None.
+
+    Of a long array it holds the name, a digest, under which `arrays` get it; None: the numbers themselves.
+    """
     if isinstance(described, OwnSurface):
-        return _with_openings(described.table(), described)
+        return _with_openings(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
     given = described.arguments() if isinstance(described, Sampled) else dataclasses.asdict(described)
     table = {keys[name]: value for name, value in given.items() if value is not None}
-    table = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in table.items()}
+    table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
-    return _with_openings({"kind": kinds[type(described)], **table}, described)
+    return _with_openings({"kind": kinds[type(described)], **table}, described, arrays)
 
 
-def _with_openings(table: dict[str, Any], described: Surface | Method) -> dict[str, Any]:
+def _with_openings(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
     """The table of a surface, with those of its openings if it has any."""
     if isinstance(described, Surface):
         del table["openings"]
         if described.openings:
-            table["openings"] = [table_of(opening) for opening in described.openings]
+            table["openings"] = [table_of(opening, arrays) for opening in described.openings]
     return table
 
 
-def scene_table(scene: Scene) -> dict[str, Any]:
-    """The tables of a scene."""
+def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:
+    if arrays is None or values.size <= _LONG:
+        return values.tolist()
+    name = _ARRAY + hashlib.sha256(repr((values.shape, values.dtype.str)).encode() + values.tobytes()).hexdigest()
+    arrays[name] = values
+    return name
+
+
+def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """A surface's table with the long arrays that it names."""
+    named = {key for key, value in table.items() if isinstance(value, str) and value.startswith(_ARRAY)}
+    held = {key: np.asarray(arrays[value]) if key in named else value for key, value in table.items()}
+    if "openings" in held:
+        held["openings"] = [with_arrays(opening, arrays) for opening in held["openings"]]
+    return held
+
+
+def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The tables of a scene; `arrays` as of `table_of`."""
     gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
     # TOML has no None.
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
-    return {**gravity, **period, "surface": [table_of(surface) for surface in scene.surfaces]}
+    return {**gravity, **period, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
 def convert(table: Any, cls: type[T], where: str) -> T:

@@ -104,8 +104,9 @@ def touching_of(body: Body, ties: Ties, scene: Scene) -> Touching:
     b = _combinations(body)
     single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)
-    surfaces = [scene.surfaces[i] for i in scene.owners()] + own_surfaces(body)
+    counts = scene.walls_of_rows()
+    surfaces = [scene.surfaces[i] for i in np.repeat(scene.owners(), counts)] + own_surfaces(body)
     return Touching(
-        b, plain, b @ ties.inverse_mass, len(body.contacts), len(scene.owners()), len(body.guides),
+        b, plain, b @ ties.inverse_mass, len(body.contacts), int(counts.sum()), len(body.guides),
         np.array([surface.restitution for surface in surfaces]), np.array([surface.friction for surface in surfaces]),
     )  # fmt: skip

@@ -16,6 +16,7 @@ from ..kernel.vector import ZERO, Vec, absolute, dot, largest, moves, norm, put,
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
+from ..surfaces.near import count_near, list_near, until_others
 from . import laws as wall_laws
 from . import reflection
 from .projection import ALLOWED, along, project
@@ -117,9 +118,9 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
     laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
     carried, chain = chain, at(chain, flight.left)
-    count = walls.count_near(chain, r)
+    count = count_near(chain, r)
     number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
-    walls.list_near(chain, 0, 0.0, r, number)
+    list_near(chain, 0, 0.0, r, number)
     _depths(chain, number, r, depth)
     for i in range(count):
         touched[i] = depth[i] >= -method.touch or number[i] == wall
@@ -182,7 +183,7 @@ def _unhindered(chain, gravity, touch, r, v, h, near):
     for cut in range(_CUTS):
         u = velocity_along(chain, touch, r, accelerated(gravity, v, 0.5 * h), h)
         # Until then none but the near walls are met.
-        alone = walls.until_others(chain, r, from_relative(touch.frame, u))
+        alone = until_others(chain, r, from_relative(touch.frame, u))
         if alone < h:
             h = alone
             continue
@@ -220,9 +221,9 @@ def _settled(chain, wall, touch, r):
 @outlined
 def inside(chain, r):
     """A point that is no more than round-off outside of the walls, moved until it is not."""
-    count = walls.count_near(chain, r)
+    count = count_near(chain, r)
     number, outside = scratch(count, np.float64), scratch(count, np.float64)
-    walls.list_near(chain, 0, 0.0, r, number)
+    list_near(chain, 0, 0.0, r, number)
     for _sweep in range(_SWEEPS):
         _depths(chain, number, r, outside)
         i = np.argmax(outside)
@@ -316,10 +317,10 @@ def are_carried(chain, gravity, r, v, near, held):
 
     `held` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
     """
-    count = walls.count_near(chain, r)
+    count = count_near(chain, r)
     number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
     normal, taken = scratch((3, count), np.float64), scratch(count, np.float64)
-    walls.list_near(chain, 0, 0.0, r, number)
+    list_near(chain, 0, 0.0, r, number)
     _depths(chain, number, r, depth)
     several = 0
     for i in range(count):

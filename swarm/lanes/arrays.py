@@ -38,7 +38,6 @@ class Lanes(NamedTuple):
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
     course: Array  # (walls COURSE, stride) the safe steps of a fall
-    cell: Array  # (2, stride) int64, the cell of a field in which a lane is
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
     marked: Array  # bool, what one loop says to the next: of a fall that it needs more steps, then that it has arrived
@@ -101,7 +100,6 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
         sweeping=np.zeros(STRIDE, np.bool_),
         record=table(RECORDS),
         course=table(walls * flights.COURSE),
-        cell=np.zeros((2, STRIDE), np.int64),
         turned=table(4),
         particle=np.zeros(STRIDE, np.int64),
         marked=eights.view(np.bool_),

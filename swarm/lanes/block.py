@@ -42,7 +42,9 @@ from .arrays import (
     heat as book_heat,
 )
 from .escape import let_out_lanes
-from .fly import go, marked_lanes, put_end
+from .fly import go, put_end
+from .marks import marked_lanes
+from .picked import of_lane, pick, picks
 from .solve import solution, solve
 from .wrap import return_lanes
 
@@ -70,7 +72,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
-    lanes, state = with_distances(lanes), share.state
+    lanes, state, picked = with_distances(lanes), share.state, picks(chain)
     following, stop, drawn, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
         following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
@@ -84,7 +86,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if status != Status.DONE.value:
             return status, live, drawn
         passes += 1
-        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, live)
+        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
         if some_hard or (methods.holds(method) and passes % _LOOK == 0):
             status, lane = _rare(hard, method, chain, gravity, state, lanes, live)
             if status != Status.DONE.value:
@@ -162,7 +164,7 @@ def _(contacts, lanes, i):
 
 
 @inlined
-def _pass(method, chain, gravity, share, lanes, live):
+def _pass(method, chain, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     return_lanes(lanes.period, share.state, lanes, live)
@@ -171,10 +173,11 @@ def _pass(method, chain, gravity, share, lanes, live):
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     impact_log.keep_before(share.log, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
+    pick(chain, 0.0, lanes, picked, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
-        here = methods.walls_of(method, chain, lane.left)
+        here = methods.walls_of(method, of_lane(chain, picked, i), lane.left)
         contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
         impact_log.note(share.log, lanes, i, contact.impulse)

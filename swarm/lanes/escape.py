@@ -8,7 +8,7 @@ from ..surfaces.openings import Openings, is_open
 from . import compose
 from . import log as impact_log
 from .arrays import LEFT, R, V
-from .fly import marked_lanes
+from .marks import marked_lanes
 
 
 @inlined

@@ -6,11 +6,12 @@ from ..kernel.vector import column, put
 from ..methods import contract as methods
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.fold import Field
+from ..surfaces.fold import Chain, Field, count_in_fields, others
 from ..surfaces.moving import Marched, Strided, at
 from ..surfaces.period import cut
-from .arrays import EIGHT, LEFT, R, V, lane_of
-from .seek import hit_of_lane, seek
+from .arrays import LEFT, R, V, lane_of
+from .marks import marked_lanes
+from .seek import hit_of_lane, keep_hit, seek
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
@@ -30,9 +31,57 @@ def _(met, gravity, method, chain, lanes, live):
 
 @go.register(Field)
 def _(met, gravity, method, chain, lanes, live):
+    _meet_others(others(chain), gravity, count_in_fields(chain), lanes, live)
     seek(chain, 0.0, gravity, lanes, live)
     for i in range(index(live)):
         _flight(method, chain, gravity, lanes, i, hit_of_lane(lanes, i))
+
+
+@by_type
+def _meet_others(chain, gravity, before, lanes, live):
+    """The first hits with the walls that are in no field; these have so many walls before them."""
+    for i in range(index(live)):
+        keep_hit(lanes, i, flights.NEVER, 0.0)
+
+
+@_meet_others.register(Chain)
+def _(chain, gravity, before, lanes, live):
+    _meet_any(gravity, chain, before, lanes, live)
+
+
+@by_type
+def _meet_any(gravity, chain, before, lanes, live):
+    """The same where there are some."""
+
+
+@_meet_any.register(Nothing)
+def _(gravity, chain, before, lanes, live):
+    _meet_straight(flights.in_steps(chain), chain, before, lanes, live)
+
+
+@_meet_any.register(Gravity)
+def _(gravity, chain, before, lanes, live):
+    _meet_by_steps(gravity, chain, before, lanes, live)
+
+
+@by_type
+def _meet_straight(steps, chain, before, lanes, live):
+    """The same without gravity, where a wall is met by steps or where none is."""
+    _meet_by_steps(None, chain, before, lanes, live)
+
+
+@_meet_straight.register(Nothing)
+def _(steps, chain, before, lanes, live):
+    for i in range(index(live)):
+        hit = flights.first_hit(chain, None, column(lanes.rows, R, i), column(lanes.rows, V, i))
+        keep_hit(lanes, i, hit, before)
+
+
+@inlined
+def _meet_by_steps(gravity, chain, before, lanes, live):
+    _go_by_steps(chain, gravity, lanes, live)
+    for i in range(index(live)):
+        keep_hit(lanes, i, flights.end(chain, lanes.course, 0, i), before)
 
 
 @go.register(Marched)
@@ -149,23 +198,3 @@ def put_end(lanes, i, end):
     put(lanes.rows, R, i, end.r)
     put(lanes.rows, V, i, end.v)
     lanes.rows[LEFT, i] = end.left
-
-
-@inlined
-def marked_lanes(lanes, live):
-    """How many lanes are marked; which, is in `order`.
-
-    Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
-    one were an eighth of the time of a frame with 75 impacts.
-    """
-    marked, order, some, count = lanes.marked, lanes.order, lanes.some, index(0)
-    eights = 0
-    for k in range((live + EIGHT - 1) // EIGHT):
-        some[eights] = k
-        eights += lanes.eights[k] != 0
-    for k in range(eights):
-        first = EIGHT * some[k]
-        for lane in range(first, min(first + EIGHT, live)):
-            order[count] = lane
-            count += index(marked[lane])
-    return int(count)

@@ -9,7 +9,7 @@ from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.period import Period, has_left, into
 from . import arrays, compose
-from .fly import marked_lanes
+from .marks import marked_lanes
 
 # A wall that is farther away than this part of the cell is none that holds a particle.
 _ON_THE_WALL = 1e-12

@@ -14,6 +14,8 @@ COUNTS = "impacts"
 IMAGES = "image"
 # When each particle has escaped [s], where walls have openings.
 ESCAPES = "escape_time"
+# Long arrays of the scene, by their digests.
+ARRAYS = "arrays"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.

@@ -1,7 +1,7 @@
 """The walls of a scene as shapes to draw, for any phi: triangles, their area, and the curves of a wire frame."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import contourpy
@@ -13,7 +13,9 @@ from ..motion import Pose
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import Spheres
+from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
+from ..surfaces.surface import Surface
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
@@ -23,6 +25,8 @@ _PLANES, _FINE = 5, 160
 _END = 0.01
 # Of each of many balls, the points along each side of its grid and of its circles; how many balls get these.
 _COARSE, _MOST_WIRES = 10, 2_000
+# Of each of many bodies of another kind, the points along each side of its grid.
+_BODY = 16
 # Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
 # An open volume is drawn to this many times the distance of the surfaces and particles.
@@ -67,11 +71,16 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
     still = Still(scene, time)
     box = _box(still, positions)
     coarse = _triangles(still, box)
+    # On a grid around all of them the many bodies of a scene would be too small, and a grid around each too slow.
+    grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     shapes = []
     for i, surface in enumerate(scene.surfaces):
         name = f"{i}_{type(surface).__name__.lower()}"
         if isinstance(surface, Spheres):
             shapes.append(Shape(name, True, *_balls(surface)))
+            continue
+        if isinstance(surface, Many) or i in grouped:
+            shapes.append(Shape(name, True, *_bodies(surface, box)))
             continue
         own = _of_surface(still, i, *coarse)
         around = _around(own[0], box) if len(own[0]) else _near(surface, scene.poses(time)[i], box)
@@ -100,6 +109,33 @@ def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Fl
     circles = [np.roll(circle, k, axis=1) for k in range(3)]
     wires = [c + r * one for c, r in zip(spheres.centers[some], spheres.radii[some], strict=True) for one in circles]
     return vertices, (triangles + first).reshape(-1, 3).astype(np.int64), np.tile(normals, (len(spheres), 1)), wires
+
+
+def _bodies(surface: Surface, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:
+    """The same of bodies of another kind, each on a grid of its own."""
+    solids = surface.solids() if isinstance(surface, Many) else [surface]
+    vertices, triangles, normals = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3))]
+    wires: list[Floats] = []
+    first = 0
+    for solid in solids[:: max(1, len(solids) // _MOST_WIRES)]:
+        low, high = (np.array(corner) for corner in replace(solid, side="inside").bounds())  # type: ignore[call-arg]
+        low, high = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
+        axes = [np.linspace(a, b, _BODY) for a, b in zip(low, high, strict=True)]
+        gap = -solid.phi(np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)).reshape(3 * (_BODY,))
+        if not (low < high).all() or not gap.min() < 0.0 < gap.max():
+            continue
+        spacing = tuple((high - low) / (_BODY - 1.0))
+        points, faces, across, _values = marching_cubes(gap, 0.0, spacing=spacing)
+        vertices.append(points + low)
+        triangles.append(faces.astype(np.int64) + first)
+        normals.append(across.astype(np.float64))
+        first += len(points)
+        for axis in range(3):
+            u, v = (axes[k] for k in range(3) if k != axis)
+            middle = 0.5 * (gap.take(_BODY // 2 - 1, axis) + gap.take(_BODY // 2, axis))
+            lines = contourpy.contour_generator(u, v, middle.T).lines(0.0)
+            wires += [np.insert(np.asarray(line), axis, 0.5 * (low + high)[axis], axis=1) for line in lines]
+    return np.concatenate(vertices), np.concatenate(triangles), np.concatenate(normals), wires
 
 
 def _box(scene: Still, positions: Floats) -> Corners:

@@ -78,9 +78,9 @@ class Stored:
     @property
     def scene(self) -> Scene:
         """The scene that was run."""
-        with self._reading("its scene"):
-            table = tomllib.loads(self._text("scene"))
-            surfaces = table["surface"]
+        with self._reading("its scene") as file:
+            table, arrays = tomllib.loads(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
+            surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             every = [one for surface in surfaces for one in (surface, *surface.get("openings", ()))]
             own = any(surface["kind"] == "own" for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.

@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import COUNTS, ESCAPES, IMAGES, PARTS
+from .layout import ARRAYS, COUNTS, ESCAPES, IMAGES, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -92,9 +92,10 @@ class TrajectoryWriter:
         creator = h5md.create_group("creator")
         creator.attrs["name"], creator.attrs["version"] = "swarm", VERSION
         parameters = file.create_group("parameters")
-        for name, text in descriptions(self._scene, self._method, self._storage).items():
-            parameters[name] = text
-        for name, value in {"particles": self._count, **self._identity}.items():
+        arrays: dict[str, Any] = {}
+        texts = descriptions(self._scene, self._method, self._storage, arrays)
+        long = {f"{ARRAYS}/{name}": values for name, values in arrays.items()}
+        for name, value in {**texts, **long, "particles": self._count, **self._identity}.items():
             parameters[name] = value
         if self._text is not None:
             parameters["scene_file"] = self._text
@@ -218,10 +219,12 @@ def _edges_of(scene: Scene) -> list[float]:
     ]
 
 
-def descriptions(scene: Scene, method: Method, storage: Storage) -> dict[str, str]:
-    """The texts that identify a run."""
+def descriptions(
+    scene: Scene, method: Method, storage: Storage, arrays: dict[str, Any] | None = None
+) -> dict[str, str]:
+    """The texts that identify a run; `arrays` get what they name and do not hold."""
     return {
-        "scene": tomli_w.dumps(tables.scene_table(scene)),
+        "scene": tomli_w.dumps(tables.scene_table(scene, {} if arrays is None else arrays)),
         "method": tomli_w.dumps(tables.table_of(method)),
         "storage": tomli_w.dumps(vars(storage)),
     }

@@ -30,7 +30,9 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     if isinstance(particles, Bodies):
         _require_no_log("of particles, not of bodies, whose points meet walls together", options)
-        return _task_of_bodies(scene.apart("bodies"), particles.copy(), method, options)
+        # Of springs each point may be in every wall at once.
+        known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
+        return _task_of_bodies(known, particles.copy(), method, options)
     if not isinstance(method, Impact) or method.contact_step > 0.0:
         name = "a contact_step" if isinstance(method, Impact) else type(method).__name__
         scene = scene.apart(name)

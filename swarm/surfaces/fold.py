@@ -5,12 +5,11 @@ before all other walls: whether a scene has one is the type of its chain.
 """
 
 import inspect
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, by_type_outlined, select
+from ..kernel.jit import by_type, select
 from ..kernel.vector import ZERO
 from . import contract
 from .surface import Surface
@@ -79,6 +78,24 @@ def member(members, wall):
 def outside_of_any(members, wall, r):
     """Whether a point is in any body of a field but the one with this number."""
     raise NotImplementedError
+
+
+@by_type
+def others(chain):
+    """The walls of a chain that are in no field: they come after all fields."""
+    return chain
+
+
+others.register(Field, lambda chain: others(chain.rest))
+
+
+@by_type
+def count_in_fields(chain):
+    """How many walls its fields have."""
+    return 0.0
+
+
+count_in_fields.register(Field, lambda chain: count(chain.first) + count_in_fields(chain.rest))
 
 
 @by_type
@@ -264,66 +281,6 @@ def _(chain, wall, r):
 
 
 outside.register(Nothing, lambda chain, wall, r: False)
-
-
-# --- Near a point: all walls, and of a field those in the cell of the point --------------------------------
-
-
-@by_type
-def count_near(chain, r):
-    """How many walls are near a point."""
-    return length(chain)
-
-
-@count_near.register(Field)
-def _(chain, r):
-    return count_in_cell(chain.first, r) + count_near(chain.rest, r)
-
-
-@by_type_outlined
-def list_near(chain, k, before, r, into):
-    """The numbers of the walls near a point into into[k:], of a chain that has so many walls before it."""
-
-
-@list_near.register(Field)
-def _(chain, k, before, r, into):
-    listed = list_in_cell(chain.first, k, before, r, into)
-    list_near(chain.rest, k + listed, before + count(chain.first), r, into)
-
-
-@list_near.register(Chain)
-def _(chain, k, before, r, into):
-    for i in range(length(chain)):
-        into[k + i] = before + i
-
-
-@by_type
-def until_others(chain, r, v):
-    """When a straight flight may meet a wall that is not near its start."""
-    return math.inf
-
-
-@until_others.register(Field)
-def _(chain, r, v):
-    return min(until_next_cell(chain.first, r, v), until_others(chain.rest, r, v))
-
-
-@by_type
-def count_in_cell(members, r):
-    """How many walls of a field are near a point."""
-    raise NotImplementedError
-
-
-@by_type
-def list_in_cell(members, k, before, r, into):
-    """Their numbers into into[k:], and how many they are."""
-    raise NotImplementedError
-
-
-@by_type
-def until_next_cell(members, r, v):
-    """When a straight flight may meet another one."""
-    raise NotImplementedError
 
 
 @by_type

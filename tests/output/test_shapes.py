@@ -65,3 +65,19 @@ def test_an_open_volume_is_drawn_as_far_as_its_particles():
     assert low[0] <= -3.0
     assert high[0] >= 3.0
     assert np.abs(shape.vertices[:, 2]).max() < 1e-6
+
+
+def test_each_of_many_bodies_is_drawn():
+    """As a field, and listed one by one."""
+    places = np.stack(np.meshgrid(*3 * [[-0.3, 0.0, 0.3]], indexing="ij"), -1).reshape(-1, 3)
+    box = swarm.Box((0.5, 0.5, 0.5))
+    cylinders = swarm.Cylinders(places, 0.1, lengths=0.2)
+    _walls, shape = shapes_of(swarm.Scene([box, cylinders]), NOWHERE)
+    assert shape.area() == pytest.approx(27 * 2.0 * np.pi * 0.1 * (0.1 + 0.2), rel=0.08)
+    assert len(shape.wires) == 27 * 3
+    listed = swarm.Scene([box, *(swarm.Sphere(0.1, tuple(place), "outside") for place in places.tolist())])
+    _walls, *shapes = shapes_of(listed, NOWHERE)
+    assert [shape.area() for shape in shapes] == pytest.approx(27 * [4.0 * np.pi * 0.01], rel=0.05)
+    # Normals point into the volume, as those of every wall.
+    ball = shapes[0]
+    assert (((ball.vertices - places[0]) * ball.normals).sum(axis=1) > 0.0).all()

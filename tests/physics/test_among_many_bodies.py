@@ -49,11 +49,11 @@ def test_a_field_is_its_balls(gravity, laws, until):
 
 
 def test_listed_balls_keep_a_row_each():
-    """Five are a field for kernels, and five surfaces for the user."""
-    field, apart = both(places(5), 0.12)
+    """Seven are a field for kernels, and seven surfaces for the user."""
+    field, apart = both(places(7), 0.12)
     start = swarm.fill(field, 60, speed=1.0, seed=2)
     one, other = run(field, start, 2.0).observables, run(apart, start, 2.0).observables
-    assert other["impulse"].shape == (2, 6)
+    assert other["impulse"].shape == (2, 8)
     assert (other["impulse"][-1, 1:] > 0.0).sum() > 2
     assert other["impulse"][-1, 1:].sum() == pytest.approx(one["impulse"][-1, 1], rel=1e-9)
 
@@ -118,3 +118,27 @@ def test_a_lattice_in_a_cell_that_repeats_is_a_lattice():
     assert unwrapped[0] == pytest.approx(unwrapped[1], abs=1e-6)
     assert ends[0].observables["impacts"][-1] == ends[1].observables["impacts"][-1] > 500
     assert (ends[0].particles.image != ends[1].particles.image).any()
+
+
+@pytest.mark.parametrize("laws", [{}, {"restitution": 0.8, "friction": 0.2}], ids=["smooth", "rough"])
+def test_bodies_meet_a_field_as_its_balls(laws):
+    field, apart = both(places(4), 0.15, DOWN, **laws)
+    bodies = swarm.place(field, swarm.dumbbell(0.1, 1.0), 4, speed=0.5, spin=1.0, seed=1)
+    ends = [
+        swarm.simulate(scene, bodies, swarm.Impact(dt=1e-2), until=0.6, compile="never") for scene in (field, apart)
+    ]
+    assert ends[0].bodies.position.tobytes() == ends[1].bodies.position.tobytes()
+    seen, wanted = (end.observables["impulse"][-1] for end in ends)
+    assert [seen[1], seen[0]] == pytest.approx([wanted[1:].sum(), wanted[0]], rel=1e-12)
+    assert seen[1] > 0.0
+
+
+def test_bodies_among_many_balls_stay_outside_of_them():
+    random = np.random.default_rng(2)
+    packing = swarm.Spheres(random.uniform(-0.4, 0.4, (60, 3)), random.uniform(0.03, 0.08, 60))
+    scene = swarm.Scene([swarm.Box(BOX), packing], (0.0, 0.0, -1.0))
+    bodies = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 4, speed=0.5, spin=1.0, seed=1)
+    end = swarm.simulate(scene, bodies, swarm.Impact(dt=1e-2), until=1.0, every=0.25, compile="never").observables
+    assert end["impulse"][-1].min() > 0.0
+    assert end["max_penetration"].max() <= 1e-14
+    assert end["energy_error"].max() <= 1e-13

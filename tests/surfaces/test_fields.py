@@ -88,9 +88,9 @@ def first_of_all(walls, gravity, r, v):
 
 
 @pytest.mark.parametrize("gravity", [None, FALL], ids=["straight", "falling"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_hit_is_missed(kind, gravity):
-    field = packing(kind)
+@pytest.mark.parametrize(("kind", "n"), [*((kind, 120) for kind in KINDS), ("spheres", 20)])
+def test_no_hit_is_missed(kind, n, gravity):
+    field = packing(kind, n)
     scene, walls = swarm.Scene([field]), [solid.walls()[0] for solid in solids_of(field)]
     random, off = np.random.default_rng(2), []
     points = random.uniform(-0.3, 1.3, (3, 400))
@@ -104,7 +104,7 @@ def test_no_hit_is_missed(kind, gravity):
             if wanted < math.inf:
                 assert number == other
                 off.append(abs(time - wanted))
-    assert len(off) > 20
+    assert len(off) > n // 6
     # Where a flight grazes, the time is as uncertain as the root of the round-off of the place.
     assert np.median(off) <= 2.0 * EPSILON
     assert max(off) <= 1e-9
@@ -149,16 +149,16 @@ def test_memory_is_linear_in_the_bodies():
 
 def test_more_than_a_few_of_one_kind_are_one_field():
     def balls(n, **laws):
-        return [swarm.Sphere(0.05, (0.2 * k - 0.4, 0.0, 0.0), "outside", **laws) for k in range(n)]
+        return [swarm.Sphere(0.05, (0.15 * k - 0.45, 0.0, 0.0), "outside", **laws) for k in range(n)]
 
     box = swarm.Box((0.5, 0.5, 0.5))
     few, some, two = (
-        swarm.Scene([*balls(n), box, *more]) for n, more in ((4, ()), (5, ()), (5, balls(5, friction=0.3)))
+        swarm.Scene([*balls(n), box, *more]) for n, more in ((6, ()), (7, ()), (7, balls(7, friction=0.3)))
     )
     assert [len(scene.order.groups) for scene in (few, some, two)] == [0, 1, 2]
     # One row for each surface, in the order of the chain.
-    assert some.owners() == [0, 1, 2, 3, 4, 5, 5, 5]
-    assert two.owners() == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 5, 5, 5]
+    assert some.owners() == [*range(7), 7, 7, 7]
+    assert two.owners() == [*range(7), *range(8, 15), 7, 7, 7]
 
 
 @pytest.mark.parametrize(
@@ -198,8 +198,8 @@ def test_what_knows_no_fields_says_so():
     for method in (swarm.Penalty(1e-3, 1e5), swarm.Verlet(1e-3, 1e5), swarm.Impact(contact_step=1e-3)):
         with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with .*use Impact"):
             swarm.simulate(scene, start, method, until=0.1)
-    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with bodies"):
-        swarm.simulate(scene, swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Impact(dt=1e-2), until=0.1)
+    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with bodies and soft walls"):
+        swarm.simulate(scene, swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Penalty(1e-3, 1e5), until=0.1)
     with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres where a surface moves"):
         swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=swarm.Translation((0.1, 0.0, 0.0))), field])
 
@@ -267,3 +267,23 @@ until = 1.0
     (tmp_path / "scene.toml").write_text(text)
     with pytest.raises(SceneError, match=r"surface\[1\].from: .*packing.csv: expected the columns x, y, z, .*missing"):
         scene_file.read(tmp_path / "scene.toml")
+
+
+def test_a_long_field_is_kept_as_arrays(tmp_path):
+    """Of a trajectory's text it is a digest; a text of 100 MB would be lost."""
+    field = packing("cylinders", 1001)
+    scene = swarm.Scene([swarm.Box((0.7, 0.7, 0.7), (0.5, 0.5, 0.5)), field])
+    start = swarm.fill(scene, 3, speed=1.0, seed=1)
+    path = tmp_path / "run.h5"
+    swarm.simulate(scene, start, swarm.Impact(), until=0.01, trajectory=path, compile="never")
+    with swarm.load(path) as trajectory:
+        again = trajectory.scene.surfaces[1]
+        assert len(trajectory.descriptions["scene"]) < 2000
+    for name in ("centers", "radii", "axes", "lengths"):
+        assert getattr(again, name).tobytes() == getattr(field, name).tobytes()
+    thinner = swarm.Cylinders(field.centers, 0.9 * field.radii, field.axes, field.lengths)
+    other = swarm.Scene([scene.surfaces[0], thinner])
+    with pytest.raises(SceneError, match="scene"):
+        swarm.simulate(
+            other, start, swarm.Impact(), until=0.02, trajectory=path, resume=True, checkpoint=9.0, compile="never"
+        )

@@ -125,7 +125,7 @@ def _blow(body, chain, lanes, state, contacts, bounces, which):
     _apply(body, (name, frame, wide), across, (answer, p), v, i)
     lost = 0.0
     for a in range(found):
-        state.impulse[name[a, 1], number] += p[wide * a]
+        state.impulse[walls.row(chain, float(name[a, 1])), number] += p[wide * a]
         if p[wide * a] > 0.0:
             state.impacts[number] += 1
     if bounces == 0.0 or not _is_elastic(touching, (name, found)):

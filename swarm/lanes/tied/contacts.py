@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from ...kernel.jit import inlined
+from ...kernel.jit import by_type, by_type_outlined, inlined
 from ...kernel.vector import Vec, cross, dot, norm
 from ...surfaces import fold as walls
+from ...surfaces.near import count_in_cell, one_in_cell
 
 # A contact this many times round-off away from its wall is at it.
 NEAR = 64.0
@@ -36,6 +37,56 @@ def span(touching, k):
     return first, last
 
 
+@by_type
+def count_at(chain, span, c):
+    """How many walls of a span a point may be at: of a field those of its cell."""
+    first, last = span
+    return last - first
+
+
+@count_at.register(walls.Field)
+def _(chain, span, c):
+    first, last = span
+    if first > 0:
+        return last - first
+    return _count_in_cells(chain, c) + last - int(walls.count_in_fields(chain))
+
+
+@by_type
+def _count_in_cells(chain, c):
+    return 0
+
+
+@_count_in_cells.register(walls.Field)
+def _(chain, c):
+    return int(count_in_cell(chain.first, c)) + _count_in_cells(chain.rest, c)
+
+
+@by_type
+def wall_at(chain, span, j, c):
+    """One of these walls."""
+    return span[0] + j
+
+
+@wall_at.register(walls.Field)
+def _(chain, span, j, c):
+    return span[0] + j if span[0] > 0 else _wall_of_cells(chain, j, 0, c)
+
+
+@by_type_outlined
+def _wall_of_cells(chain, j, before, c):
+    """The same of a chain that has so many walls before it."""
+    return before + j
+
+
+@_wall_of_cells.register(walls.Field)
+def _(chain, j, before, c):
+    here = int(count_in_cell(chain.first, c))
+    if j < here:
+        return before + int(one_in_cell(chain.first, j, c))
+    return _wall_of_cells(chain.rest, j - here, before + int(walls.count(chain.first)), c)
+
+
 @inlined
 def width(touching, name, found):
     """How many directions of each contact matter: the normal, or the tangents too, where there is friction."""
@@ -53,8 +104,9 @@ def near(touching, chain, rule, motion, i, contacts, approaching):
     found = 0
     for k in range(touching.plain.size):
         c, u = point_of(touching, r, k, i), point_of(touching, v, k, i)
-        start, stop = span(touching, k)
-        for w in range(start, stop):
+        met = span(touching, k)
+        for j in range(count_at(chain, met, c)):
+            w = wall_at(chain, met, j, c)
             if found < MOST_CONTACTS and walls.distance(chain, float(w), c) >= -NEAR * rule.room:
                 n = walls.unit_normal(chain, float(w), c)
                 # What is left of an approach by round-off is none.

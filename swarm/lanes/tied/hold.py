@@ -319,7 +319,7 @@ def _(kind, body, chain, lanes, paces, state, i):
     number, pushes = pace.body[i], False
     for a in range(pace.held[i]):
         pushes = pushes or held.press[i, 3 * a] > 0.0
-        state.impulse[held.name[i, a, 1], number] += held.impulse[i, a]
+        state.impulse[walls.row(chain, float(held.name[i, a, 1])), number] += held.impulse[i, a]
     state.dissipated[number] += held.lost[i]
     state.sliding[number] += pace.step[i]
     if not pushes:

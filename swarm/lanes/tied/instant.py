@@ -7,7 +7,7 @@ from ...kernel.jit import inlined, outlined
 from ...kernel.vector import dot
 from ...surfaces import fold as walls
 from . import contract
-from .contacts import NEAR, point_of, span
+from .contacts import NEAR, count_at, point_of, span, wall_at
 from .hold import ROOM
 
 # What becomes of a lane after a trial.
@@ -48,8 +48,9 @@ def look(touching, chain, rule, lanes, pace, i, larger):
     worst, first, point, wall = -math.inf, tau, -1, -1
     for k in range(touching.plain.size):
         c = point_of(touching, lanes.r1, k, i)
-        start, stop = span(touching, k)
-        for w in range(start, stop):
+        met = span(touching, k)
+        for j in range(count_at(chain, met, c)):
+            w = wall_at(chain, met, j, c)
             gap = walls.distance(chain, float(w), c)
             worst = max(worst, gap)
             if not gap <= room:

@@ -1,6 +1,5 @@
 """A uniform grid of cells around many bodies, and which of them reach into each."""
 
-from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -8,22 +7,18 @@ from numpy.typing import NDArray
 
 from ...kernel.gravity import Gravity, Nothing
 from ...kernel.jit import Array, by_type, inlined, select
-from ...kernel.vector import Vec, vec
+from ...kernel.vector import Vec
 from ..course import rise_time
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.
-_MARGIN = 1e-6
+MARGIN = 1e-6
 # Cells for each body: a flight through more of them looks at fewer bodies in each.
 _CELLS_EACH = 1.0
 # An endless direction is one cell of this width, and a body without end has bounds beyond half of it.
 _ENDLESS = 1e200
-# Pairs of bodies and cells that are looked at together.
-_BATCH = 4_000_000
-
 
 Floats = NDArray[np.float64]
-Reaches = Callable[[NDArray[np.int64], Floats, Floats], NDArray[np.bool_]]
 
 
 class Grid(NamedTuple):
@@ -64,7 +59,7 @@ def cell_of(grid, r):
 def _place(d, inverse, count):
     """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther."""
     place = d * inverse
-    low, high = (place < 0.0) & (place >= -0.5 * _MARGIN), (place >= count) & (place < count + 0.5 * _MARGIN)
+    low, high = (place < 0.0) & (place >= -0.5 * MARGIN), (place >= count) & (place < count + 0.5 * MARGIN)
     return select(low, 0.0, select(high, count - 1.0, np.floor(place)))
 
 
@@ -112,93 +107,68 @@ def until_next(gravity, grid, cell, r, v):
     x = _along(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
     y = _along(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)
     z = _along(gravity, 2, (grid.low.z, grid.width.z, grid.margin.z, n.z), p.z, r.z, v.z)
-    leaves = select(y.leaves < x.leaves, y.leaves, x.leaves)
-    enters = select(y.enters > x.enters, y.enters, x.enters)
-    leaves, enters = select(z.leaves < leaves, z.leaves, leaves), select(z.enters > enters, z.enters, enters)
-    return select(cell.inside, leaves, enters)
+    leaves = select(y < x, y, x)
+    in_x, in_y, in_z = _comes(x, p.x, n.x), _comes(y, p.y, n.y), _comes(z, p.z, n.z)
+    enters = select(in_y > in_x, in_y, in_x)
+    return select(cell.inside, select(z < leaves, z, leaves), select(in_z > enters, in_z, enters))
 
 
-class Passage(NamedTuple):
-    """When a flight leaves its layer of cells, and before when it does not come into the grid, in one direction."""
-
-    leaves: float
-    enters: float
+@inlined
+def _comes(time, place, count):
+    """When a flight comes into the layers of cells, 0 where it is in them."""
+    return select((place >= 0.0) & (place < count), 0.0, time)
 
 
 @by_type
 def _along(gravity, axis, cells, place, x, v):
-    """The `Passage` along one axis, with (low, width, margin, how many) of its layers."""
+    """When a flight leaves its layer of cells, (low, width, margin, how many) of which are given.
+
+    Of a flight beside them, before when it does not come in.
+    """
     raise NotImplementedError
 
 
 @_along.register(Nothing)
 def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
-    ahead = v > 0.0
+    # One division for both
+    ahead, among, below = v > 0.0, (place >= 0.0) & (place < count), place < 0.0
     edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
-    face = select(place < 0.0, low + margin, low + count * width - margin)
-    comes = (select(place < 0.0, 1.0, -1.0) * v) > 0.0
-    return Passage(
-        select(v != 0.0, (edge - x) / v, np.inf),
-        select((place >= 0.0) & (place < count), 0.0, select(comes, (face - x) / v, np.inf)),
-    )
+    face = select(below, low + margin, low + count * width - margin)
+    comes = (select(below, 1.0, -1.0) * v) > 0.0
+    ends = (among & (v != 0.0)) | ((not among) & comes)
+    return select(ends, (select(among, edge, face) - x) / v, np.inf)
 
 
 @_along.register(Gravity)
 def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
     b, a = 0.5 * v, 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
-    above = rise_time(x - (low + (place + 1.0) * width + margin), b, a)
-    below = rise_time(low + place * width - margin - x, -b, -a)
-    sign, face = select(place < 0.0, 1.0, -1.0), select(place < 0.0, low + margin, low + count * width - margin)
-    comes = rise_time(sign * (x - face), sign * b, sign * a)
-    return Passage(
-        select(above < below, above, below),
-        select((place >= 0.0) & (place < count), 0.0, comes),
+    among, below = (place >= 0.0) & (place < count), place < 0.0
+    sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
+    up = rise_time(
+        select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)),
+        select(among, b, sign * b),
+        select(among, a, sign * a),
     )
+    down = rise_time(low + place * width - margin - x, -b, -a)
+    return select(among & (down < up), down, up)
 
 
 # --- How it is made --------------------------------------------------------------------------------------
 
 
-def grid_of(low: Floats, high: Floats, reaches: Reaches, repeated: tuple[Floats, Floats] | None = None) -> Grid:
-    """The grid of bodies with these bounds (3, n).
-
-    Args:
-        low: lowest corner of the bounds of each body, infinite where it has no end [m].
-        high: highest corner.
-        repeated: the corners (3,) of the cell of the scene that repeats, infinite where it does not; None: none does.
-        reaches: which of so many bodies may have a point in common with the boxes that have these corners (3, pairs).
-    """
-    corner, shape, width = _cells(low, high, repeated)
-    margin = _MARGIN * width
-    last = shape.astype(np.int64) - 1
-    begins, ends = (
-        np.clip(np.floor((edge - corner[:, None]) / width[:, None]), 0, last[:, None]).astype(np.int64)
-        for edge in (low - 2.0 * margin[:, None], high + 2.0 * margin[:, None])
-    )
-    cells, bodies = [], []
-    for body, place in _pairs(begins, ends):
-        near = corner[:, None] + place * width[:, None] - 2.0 * margin[:, None]
-        far = corner[:, None] + (place + 1) * width[:, None] + 2.0 * margin[:, None]
-        there = reaches(body, near, far)
-        cells.append(((place[0] * shape[1] + place[1]) * shape[2] + place[2])[there].astype(np.int64))
-        bodies.append(body[there].astype(np.int32))
-    of_cell, of_body = np.concatenate(cells), np.concatenate(bodies)
-    order = np.argsort(of_cell, kind="stable")
-    first = np.zeros(int(shape.prod()) + 2, np.int32)
-    np.cumsum(np.bincount(of_cell, minlength=first.size - 1), out=first[1:])
-    low_corner, wide, inverse, room, cells_along = (
-        vec(row.tolist()) for row in (corner, width, 1.0 / width, margin, shape)
-    )
-    return Grid(low_corner, wide, inverse, room, cells_along, first, of_body[order])
+def one_cell(bodies: int) -> Grid:
+    """The grid of so many bodies that all are looked at."""
+    low, width, margin = (Vec(*3 * [size]) for size in (-0.5 * _ENDLESS, _ENDLESS, MARGIN * _ENDLESS))
+    entries, first = np.arange(bodies, dtype=np.int32), np.array([0, bodies, bodies], np.int32)
+    return Grid(low, width, Vec(*3 * [1.0 / _ENDLESS]), margin, Vec(1.0, 1.0, 1.0), first, entries)
 
 
-def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
+def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
     """The corner of the grid, how many cells it has along each axis, and how wide they are."""
     first, last, bodies = low.min(axis=1), high.max(axis=1), low.shape[1]
     if repeated is not None:
-        # Cells begin and end at the faces.
         first, last = np.maximum(first, repeated[0]), np.minimum(last, repeated[1])
         middle = 0.5 * (low + high)
         bodies = (
@@ -208,28 +178,19 @@ def _cells(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) ->
     extent = np.where(endless, 1.0, last - first)
     each = extent[~endless].prod() / (_CELLS_EACH * max(1, bodies))
     side = each ** (1.0 / max(1, (~endless).sum()))
+    if repeated is not None:
+        # Cells begin and end at the faces, if bodies are near: a thin layer in front of a face is one more to cross.
+        first = np.where(first - repeated[0] < side, repeated[0], first)
+        last = np.where(repeated[1] - last < side, repeated[1], last)
+        extent = np.where(endless, 1.0, last - first)
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
-    room = 4.0 * _MARGIN * extent
-    if repeated is not None:
-        room = np.where(np.isfinite(repeated[0]), 0.0, room)
-    width = np.where(endless, _ENDLESS, (extent + 2.0 * room) / shape)
-    return np.where(endless, -0.5 * _ENDLESS, first - room), shape, width
+    room = 4.0 * MARGIN * extent
+    before, behind = (room, room) if repeated is None else _room_up_to(repeated, first, last, room)
+    width = np.where(endless, _ENDLESS, (extent + before + behind) / shape)
+    return np.where(endless, -0.5 * _ENDLESS, first - before), shape, width
 
 
-def _pairs(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Bodies and the places (3, pairs) of the cells from the first to the last of each, in batches."""
-    counts = ends - begins + 1
-    number = counts.prod(axis=0)
-    stops = np.cumsum(number)
-    start = 0
-    while start < number.size:
-        done = stops[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(stops, done + _BATCH, side="right")))
-        some = np.arange(start, stop)
-        body = np.repeat(some, number[start:stop])
-        k = np.arange(body.size) - np.repeat(stops[start:stop] - number[start:stop] - done, number[start:stop])
-        along_z, along_y = counts[2, body], counts[1, body]
-        place = np.stack([k // (along_z * along_y), k // along_z % along_y, k % along_z]) + begins[:, body]
-        yield body, place
-        start = stop
+def _room_up_to(repeated: tuple[Floats, Floats], first: Floats, last: Floats, room: Floats) -> tuple[Floats, Floats]:
+    """The room before and behind the bodies, none at the faces of a cell that repeats."""
+    return np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...kernel.gravity import Nothing
 from ...kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
 from ...kernel.vector import Vec, column, put
-from .. import contract, flights, fold
+from .. import contract, flights, fold, near
 from ..fold import Chain
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
@@ -33,6 +33,10 @@ class Members(NamedTuple):
     like: Any  # the numbers of one of them, which say of what kind they are
     table: Array  # (members, width) the numbers of each
     grid: Grid
+
+
+class Few(Members):
+    """So few bodies that each lane looks at all of them, faster than from cell to cell; the grid is one cell."""
 
 
 @inlined
@@ -151,13 +155,13 @@ def _is_in_any(members, wall, r):
     return False
 
 
-@fold.count_in_cell.register(Members)
+@near.count_in_cell.register(Members)
 def _(members, r):
     cell = index(cell_of(members.grid, r).number)
     return int(members.grid.first[cell + 1] - members.grid.first[cell])
 
 
-@fold.list_in_cell.register(Members)
+@near.list_in_cell.register(Members)
 def _(members, k, before, r, into):
     cell = index(cell_of(members.grid, r).number)
     first, stop = members.grid.first[cell], members.grid.first[cell + 1]
@@ -166,7 +170,12 @@ def _(members, k, before, r, into):
     return int(stop - first)
 
 
-@fold.until_next_cell.register(Members)
+@near.one_in_cell.register(Members)
+def _(members, k, r):
+    return members.grid.entries[members.grid.first[index(cell_of(members.grid, r).number)] + k]
+
+
+@near.until_next_cell.register(Members)
 def _(members, r, v):
     return until_next(None, members.grid, cell_of(members.grid, r), r, v)
 

@@ -5,12 +5,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rows import bodies, lengths
 from ..shapes.sphere import SphereNumbers
-from .grid import grid_of
-from .many import Floats, Many
+from .many import Floats, Many, field_of
 from .members import Members, aligned, gathered
 
 
@@ -56,13 +54,7 @@ class Spheres(Many):
     def members(self) -> Members:
         """What kernels take."""
         table = aligned(np.column_stack([self.centers, self.radii]))
-        return Members(gathered(_LIKE, table, 0, 0), table, grid_of(*self.corners(), self._reach, self.repeated))
-
-    def _reach(self, bodies: NDArray[np.int64], low: Floats, high: Floats) -> NDArray[np.bool_]:
-        """Which of these balls have a point in common with the boxes that have these corners (3, pairs)."""
-        center = self.centers.T[:, bodies]
-        off = np.maximum(np.maximum(low - center, center - high), 0.0)
-        return np.asarray((off**2).sum(axis=0) <= self.radii[bodies] ** 2)
+        return field_of(gathered(_LIKE, table, 0, 0), table, self.corners, self.repeated)
 
 
 _LIKE = SphereNumbers(*[0.0] * 5)  # type: ignore[arg-type]
