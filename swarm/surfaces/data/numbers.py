@@ -49,6 +49,18 @@ def _(surface, r):
     return slope
 
 
+@inlined
+def _coordinates(surface, r):
+    """The magnitudes of those that round a point, in the scene and in the grid: near the origin these are larger."""
+    return absolute(r) + absolute(r - surface.spline.low)
+
+
+@contract.gap_scale.register(SampledNumbers)
+def _(surface, r):
+    _value, n = splines.value_and_slope(surface.spline, r)
+    return total(times(absolute(n), _coordinates(surface, r)))
+
+
 @contract.settle.register(SampledNumbers)
 def _(surface, r):
     value, n = splines.value_and_slope(surface.spline, r)
@@ -218,9 +230,11 @@ def march(surface, r, v, pull):
             continue
         value, n = splines.value_and_slope(surface.spline, p)
         level, half = surface.side * value, 0.5 * surface.side * dot(n, w)
-        speed, room = norm(w), 2.0 * _EPSILON * total(absolute(p))
-        if level > 0.0 and half > 0.0 and i > 0:
-            if level * speed <= 2.0 * _ROUND_OFF * half * room:
+        speed, room = norm(w), 2.0 * _EPSILON * total(_coordinates(surface, p))
+        # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
+        noise = _ROUND_OFF * room * norm(n)
+        if i > 0 and half >= 0.0 and level >= -noise:
+            if level <= noise:
                 return t, True
             return bisected(surface, r, v, pull, before, t), True
         step, out, bent = _safe_step(surface, cell, Near(level, half, n), p, w, pull)
