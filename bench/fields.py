@@ -14,11 +14,7 @@ from numpy.typing import NDArray
 
 import swarm
 
-<<<<<<< HEAD
-from . import impact_log
-=======
-from . import sampled
->>>>>>> 6193c8d (example of a vessel from an STL file, and the bench of sampled surfaces)
+from . import impact_log, sampled
 from .report import ROOT, Row, in_turn, show, write
 
 Floats = NDArray[np.float64]
@@ -206,11 +202,7 @@ def compiled(quick: bool) -> list[Row]:
 
 def main(quick: bool) -> None:
     """Measure all of it."""
-<<<<<<< HEAD
-    rows = [row for part in (speed, packing, impact_log.rows, compiled) for row in part(quick)]
-=======
-    rows = [row for part in (speed, packing, sampled.rows, compiled) for row in part(quick)]
->>>>>>> 6193c8d (example of a vessel from an STL file, and the bench of sampled surfaces)
+    rows = [row for part in (speed, packing, impact_log.rows, sampled.rows, compiled) for row in part(quick)]
     show(rows)
     if not quick:
         write(rows, "fields")
