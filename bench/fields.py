@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import swarm
 
-from . import impact_log
+from . import impact_log, sampled
 from .report import ROOT, Row, in_turn, show, write
 
 Floats = NDArray[np.float64]
@@ -204,7 +204,7 @@ def compiled(quick: bool) -> list[Row]:
 
 def main(quick: bool) -> None:
     """Measure all of it."""
-    rows = [row for part in (speed, packing, impact_log.rows, compiled) for row in part(quick)]
+    rows = [row for part in (speed, packing, impact_log.rows, sampled.rows, compiled) for row in part(quick)]
     show(rows)
     if not quick:
         write(rows, "fields")

@@ -133,3 +133,16 @@ def test_impacts_of_compiled_runs_are_those_of_plain_python():
     assert end.observables["energy_error"].max() < 1e-13
     assert end.observables["max_penetration"].max() < 4.0 * EPSILON
     assert scene.surfaces[0].phi(end.particles.position).max() < 4.0 * EPSILON
+
+
+@pytest.mark.parametrize("pull", [ZERO, Vec(0.0, 0.0, -4.0)], ids=["straight", "falling"])
+def test_a_hit_at_the_origin_is_found(pull):
+    # Where the coordinates of the scene are 0, but not those of the grid, which are what is rounded.
+    surface = ball()
+    moved = swarm.Sampled(surface.values, surface.spacing, np.add(surface.origin, (0.0, 0.0, 0.5)))
+    (wall,) = moved.walls()
+    for x in (0.0, 1e-3, 1e-9):
+        time, hits = call(contract.falling_hit, wall, np.array((x, x, 0.3)), np.array((0.0, 0.0, -1.0)), pull)
+        assert hits
+        place = np.array((x, x, 0.3 - time + 0.5 * pull.z * time * time))
+        assert abs(moved.phi(place)) < 1e-14

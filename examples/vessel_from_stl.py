@@ -1,0 +1,118 @@
+"""A gas in a vessel from a drawing: an STL file becomes a surface, and heights obey the barometric law.
+
+    python -m examples.vessel_from_stl
+
+A vase of three twisted lobes is made here, written as triangles, and read again as any other part would be. Its walls
+are warm, so the gas becomes isothermal: at a height z its density is as exp(-m g z/kT), whatever the shape. Needs the
+extras `mesh` and `plot`.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import swarm
+
+GRAVITY, TEMPERATURE, MASS = 9.81, 4.0, 1.0
+HEIGHT, LOBES, DEPTH, TWIST = 1.0, 3, 0.18, 4.0
+
+
+class Gas(NamedTuple):
+    """What the picture shows."""
+
+    surface: swarm.Sampled
+    result: swarm.Result
+    heights: np.ndarray  # of all frames but the first ones [m]
+    paths: np.ndarray  # (frames, 3, particles) [m]
+
+
+def radius(z: np.ndarray) -> np.ndarray:
+    """The mean radius at a height: a belly and a neck [m]."""
+    return 0.12 + 0.25 * np.exp(-(((z - 0.35) / 0.22) ** 2))
+
+
+def vase(rows: int = 160, columns: int = 240) -> tuple[np.ndarray, np.ndarray]:
+    """Its vertices (V, 3) [m] and triangles (T, 3), seen from outside; 76 960 triangles."""
+    z, angle = np.linspace(0.0, HEIGHT, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
+    wide = radius(z)[:, None] * (1.0 + DEPTH * np.cos(LOBES * angle - TWIST * z[:, None]))
+    around = np.stack([wide * np.cos(angle), wide * np.sin(angle), np.broadcast_to(z[:, None], wide.shape)], axis=-1)
+    vertices = np.concatenate([around.reshape(-1, 3), [(0.0, 0.0, 0.0), (0.0, 0.0, HEIGHT)]])
+    one, after = np.arange(columns), np.roll(np.arange(columns), -1)
+    first = columns * np.arange(rows)[:, None]
+    a, b, c, d = first + one, first + after, first + columns + one, first + columns + after
+    sides = np.concatenate([np.stack([a, b, d], axis=-1), np.stack([a, d, c], axis=-1)]).reshape(-1, 3)
+    bottom, top = len(vertices) - 2, len(vertices) - 1
+    floor = np.stack([np.full(columns, bottom), after, one], axis=-1)
+    lid = np.stack([np.full(columns, top), columns * rows + one, columns * rows + after], axis=-1)
+    return vertices, np.concatenate([sides, floor, lid])
+
+
+def write_stl(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    """A binary STL file: of each triangle its normal, which readers compute, and its corners."""
+    rows = np.zeros(len(triangles), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]))
+    rows["corners"] = vertices[triangles]
+    path.write_bytes(bytes(80) + np.uint32(len(triangles)).tobytes() + rows.tobytes())
+
+
+def run(count: int, until: float, spacing: float = 0.015, frames: int = 40) -> Gas:
+    """The gas for so many seconds; the first quarter of the frames is not counted, while it warms."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_stl(folder / "vase.stl", *vase())
+        surface = swarm.from_mesh(folder / "vase.stl", spacing, temperature=TEMPERATURE)
+        scene = swarm.Scene([surface], gravity=(0.0, 0.0, -GRAVITY))
+        start = swarm.fill(scene, count, temperature=TEMPERATURE, mass=MASS, seed=1)
+        result = swarm.simulate(
+            scene, start, swarm.Impact(), until=until, every=until / frames, trajectory=folder / "gas.h5"
+        )
+        with swarm.load(folder / "gas.h5") as trajectory:
+            paths = np.array([trajectory.frame(k).position for k in range(frames // 4, frames + 1)])
+    return Gas(surface, result, paths[:, 2].ravel(), paths)
+
+
+def law(z: np.ndarray) -> np.ndarray:
+    """The barometric density of heights, not normalized: the area of the section times exp(-m g z/kT)."""
+    return radius(z) ** 2 * np.exp(-MASS * GRAVITY * z / TEMPERATURE)
+
+
+def main() -> None:
+    """Run, draw and print."""
+    from matplotlib import pyplot
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    from .paper.plotting import BLUE, RED
+
+    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask.add_argument("--count", type=int, default=4000)
+    ask.add_argument("--until", type=float, default=20.0)
+    ask.add_argument("-o", "--output", type=Path, default=Path("vessel_from_stl.png"))
+    asked = ask.parse_args()
+    gas = run(asked.count, asked.until)
+    seen = gas.result.observables
+    print(f"{gas.surface}: within {1e3 * gas.surface.mesh_error:.2g} mm of the mesh")
+    print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}, warmth of the walls included")
+    print(f"deepest {seen['max_penetration'].max():.1e} m outside")
+    picture = pyplot.figure(figsize=(7.4, 3.8))
+    shape = picture.add_subplot(1, 2, 1, projection="3d")
+    vertices, triangles = vase(60, 72)
+    shape.add_collection3d(Poly3DCollection(vertices[triangles], facecolor=(0.5, 0.6, 0.7, 0.12), edgecolor="none"))
+    shape.scatter(*gas.paths[-1][:, :1500], s=1.0, color=BLUE, linewidths=0.0)
+    shape.set(xlim=(-0.4, 0.4), ylim=(-0.4, 0.4), zlim=(0.0, 1.0), title=f"{asked.count} particles in a vase from STL")
+    shape.set_box_aspect((0.8, 0.8, 1.0))
+    shape.set_axis_off()
+    axes = picture.add_subplot(1, 2, 2)
+    z = np.linspace(0.0, HEIGHT, 400)
+    axes.hist(gas.heights, bins=50, range=(0.0, HEIGHT), density=True, color=BLUE, alpha=0.4, label="particles")
+    axes.plot(z, law(z) / (law(z).mean() * HEIGHT), color=RED, label="barometric law")
+    axes.set(xlabel="height [m]", ylabel="density [1/m]", title="where they are")
+    axes.legend(frameon=False)
+    picture.tight_layout()
+    picture.savefig(asked.output, dpi=130)
+    print(f"written {asked.output}")
+
+
+if __name__ == "__main__":
+    main()
