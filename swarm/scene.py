@@ -202,7 +202,7 @@ class Scene:
 
     def openings(self) -> Openings | None:
         """The openings of every wall of the chain as kernels take them, None where there are none."""
-        return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self._owner])
+        return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self.owners_of_pieces])
 
     def _of_walls(self, values: list[Any], neutral: Any) -> Chain | Span | None:
         """The value of the owner of every wall as a chain, None where all are neutral."""
@@ -220,7 +220,7 @@ class Scene:
 
     def members(self) -> NDArray[np.int64]:
         """Of each wall of the chain its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self._owner[i], member) for i, member in self.order.members(self._pieces)]).T
+        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
 
     @cached_property
     def _pieces(self) -> tuple[Surface, ...]:

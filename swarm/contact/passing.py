@@ -7,6 +7,7 @@ import numpy as np
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch, select
 from ..kernel.vector import norm
 from ..surfaces import fold as walls
+from ..surfaces import near as near_walls
 from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.openings import Openings, is_open, outside
@@ -33,9 +34,9 @@ def open_wall_at(openings, chain, r, touch, near):
 
 @open_wall_at.register(Openings)
 def _(openings, chain, r, touch, near):
-    count = walls.count_near(chain, r)
+    count = near_walls.count_near(chain, r)
     number = scratch(count, np.float64)
-    walls.list_near(chain, 0, 0.0, r, number)
+    near_walls.list_near(chain, 0, 0.0, r, number)
     for i in range(count):
         if walls.distance(chain, number[i], r) >= -touch and is_open(openings, number[i], r, near):
             return number[i]
