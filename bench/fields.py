@@ -167,6 +167,8 @@ def packing(quick: bool) -> list[Row]:
     scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), field])
     start = swarm.fill(scene, 100 if quick else COUNT, speed=1.0, seed=4)
     until = 1.0 if quick else 100.0
+    # The first call compiles.
+    swarm.simulate(scene, start, swarm.Impact(), until=1e-3 * until, threads=2, compile="always")
     began = time.perf_counter()
     end = swarm.simulate(scene, start, swarm.Impact(), until=until, every=until / 4.0, threads=2, compile="always")
     seconds, seen = time.perf_counter() - began, end.observables
