@@ -132,6 +132,9 @@ METHODS = {
 LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 4.0, 12.0)}
 
 every_surface = pytest.mark.parametrize("name", SURFACES)
+# Steps of surfaces from data are slow in plain Python. And those of AugmentedLagrangian end on them to 2e-14 of phi,
+# whose terms are 10 here, not to the 1e-14 of contact/test_uzawa.py.
+every_level = pytest.mark.parametrize("name", [*SURFACES, *map(rarely, SAMPLED_WALLS)])
 every_wall = pytest.mark.parametrize("name", WALLS)
 # Those whose level along a flight is a polynomial. Flights to a spline, which is another one in each cell, are held
 # against a dense search: surfaces/data/test_sampled_flights.py.

@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from conftest import EPSILON
+from conftest import EPSILON, METHODS
 from samples import ball, bumpy, grid
 
 import swarm
@@ -138,6 +138,18 @@ def test_a_grain_slides_on_it_as_in_the_sphere():
     assert ends[0].observables["sliding"][-1] == 1
     assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-7
     assert ends[0].observables["max_penetration"].max() < 8.0 * EPSILON
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_meets_it(name):
+    scene = swarm.Scene([sampled()])
+    start = swarm.Particles([[0.05], [0.0], [0.2]], [[0.3], [0.1], [1.0]])
+    result = swarm.simulate(scene, start, METHODS[name], until=0.35, every=0.05, compile="never")
+    assert result.observables["impacts"][-1] >= 1
+    assert result.particles.velocity[2] < 0.0
+    # Three of them are those that the paper's are compared with.
+    conserves = name not in ("verlet", "midpoint", "trapezoidal")
+    assert result.observables["energy_error"].max() < (1e-13 if conserves else 1e-2)
 
 
 # --- Kept ------------------------------------------------------------------------------------------------
