@@ -18,7 +18,7 @@ from .errors import SceneError
 from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
-from .surfaces import ALL_SURFACES, OwnSurface, Sampled, Surface
+from .surfaces import ALL_SURFACES, OwnSurface, Surface
 
 T = TypeVar("T")
 # An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
@@ -57,9 +57,8 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     if isinstance(described, OwnSurface):
         return _with_openings(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
-    keys = {field.name: field.metadata.get("key", field.name) for field in dataclasses.fields(described)}
-    given = described.arguments() if isinstance(described, Sampled) else dataclasses.asdict(described)
-    table = {keys[name]: value for name, value in given.items() if value is not None}
+    given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
+    table = {key: value for key, value in given.items() if value is not None}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
@@ -100,13 +99,16 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     return {**gravity, **period, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
+def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:
+    """The fields of a dataclass that a file has: not the options of a session, and nothing that is made of others."""
+    return [field for field in dataclasses.fields(cls) if field.metadata.get("in_file", True)]
+
+
 def convert(table: Any, cls: type[T], where: str) -> T:
     """A dataclass from a table: no unknown key, no missing one, every value of its type."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
-    # Options of a session are unknown keys in a file.
-    fields = [one for one in dataclasses.fields(cls) if one.metadata.get("in_file", True)]  # type: ignore[arg-type]
-    names = {field.metadata.get("key", field.name): field for field in fields}
+    names = {field.metadata.get("key", field.name): field for field in _kept(cls)}
     for key in table:
         if key not in names:
             at_top = key in ("gravity", "period")

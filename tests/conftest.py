@@ -100,10 +100,24 @@ QUADRIC_WALLS = {
 }
 
 
+def _sampled(side="inside", rotation=None):
+    """An egg with a flat top, in a grid that reaches around all points of the tests."""
+    axis = np.linspace(-1.3, 1.3, 12)
+    x, y, z = axis[:, None, None] - 0.1, axis[:, None] + 0.05, axis
+    values = x**2 / 0.25 + y**2 / 0.36 + 0.5 * z**2 + z**4 + 0.3 * np.sin(x + 2.0 * y) - 1.0
+
+    def make(s=1.0):
+        return swarm.Sampled(values, s * (axis[1] - axis[0]), (axis[0] * s,) * 3, side, rotation=rotation)
+
+    return make
+
+
+# Surfaces from data, whose kernels are as large for any samples, for the tests of surfaces alone.
+SAMPLED_WALLS = {"sampled": _sampled(), "sampled solid": _sampled("outside", _TILT)}
 # Those whose push has no closed form: it is found by iteration.
-ITERATED = ("torus", "ring", "rotated torus", "capsule", "rod", "formula")
+ITERATED = ("torus", "ring", "rotated torus", "capsule", "rod", "formula", *SAMPLED_WALLS)
 QUADRICS = [name for name in SURFACES if name not in ITERATED]
-WALLS = {**SURFACES, **QUADRIC_WALLS}
+WALLS = {**SURFACES, **QUADRIC_WALLS, **SAMPLED_WALLS}
 METHODS = {
     "impact": swarm.Impact(),
     "impact, chord": swarm.Impact(contact_step=1e-3),
@@ -118,7 +132,13 @@ METHODS = {
 LAWS = {str(a): regularisation(1e3, a) for a in (1.0, 1.25, 1.5, 2.0, 4.0, 12.0)}
 
 every_surface = pytest.mark.parametrize("name", SURFACES)
+# Steps of surfaces from data are slow in plain Python. And those of AugmentedLagrangian end on them to 2e-14 of phi,
+# whose terms are 10 here, not to the 1e-14 of contact/test_uzawa.py.
+every_level = pytest.mark.parametrize("name", [*SURFACES, *map(rarely, SAMPLED_WALLS)])
 every_wall = pytest.mark.parametrize("name", WALLS)
+# Those whose level along a flight is a polynomial. Flights to a spline, which is another one in each cell, are held
+# against a dense search: surfaces/data/test_sampled_flights.py.
+every_polynomial_wall = pytest.mark.parametrize("name", [name for name in WALLS if name not in SAMPLED_WALLS])
 every_quadric_wall = pytest.mark.parametrize("name", QUADRIC_WALLS)
 every_quadric = pytest.mark.parametrize("name", QUADRICS)
 every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -91,6 +91,11 @@ REFUSED = {
     "infinite": ([BALL], (1.0, np.inf, None), r"period\[1\] must be a finite number above 0, got inf"),
     "true": ([BALL], (True, 1.0, 1.0), r"period\[0\] must be a finite number above 0, got True"),
     "too short": ([BALL], (0.15, 1.0, 1.0), r"period\[0\] must be as long as each solid.*got 0\.15.*0\.2 long"),
+    "too short, of many": (
+        [swarm.Spheres([[0.5, 0.5, 0.5], [0.2, 0.2, 0.2]], [0.1, 0.3])],
+        (1.0, 0.5, 1.0),
+        r"period\[1\] must be as long as each solid.*got 0\.5, shorter than body 1 of surfaces\[0\].*0\.6 long",
+    ),
     "across a plane": ([FLOOR], CELL, r"surfaces\[0\] \(Plane\) must be bounded along z, or the same all along it"),
     "tilted plane": ([TILTED], (1.0, 1.0, None), r"surfaces\[0\] \(Plane\) must be bounded along y"),
     "cavity": ([swarm.Sphere(0.5)], CELL, r"surfaces\[0\] \(Sphere\) must be within the cell, from 0 to 1 along x"),

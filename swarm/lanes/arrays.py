@@ -46,7 +46,7 @@ class Lanes(NamedTuple):
     order: Array  # int64, the lanes that are marked
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
     period: Any = None  # the cell where it repeats
-    before: Any = None  # what a lane is before its contact, for the log of impacts, where there is one
+    before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
 
 
 class Halted(NamedTuple):
@@ -86,6 +86,7 @@ class Share(NamedTuple):
     seed: int  # of random numbers
     moment: float  # at which the frame ends [s]
     log: Any = None  # `log.Log` of impacts
+    counts: Any = None  # `log.Counts` of them
 
 
 def empty(walls: int, rows: int, period: Any = None) -> Lanes:

@@ -172,6 +172,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     impact_log.keep_before(share.log, lanes, live)
+    impact_log.keep_before(share.counts, lanes, live)
     _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
     pick(chain, 0.0, lanes, picked, live)
     some_arrived, some_hard = False, False
@@ -183,6 +184,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
         impact_log.note(share.log, lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     impact_log.add_rows(share.log, method, chain, share.state, lanes, live)
+    impact_log.add_rows(share.counts, method, chain, share.state, lanes, live)
     return some_arrived, some_hard
 
 

@@ -1,6 +1,6 @@
 """The log of impacts: each one that a kernel counts is a row, in arrays that another thread writes to a file.
 
-Where a run has no log there is None in its place, and nothing of this is compiled.
+And their number on each wall. Where a run has none of these there is None in its place, and nothing of it is compiled.
 """
 
 from typing import Any, NamedTuple
@@ -41,6 +41,12 @@ class Log(NamedTuple):
     chosen: Any  # (N,) bool, the particles that have rows; None: all
     begin: float  # of the frame [s]
     end: float
+
+
+class Counts(NamedTuple):
+    """Impacts on each wall of the chain that one thread has computed."""
+
+    impacts: Array  # (walls,) int64
 
 
 class Struck(NamedTuple):
@@ -110,6 +116,12 @@ def _(log, lanes, live):
         before[_WALL, i], before[_IMPULSE, i] = lanes.wall[i], 0.0
 
 
+@keep_before.register(Counts)
+def _(log, lanes, live):
+    for i in range(index(live)):
+        lanes.before[_HITS, i], lanes.before[_WALL, i] = lanes.rows[HITS, i], lanes.wall[i]
+
+
 @by_type
 def note(log, lanes, i, impulse):
     """Note the impulse per mass that the wall of a lane gives."""
@@ -122,7 +134,7 @@ def _(log, lanes, i, impulse):
 
 @by_type_outlined
 def add_rows(log, method, chain, state, lanes, live):
-    """A row for each lane with one more impact than before its contact."""
+    """A row for each lane with one more impact than before its contact, or a count."""
 
 
 @add_rows.register(Log)
@@ -140,6 +152,14 @@ def _(log, method, chain, state, lanes, live):
         _add(log, method, chain, state, lanes.particle[i], struck)
 
 
+@add_rows.register(Counts)
+def _(log, method, chain, state, lanes, live):
+    before = lanes.before
+    for i in range(index(live)):
+        # A lane without an impact may be at no wall.
+        log.impacts[index(int(max(before[_WALL, i], 0.0)))] += np.int64(lanes.rows[HITS, i] - before[_HITS, i])
+
+
 @by_type
 def _is_chosen(chosen, particle):
     return chosen[index(particle)]
@@ -153,13 +173,18 @@ _is_chosen.register(Nothing, lambda chosen, particle: True)
 
 @by_type_outlined
 def add_row(log, method, chain, state, particle, struck):
-    """A row for an impact of a particle."""
+    """A row for an impact of a particle, or a count."""
 
 
 @add_row.register(Log)
 def _(log, method, chain, state, particle, struck):
     if _is_chosen(log.chosen, particle):
         _add(log, method, chain, state, particle, struck)
+
+
+@add_row.register(Counts)
+def _(log, method, chain, state, particle, struck):
+    log.impacts[index(int(struck.wall))] += 1
 
 
 @by_type_outlined

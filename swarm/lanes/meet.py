@@ -78,6 +78,7 @@ def _decide(method, chain, gravity, share, i):
         state.impacts[i] += 1
         struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
         impact_log.add_row(share.log, method, carried, state, i, struck)
+        impact_log.add_row(share.counts, method, carried, state, i, struck)
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
     u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
@@ -133,6 +134,7 @@ def _(thermal, method, chain, gravity, share, i):
     state.impacts[i] += 1
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
     impact_log.add_row(share.log, method, chain, state, i, struck)
+    impact_log.add_row(share.counts, method, chain, state, i, struck)
     state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.phase[i] = FLYING

@@ -44,6 +44,7 @@ class Job:
         wall_time: used so far [s].
         seed: of thermal walls.
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
+        member_impacts: whether the impacts on each member are counted.
     """
 
     version: str
@@ -59,10 +60,11 @@ class Job:
     seed: int = 0
     kept: str = ""
     rows: int = 0
+    member_impacts: bool = False
 
     def require_same(self, other: "Job", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
-        for name in ("particles", "method", "scene", "storage", "start", "seed", "kept", "version"):
+        for name in ("particles", "method", "scene", "storage", "start", "seed", "kept", "member_impacts", "version"):
             mine, its = getattr(self, name), getattr(other, name)
             if mine != its:
                 raise SceneError(
@@ -78,6 +80,7 @@ _NAMES = {
     "start": "particles at the start (seed, speed, mass, file, body) have the digest",
     "seed": "seed of thermal walls is",
     "kept": "log of impacts keeps",
+    "member_impacts": "member_impacts is",
     "version": "version of swarm is",
 }
 

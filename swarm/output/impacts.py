@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..methods import Method
 from ..scene import Scene
 from .appended import AppendedFile, put
+from .layout import ARRAYS
 from .storage import Storage
 from .writer import WriteFrames, Written, descriptions
 
@@ -33,9 +34,11 @@ Rows = dict[str, NDArray[Any]]
 def about(scene: Scene, method: Method, kept: str, identity: dict[str, Any]) -> dict[str, Any]:
     """What a log says of its run: group/name -> text, number or array."""
     surface, member = scene.members()
-    texts = {name: text for name, text in descriptions(scene, method, Storage()).items() if name != "storage"}
+    arrays: dict[str, Any] = {}
+    texts = {name: text for name, text in descriptions(scene, method, Storage(), arrays).items() if name != "storage"}
     return {
         **{f"parameters/{name}": value for name, value in {**texts, "kept": kept, **identity}.items()},
+        **{f"parameters/{ARRAYS}/{name}": values for name, values in arrays.items()},
         "walls/surface": surface,
         "walls/member": member,
     }

@@ -217,6 +217,8 @@ def _require_instants(scene: Scene, particles: Particles, method: Method, option
 def _require_no_log(instead: str, options: RunOptions) -> None:
     if options.impacts is not None:
         raise SceneError(f"impacts must be None here, a log of impacts is {instead}; got {options.impacts}")
+    if options.member_impacts:
+        raise SceneError(f"member_impacts must be False here, their count is {instead}; got True")
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

@@ -23,8 +23,9 @@ from ..particles import Contacts, Multipliers, Particles
 from ..scene import Scene
 from ..status import Status
 from . import failures
-from .impacts import Impacts, Page
+from .impacts import Page
 from .state import state_of
+from .tally import Watched
 from .tiers import Tier
 from .waiting import result_of
 
@@ -43,6 +44,7 @@ _MUCH_WRITING = 1.0 / 3.0
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 # A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
 _PARTS = 4
+_UNWATCHED = Watched()
 # (status, particle, what a halt left in the lanes)
 _End = tuple[int, int, lanes.Halted | None]
 _DONE: _End = (int(Status.DONE), 0, None)
@@ -53,9 +55,9 @@ class Run:
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always", seed: int = 0, impacts: Impacts | None = None,
+        compile: str = "always", seed: int = 0, watched: Watched = _UNWATCHED,
     ) -> None:  # fmt: skip
-        self._impacts = impacts
+        self._impacts, self._tally = watched
         n, self._owners = len(particles), scene.owners()
         self._booked = booked(scene.chain())
         self.state = state_of(scene, particles, method, self._booked)
@@ -200,7 +202,8 @@ class Run:
 
     def _empty_lanes(self) -> lanes.Lanes:
         made = lanes.empty(len(self._owners), self._booked, self.state.period)
-        return made if self._impacts is None else made._replace(before=lanes.table(impact_log.ROWS))
+        watched = self._impacts is not None or self._tally is not None
+        return made._replace(before=lanes.table(impact_log.ROWS)) if watched else made
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
@@ -257,9 +260,9 @@ class Run:
         """What a thread shares with the others, and its counts."""
         pending = np.zeros(PHASES, np.int64)
         log = None if self._impacts is None else self._impacts.example
-        return lanes.Share(
-            self.state, self._phase, pending, self._halted, draws, self._halt, span, self._seed, self._moment, log
-        )
+        counts = None if self._tally is None else self._tally.counts()
+        frame = span, self._seed, self._moment
+        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, *frame, log, counts)
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
@@ -311,6 +314,8 @@ class Run:
         arrays: dict[str, NDArray[Any]] = {"phase": self._phase, **_named("halted", self._halted)}
         for name, array in self.state._asdict().items():
             arrays |= _named(name, array) if isinstance(array, (Contacts, Multipliers)) else {name: array}
+        if self._tally is not None:
+            arrays["member_impacts"] = self._tally.total()
         return {name: array for name, array in arrays.items() if isinstance(array, np.ndarray)}
 
     def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
@@ -318,6 +323,8 @@ class Run:
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")
+        if self._tally is not None:
+            self._tally.restore(arrays["member_impacts"])
         self._cut_short = cut_short
         contacts = self.state.contacts
         if contacts is not None and (contacts.phase.any() or (contacts.left > 0.0).any()):

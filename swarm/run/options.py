@@ -38,6 +38,7 @@ class RunOptions:
     recording: Any = None
     impacts: Any = None
     impact_particles: Any = "all"
+    member_impacts: bool = field(default=False, metadata=_OF_A_SESSION)
     record_particles: int = 5000
     record_color: str = "speed"
     record_megabytes: float = 100.0
@@ -71,6 +72,7 @@ class RunOptions:
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
         checks.one_of("compile", self.compile, CHOICES)
+        checks.flag("member_impacts", self.member_impacts)
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         _ = self.storage

@@ -2,14 +2,15 @@
 
 from .bodies import BodyRun
 from .engine import Run
-from .impacts import Impacts
 from .options import Task
 from .reacting import ReactingRun
+from .tally import Watched
 
+_UNWATCHED = Watched()
 AnyRun = Run | BodyRun | ReactingRun
 
 
-def run_of(task: Task, log: Impacts | None = None) -> AnyRun:
+def run_of(task: Task, watched: Watched = _UNWATCHED) -> AnyRun:
     """The state of a run at its start, and the threads that advance it."""
     options = task.options
     how = options.thread_count(), options.block_size, options.compile
@@ -17,4 +18,4 @@ def run_of(task: Task, log: Impacts | None = None) -> AnyRun:
         return BodyRun(task.scene, task.bodies, task.particles, task.method, *how)
     if task.scene.reacts():
         return ReactingRun(task.scene, task.particles, task.method, *how)
-    return Run(task.scene, task.particles, task.method, *how, options.seed, log)
+    return Run(task.scene, task.particles, task.method, *how, options.seed, watched)

@@ -87,7 +87,7 @@ class Session:
                 "replace; move it away, or choose another name for the trajectory"
             )
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
-        texts["kept"] = "" if log is None else log.kept
+        texts["kept"], texts["member_impacts"] = "" if log is None else log.kept, task.options.member_impacts
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
         if not self._resumes:
             return

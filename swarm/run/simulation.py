@@ -25,6 +25,7 @@ from .options import RunOptions, Task
 from .outputs import recorder_of, writer_of
 from .runs import AnyRun, run_of
 from .session import Session
+from .tally import Watched, tally_of
 
 if TYPE_CHECKING:
     from ..output.background import Background
@@ -51,6 +52,9 @@ class Result:
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
         escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
+        member_impacts: with member_impacts=True how many impacts each surface has had since 0 s, in all sessions: a
+            list with an array for each, (members,) of a field such as `Spheres` and (1,) of any other; in a cell that
+            repeats all images of a body are one. Else None. No file holds it.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
     """
 
@@ -61,6 +65,7 @@ class Result:
     multipliers: Multipliers | None
     impacts_per_particle: NDArray[np.int64]
     escape_time: NDArray[np.float64]
+    member_impacts: list[NDArray[np.int64]] | None = None
     bodies: Bodies | None = None
 
 
@@ -75,6 +80,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     recording: str | os.PathLike[str] | None = None,
     impacts: str | os.PathLike[str] | None = None,
     impact_particles: str | int | Sequence[int] = "all",
+    member_impacts: bool = False,
     record_particles: int = 5000,
     record_color: str = "speed",
     record_megabytes: float = 100.0,
@@ -113,6 +119,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
         impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
         impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
+        member_impacts: True to count the impacts on each member of each surface, by Impact; see `Result`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
@@ -167,7 +174,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     from .progress import display  # rich is imported only when it is shown
 
     recorder = recorder_of(task)
-    log = log_of(task)
+    log, tally = log_of(task), tally_of(task)
     runs: list[AnyRun] = []
 
     def stop() -> None:
@@ -178,7 +185,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
         session.prepare(task, log)
         _require_room(task, session)
-        run = run_of(task, log)
+        run = run_of(task, Watched(log, tally))
         runs.append(run)
         session.restore(run)
         writer = writer_of(task, session, recorder, log)
@@ -192,6 +199,7 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
             run.state.multipliers,
             run.state.impacts,
             np.full(len(task.particles), np.nan) if run.state.escape_time is None else run.state.escape_time,
+            None if tally is None else tally.of_members(),
             None if task.bodies is None else task.bodies.moved(task.particles),
         )
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import EPSILON, LAWS, call, directions, every_surface, exponent_of, gap, numbers_of, wall_point
+from conftest import EPSILON, LAWS, call, directions, every_level, exponent_of, gap, numbers_of, wall_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -112,7 +112,7 @@ def mean_value(law, surface, r0, r1):
 # --- The identity ----------------------------------------------------------------------------------------
 
 
-@every_surface
+@every_level
 @settings(max_examples=10)
 @given(**pairs)
 def test_composite_is_a_discrete_gradient(name, **pair):
@@ -171,7 +171,7 @@ def test_mean_value_where_the_gap_is_not_convex(name):
                 assert _is_a_mean_value(law, surface, r0, r1), law
 
 
-@every_surface
+@every_level
 def test_mean_value_of_close_points(name):
     """As at the turning point of a head-on contact: any beta will do."""
     surface = numbers_of(name)
@@ -186,7 +186,7 @@ def test_mean_value_of_close_points(name):
                 assert size(d - gradient) <= 30.0 * near * size(gradient), law
 
 
-@every_surface
+@every_level
 @few
 @given(point=directions, direction=directions, first=outer, last=outer, along=st.sampled_from([0.1, 1e-3, 0.0]))
 def test_close_points_outside_have_the_gradient_at_their_middle(name, **pair):
@@ -221,7 +221,7 @@ def test_scalar_form_is_the_composite_on_a_sphere(r0, r1, radius):
 # --- Limits ----------------------------------------------------------------------------------------------
 
 
-@every_surface
+@every_level
 @few
 @given(point=directions, depth=depths)
 def test_one_point_has_the_gradient(name, point, depth):
@@ -237,7 +237,7 @@ def test_one_point_has_the_gradient(name, point, depth):
                 assert tuple(d) == (0.0, 0.0, 0.0)
 
 
-@every_surface
+@every_level
 @few
 @given(point=directions, direction=directions, depth=outer, along=st.sampled_from([0.02, 0.0]))
 def test_close_points_tend_to_the_gradient(name, point, direction, depth, along):
@@ -290,7 +290,7 @@ def test_on_the_surface_at_both_ends(law):
         assert vector(forms.composite, law, surface, r0, r1) == pytest.approx(expected, rel=8 * EPSILON, abs=0.0)
 
 
-@every_surface
+@every_level
 @few
 @given(point=directions, direction=directions, inside=st.sampled_from([1e-9, 1e-3, 0.05]), outside=outer)
 def test_one_point_inside_and_one_outside(name, point, direction, inside, outside):
@@ -306,7 +306,7 @@ def test_one_point_inside_and_one_outside(name, point, direction, inside, outsid
         assert vector(forms.composite, law, surface, r1, r0) == pytest.approx(d, rel=1e-12, abs=1e-12 * size(d))
 
 
-@every_surface
+@every_level
 @few
 @given(point=directions, direction=directions, first=outer, last=outer)
 def test_inside_there_is_none(name, point, direction, first, last):
@@ -381,7 +381,7 @@ class Contact:
         return 2.0 * slope * (max(forces) - min(forces)) + 64 * EPSILON * slope * max(forces)
 
 
-@every_surface
+@every_level
 @few
 @given(**steps)
 def test_reaction_of_the_composite_form_solves_its_step(name, **step):
@@ -416,7 +416,7 @@ def _mean_value_step(name, law, part, lean, depth, length, stiffness):
     return solved, miss <= slack, (step, held, end, strength)
 
 
-@every_surface
+@every_level
 @pytest.mark.parametrize("law", [LAWS["1.5"], LAWS["4.0"]], ids=["1.5", "4.0"])
 def test_reaction_of_the_mean_value_form_solves_its_step(name, law):
     """And it is along grad Phi at a point between, with the beta of `mean_value`."""

@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 import tomli_w
-from conftest import QUADRIC_WALLS, WALLS, directions, every_wall, numbers_of, side_of, surface_of
+from conftest import QUADRIC_WALLS, SAMPLED_WALLS, WALLS, directions, every_wall, numbers_of, side_of, surface_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -162,7 +162,7 @@ def is_made_again(surface):
         assert [wall[1:] for wall in again.walls()] == [wall[1:] for wall in surface.walls()]
 
 
-@every_wall
+@pytest.mark.parametrize("name", [name for name in WALLS if name not in SAMPLED_WALLS])
 def test_a_surface_is_made_again_by_its_repr_and_by_its_table(name):
     is_made_again(surface_of(name))
 
@@ -177,4 +177,5 @@ def test_a_turned_surface_is_made_again(name, direction, axis, angle):
 
 
 def test_every_kind_is_made_again():
-    assert set(TURNED) == set(ALL_SURFACES) - set(ALL_FIELDS)
+    # Whose repr leaves out long arrays: test_fields.py and data/test_sampled.py.
+    assert set(TURNED) == set(ALL_SURFACES) - set(ALL_FIELDS) - {"sampled"}

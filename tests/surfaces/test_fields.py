@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm import scene_file, tables
+from swarm import rows, scene_file, tables
 from swarm.errors import SceneError
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
@@ -186,10 +186,30 @@ def test_bad_bodies_are_told(build, parts):
     assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
+def test_a_hundred_million_bodies_are_told_what_memory_they_take(monkeypatch):
+    """Before it is tried: of those that are turned ten times as much as of balls."""
+    monkeypatch.setattr(rows, "memory", lambda: 16_000_000_000)
+    places = np.broadcast_to(0.0, (10**8, 3))
+    for build, said in ((swarm.Spheres, "30 GB"), (swarm.Cylinders, "300 GB")):
+        with pytest.raises(SceneError, match=rf"got 1e\+08 bodies, which take {said}; this machine has 16 GB"):
+            build(places, 0.1)
+
+
 def test_a_packing_without_room_is_told():
     places = np.stack(np.meshgrid(*3 * [np.linspace(-0.5, 0.5, 8)], indexing="ij"), -1).reshape(-1, 3)
     with pytest.raises(SceneError, match="must leave a volume for particles"):
         swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Spheres(places, 0.15)])
+
+
+def test_bodies_may_reach_through_a_wall():
+    """What is admissible is outside of all bodies and within the wall."""
+    places = np.array([[0.5, 0.0, 0.0], [-0.5, 0.2, 0.1], [0.0, 0.0, 0.62], [0.0, 0.1, 0.5]])
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Spheres(places, [0.2, 0.25, 0.15, 0.2])])
+    start = swarm.fill(scene, 20, speed=1.0, seed=1)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=20.0, every=0.5, compile="never")
+    assert (result.observables["impulse"][-1] > 0.0).all()
+    assert result.observables["max_penetration"].max() < 1e-14
+    assert (scene.gaps(result.particles.position) <= 1e-14).all()
 
 
 def test_what_knows_no_fields_says_so():

@@ -8,6 +8,7 @@ from conftest import (
     ITERATED,
     call,
     directions,
+    every_polynomial_wall,
     every_quadric_wall,
     every_wall,
     numbers_of,
@@ -29,7 +30,7 @@ heavies = st.sampled_from([1e-6, 1.0, 1e3])
 # --- Hits ------------------------------------------------------------------------------------------------
 
 
-@every_wall
+@every_polynomial_wall
 @settings(max_examples=100)
 @given(**flights)
 def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, scale, speed):
@@ -38,7 +39,7 @@ def test_first_hit_is_the_exact_first_root(name, point, direction, depth, lean, 
     hit_of(straight, surface, position, velocity, np.zeros(3), horizon, 100 if name in ITERATED else 1)
 
 
-@every_wall
+@every_polynomial_wall
 @given(**flights, pull=vectors, heavy=heavies)
 def test_falling_hits_lead_to_the_exact_first_root(name, point, direction, depth, lean, scale, speed, pull, heavy):
     """Asked again from where the last answer ended: never past the exit, and there in the end."""
@@ -57,7 +58,7 @@ def test_a_fall_that_is_no_graze_ends_after_a_few_passes(name, point, direction,
     assert time == math.inf or passes <= 12
 
 
-@every_wall
+@every_polynomial_wall
 @pytest.mark.parametrize("off", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_a_parabola_that_just_touches(name, off, scale):
@@ -131,7 +132,7 @@ def test_at_rest_there_is_no_hit(name, point, depth):
 # --- Safe times ------------------------------------------------------------------------------------------
 
 
-@every_wall
+@every_polynomial_wall
 @given(**flights, pull=vectors, heavy=heavies)
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
@@ -145,7 +146,7 @@ def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, s
         assert time > 0.0
 
 
-@every_wall
+@every_polynomial_wall
 @settings(max_examples=10)
 @given(point=directions, direction=directions, pull=directions, lean=st.floats(0.3, 1.0))
 def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):

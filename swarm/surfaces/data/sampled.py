@@ -18,7 +18,6 @@ from . import flight as _flight  # noqa: F401
 from . import spline
 from .cells import Cells, cells_of, eigenvalues, least_at_border
 from .numbers import SampledNumbers
-from .packed import packed, unpacked
 from .spline import Spline
 
 Floats = NDArray[np.float64]
@@ -127,11 +126,6 @@ class Sampled(Surface):
         x, y, z = (a + b for a, b in zip(self.origin, shift, strict=True))
         return replace(self, origin=(x, y, z))
 
-    def arguments(self) -> dict[str, Any]:
-        """What a file keeps of it: its samples too, unless they are too many."""
-        given = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("values", "_made")}
-        return {"values": packed(self.values), **given}
-
 
 class Samples:
     """What is made of the samples of a surface, once."""
@@ -184,9 +178,7 @@ def _spacing(value: Any) -> Vector:
 
 
 def _samples(values: Any) -> Floats:
-    """The argument `values`, checked: an array, a path, or what a trajectory keeps of it."""
-    if isinstance(values, dict):
-        values = unpacked(values)
+    """The argument `values`, checked: an array or a path."""
     if isinstance(values, str | Path):
         values = read(values)
     found = np.ascontiguousarray(checks.array("values", values))

@@ -11,7 +11,9 @@ from .many import Many
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Boxes(Many):
-    """Many solid boxes, one surface; the space outside of all of them. They may overlap.
+    """Many solid boxes, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, half_x, half_y, half_z
     and optionally q_w, q_x, q_y, q_z.

@@ -11,7 +11,9 @@ from .many import Many
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Cylinders(Many):
-    """Many solid cylinders, endless or capped, one surface; the space outside of all of them. They may overlap.
+    """Many solid cylinders, endless or capped, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius
     and optionally axis_x, axis_y, axis_z, length.

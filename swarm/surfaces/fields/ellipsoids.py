@@ -11,7 +11,9 @@ from .many import Many
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ellipsoids(Many):
-    """Many solid ellipsoids, one surface; the space outside of all of them. They may overlap.
+    """Many solid ellipsoids, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, a, b, c
     and optionally q_w, q_x, q_y, q_z.

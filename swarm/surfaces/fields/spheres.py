@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...rows import bodies, lengths
+from ...rows import BALL, bodies, lengths
 from ..shapes.sphere import SphereNumbers
 from .many import Floats, Many, field_of
 from .members import Members, aligned, gathered
@@ -14,7 +14,9 @@ from .members import Members, aligned, gathered
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Spheres(Many):
-    """Many solid balls, one surface; the space outside of all of them. They may overlap.
+    """Many solid balls, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
 
@@ -38,7 +40,7 @@ class Spheres(Many):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers))
+        object.__setattr__(self, "centers", bodies("centers", self.centers, BALL))
         object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
 
     def size(self) -> float:

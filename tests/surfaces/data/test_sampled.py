@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from conftest import EPSILON
+from conftest import EPSILON, METHODS
 from samples import ball, bumpy, grid
 
 import swarm
@@ -140,6 +140,18 @@ def test_a_grain_slides_on_it_as_in_the_sphere():
     assert ends[0].observables["max_penetration"].max() < 8.0 * EPSILON
 
 
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_meets_it(name):
+    scene = swarm.Scene([sampled()])
+    start = swarm.Particles([[0.05], [0.0], [0.2]], [[0.3], [0.1], [1.0]])
+    result = swarm.simulate(scene, start, METHODS[name], until=0.35, every=0.05, compile="never")
+    assert result.observables["impacts"][-1] >= 1
+    assert result.particles.velocity[2] < 0.0
+    # Three of them are those that the paper's are compared with.
+    conserves = name not in ("verlet", "midpoint", "trapezoidal")
+    assert result.observables["energy_error"].max() < (1e-13 if conserves else 1e-2)
+
+
 # --- Kept ------------------------------------------------------------------------------------------------
 
 
@@ -150,27 +162,31 @@ def test_its_table_makes_it_again():
         assert repr(again) == repr(surface)
 
 
-def test_a_trajectory_keeps_the_samples(tmp_path):
-    scene = swarm.Scene([bumpy()])
-    start = swarm.fill(scene, 3, speed=1.0, seed=1)
-    swarm.simulate(scene, start, swarm.Impact(), until=0.1, trajectory=tmp_path / "t.h5", compile="never")
-    with swarm.load(tmp_path / "t.h5") as trajectory:
-        assert np.array_equal(trajectory.scene.surfaces[0].values, bumpy().values)
+def test_a_trajectory_and_a_log_keep_the_samples(tmp_path):
+    """As an array beside the text of the scene, which names its digest; others do not go on with the run."""
+    axis = np.linspace(-0.6, 0.6, 12)
+    values = axis[:, None, None] ** 2 + axis[:, None] ** 2 + 1.2 * axis**2 - 0.16
 
+    def scene(values):
+        return swarm.Scene([swarm.Sampled(values, axis[1] - axis[0], (axis[0],) * 3, openings=[sampled(8.0 * SQUARE)])])
 
-def test_too_many_samples_are_known_by_their_digest(monkeypatch):
-    from swarm.surfaces.data import packed
+    start, path = swarm.fill(scene(values), 3, speed=1.0, seed=1), tmp_path / "t.h5"
 
-    monkeypatch.setattr(packed, "_MOST_BYTES", 1000)
-    table = tables.table_of(sampled())
-    assert set(table["values"]) == {"shape", "sha256"}
-    with pytest.raises(swarm.SceneError, match=r"got only the digest of 8 x 8 x 8.*not kept in a file"):
-        tables.of_kind(table, "surface[0]", swarm.surfaces.ALL_SURFACES)
-    monkeypatch.undo()
-    table = tables.table_of(sampled())
-    table["values"]["sha256"] = "0" * 64
-    with pytest.raises(swarm.SceneError, match="damaged"):
-        tables.of_kind(table, "surface[0]", swarm.surfaces.ALL_SURFACES)
+    def run(scene, until, **keywords):
+        kept = {"trajectory": path, "impacts": tmp_path / "i.h5", "checkpoint": 9.0, "compile": "never"}
+        return swarm.simulate(scene, start, swarm.Impact(), until=until, every=0.25, **kept, **keywords)
+
+    with pytest.raises(swarm.WallTimeError):
+        run(scene(values), 0.5, walltime=1e-9)
+    with swarm.load(path) as trajectory, swarm.load_impacts(tmp_path / "i.h5") as log:
+        assert len(trajectory.descriptions["scene"]) < 20000
+        for kept in (trajectory.scene, log.scene):
+            assert np.array_equal(kept.surfaces[0].values, values)
+            assert np.array_equal(kept.surfaces[0].openings[0].values, 8.0 * SQUARE)
+        again = trajectory.scene
+    with pytest.raises(swarm.SceneError, match="is of another run: its scene is"):
+        run(scene(1.01 * values), 0.5, resume=True)
+    assert run(again, 0.5, resume=True).observables["time"].tolist() == [0.0, 0.25, 0.5]
 
 
 TEXT = """
