@@ -15,21 +15,20 @@ from ..surfaces import contract, flights, fold
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, Members, gathered, member, width
-from .arrays import STRIDE, R, V
+from .arrays import ROWS, STRIDE, R, V
 from .marks import marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.
 _MANY = 8
 # What a lane knows of its flight, in rows of `course`: when it ends, and at which wall, or -1.
 _TIME, _WALL = 0, 1
-# Rows of a position and a velocity.
-_FLIGHT = 6
+# From this row on `lanes.rows` has the flights of lanes that are closed up.
+_CLOSED_UP = ROWS
 
 
 class Seen(NamedTuple):
     """What lanes know of their flights so far, and of the bodies near them."""
 
-    flight: Array  # (_FLIGHT, stride) position and velocity
     owner: Array  # int64, whose they are
     time: Array  # when the flight ends
     wall: Array  # where, or -1
@@ -37,6 +36,13 @@ class Seen(NamedTuple):
     number: Array  # int64, how many it has
     which: Array  # the number of body k
     body: Array  # (stride, width), its numbers
+
+
+class Near(NamedTuple):
+    """Which of the bodies of their cells lanes look at, and from which row on `lanes.rows` has their flights."""
+
+    k: int
+    row: int
 
 
 @inlined
@@ -102,26 +108,25 @@ def _(members, before, gravity, lanes, live):
 @inlined
 def _look_at_near(gravity, members, before, lanes, live):
     """Every lane at the bodies near it: those in its cell, or all."""
-    rows, course, grid, columns = lanes.rows, lanes.course, members.grid, width(members.like)
+    course, grid, columns = lanes.course, members.grid, width(members.like)
     seen = Seen(
-        unwritten((_FLIGHT, STRIDE), np.float64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
+        unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
         unwritten(STRIDE, np.float64), unwritten((STRIDE, columns), np.float64),
     )  # fmt: skip
     for i in range(index(live)):
-        put(seen.flight, R, i, column(rows, R, i))
-        put(seen.flight, V, i, column(rows, V, i))
         seen.owner[i], seen.time[i], seen.wall[i] = i, course[_TIME, i], course[_WALL, i]
-    _find_near(members, gravity, seen, live)
-    most, n = 0, live
+    _find_near(members, gravity, lanes, live, seen)
+    most, n, row = 0, live, 0
     for i in range(index(live)):
         most = max(most, seen.number[i])
     for k in range(most):
-        n = _close_up(seen, k, lanes, n)
+        some = _close_up(seen, k, lanes, n, row)
+        n, row = some, select(some < n, _CLOSED_UP, row)
         for i in range(index(n)):
             seen.which[i] = grid.entries[index(select(k < seen.number[i], seen.first[i] + k, 0))]
             copy_row(seen.body, i, members.table, index(int(seen.which[i])), columns)
-        _look(gravity, members.like, before, lanes, n, seen, k)
+        _look(gravity, members.like, before, lanes, n, seen, Near(k, row))
     if n == live:
         for i in range(index(live)):
             course[_TIME, i], course[_WALL, i] = seen.time[i], seen.wall[i]
@@ -131,23 +136,23 @@ def _look_at_near(gravity, members, before, lanes, live):
 
 
 @by_type
-def _find_near(members, gravity, seen, live):
+def _find_near(members, gravity, lanes, live, seen):
     """Which bodies are near each lane, and until when it knows that."""
 
 
 @_find_near.register(Few)
-def _(members, gravity, seen, live):
+def _(members, gravity, lanes, live, seen):
     for i in range(index(live)):
         seen.first[i], seen.number[i] = 0, members.table.shape[0]
 
 
 @_find_near.register(Members)
-def _(members, gravity, seen, live):
+def _(members, gravity, lanes, live, seen):
     grid = members.grid
     for i in range(index(live)):
-        r = column(seen.flight, R, i)
+        r = column(lanes.rows, R, i)
         cell = cell_of(grid, r)
-        until = until_next(gravity, grid, cell, r, column(seen.flight, V, i))
+        until = until_next(gravity, grid, cell, r, column(lanes.rows, V, i))
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])
@@ -160,7 +165,7 @@ def _(members, gravity, seen, live):
 
 
 @inlined
-def _close_up(seen, k, lanes, n):
+def _close_up(seen, k, lanes, n, row):
     """Give back the lanes that have no body k, where these are most, and close up the others: how many there are.
 
     Among 1000 balls at random, 3.6 in a cell and 11 in the fullest, an impact takes a fifth longer without. (Lanes one
@@ -174,8 +179,8 @@ def _close_up(seen, k, lanes, n):
     for i in range(index(n)):
         _give_back(seen, lanes, i)
         number = seen.number[i]
-        put(seen.flight, R, j, column(seen.flight, R, i))
-        put(seen.flight, V, j, column(seen.flight, V, i))
+        put(lanes.rows, _CLOSED_UP + R, j, column(lanes.rows, row + R, i))
+        put(lanes.rows, _CLOSED_UP + V, j, column(lanes.rows, row + V, i))
         seen.owner[j], seen.time[j], seen.wall[j] = seen.owner[i], seen.time[i], seen.wall[i]
         seen.number[j], seen.first[j] = number, seen.first[i]
         j += index(k < number)
@@ -190,61 +195,62 @@ def _give_back(seen, lanes, i):
 
 
 @by_type
-def _look(gravity, like, before, lanes, live, seen, k):
+def _look(gravity, like, before, lanes, live, seen, near):
     """Every lane at the next of these bodies."""
 
 
 @_look.register(Nothing)
-def _(gravity, like, before, lanes, live, seen, k):
-    _look_straight(flights.in_steps(like), like, before, lanes, live, seen, k)
+def _(gravity, like, before, lanes, live, seen, near):
+    _look_straight(flights.in_steps(like), like, before, lanes, live, seen, near)
 
 
 @_look.register(Gravity)
-def _(gravity, like, before, lanes, live, seen, k):
-    _look_by_steps(gravity, like, before, lanes, live, seen, k)
+def _(gravity, like, before, lanes, live, seen, near):
+    _look_by_steps(gravity, like, before, lanes, live, seen, near)
 
 
 @by_type
-def _look_straight(steps, like, before, lanes, live, seen, k):
+def _look_straight(steps, like, before, lanes, live, seen, near):
     """The same without gravity, where a body is met by steps or in closed form."""
-    _look_by_steps(None, like, before, lanes, live, seen, k)
+    _look_by_steps(None, like, before, lanes, live, seen, near)
 
 
 @_look_straight.register(Nothing)
-def _(steps, like, before, lanes, live, seen, k):
-    flight = seen.flight
+def _(steps, like, before, lanes, live, seen, near):
+    rows = lanes.rows
     for i in range(index(live)):
         body = gathered(like, seen.body, i, 0)
-        time, hits = contract.first_hit(body, column(flight, R, i), column(flight, V, i))
-        _take(seen, i, k, time, select(hits, seen.which[i] + before, -1.0))
+        time, hits = contract.first_hit(body, *_flight(rows, near, i))
+        _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
 
 
 @inlined
-def _look_by_steps(gravity, like, before, lanes, live, seen, k):
-    flight, marked, order, course = (
-        seen.flight,
-        lanes.marked,
-        lanes.order,
-        unwritten((flights.COURSE, STRIDE), np.float64),
-    )
+def _look_by_steps(gravity, like, before, lanes, live, seen, near):
+    rows, marked, order, course = lanes.rows, lanes.marked, lanes.order, unwritten((flights.COURSE, STRIDE), np.float64)
     for i in range(index(live)):
-        flights.begin(_one(like, seen, i), gravity, course, 0, i, column(flight, R, i), column(flight, V, i))
+        flights.begin(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
     steps, some = SAFE_STEPS + MORE_STEPS, live
     while steps > 0 and some > 0:
         for i in range(index(live)):
-            marked[i] = _goes_on(like, course, seen, i, k)
+            marked[i] = _goes_on(like, course, seen, i, near)
         some = marked_lanes(lanes, live)
         if some > live // _MANY:
             for i in range(index(live)):
-                flights.step(_one(like, seen, i), gravity, course, 0, i, column(flight, R, i), column(flight, V, i))
+                flights.step(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
             steps -= 1
         else:
             for j in range(some):
-                _go_on(like, gravity, course, seen, index(order[j]), k, steps)
+                _go_on(like, gravity, rows, course, seen, index(order[j]), near, steps)
             some = 0
     for i in range(index(live)):
         hit = flights.end(_one(like, seen, i), course, 0, i)
-        _take(seen, i, k, hit.time, select(hit.wall < 0.0, -1.0, seen.which[i] + before))
+        _take(seen, i, near, hit.time, select(hit.wall < 0.0, -1.0, seen.which[i] + before))
+
+
+@inlined
+def _flight(rows, near, i):
+    """The position and the velocity of a lane."""
+    return column(rows, index(near.row + R), i), column(rows, index(near.row + V), i)
 
 
 @inlined
@@ -254,25 +260,24 @@ def _one(like, seen, i):
 
 
 @inlined
-def _goes_on(like, course, seen, i, k):
+def _goes_on(like, course, seen, i, near):
     """Whether more safe steps may find a hit that is the first so far."""
     hit = flights.end(_one(like, seen, i), course, 0, i)
-    return (hit.wall < 0.0) & (hit.time < seen.time[i]) & (k < seen.number[i])
+    return (hit.wall < 0.0) & (hit.time < seen.time[i]) & (near.k < seen.number[i])
 
 
 @outlined
-def _go_on(like, gravity, course, seen, i, k, steps):
+def _go_on(like, gravity, rows, course, seen, i, near, steps):
     """So many more steps of one lane, if need be."""
-    flight = seen.flight
     for _step in range(steps):
-        flights.step(_one(like, seen, i), gravity, course, 0, i, column(flight, R, i), column(flight, V, i))
-        if not _goes_on(like, course, seen, i, k):
+        flights.step(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
+        if not _goes_on(like, course, seen, i, near):
             break
 
 
 @inlined
-def _take(seen, i, k, time, wall):
+def _take(seen, i, near, time, wall):
     """A hit with that body, if there is one and it is the first so far."""
-    sooner = (k < seen.number[i]) & (time < seen.time[i])
+    sooner = (near.k < seen.number[i]) & (time < seen.time[i])
     seen.time[i] = select(sooner, time, seen.time[i])
     seen.wall[i] = select(sooner, wall, seen.wall[i])
