@@ -80,7 +80,7 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
     box = float(np.prod(high - low))
     while found < n:
         trial = low + (high - low) * random.random((3, _BATCH))
-        inside = trial[:, (scene.gaps(trial) <= 0.0).all(axis=0)]
+        inside = trial[:, scene.admits(trial)]
         admissible += inside.shape[1]
         inside = inside[:, : n - found]
         points[:, found : found + inside.shape[1]] = inside

@@ -21,7 +21,7 @@ from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, chain_in, order_of
-from .surfaces.fields.many import members_of
+from .surfaces.fields.many import Many, members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
@@ -267,6 +267,17 @@ class Scene:
             rows, _image = into_cell(self.period, rows)
         return np.array([_gaps(images, rows, time).max(axis=0) for images in self._images])
 
+    def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
+        rows = points if self.period is None else into_cell(self.period, points)[0]
+        admitted = np.ones(rows.shape[1], np.bool_)
+        for image in (image for images in self._images for image in images):
+            if isinstance(image, Many):
+                admitted[admitted] = ~image.contain(rows[:, admitted])
+            else:
+                admitted &= _gaps((image,), rows, 0.0)[0] <= 0.0
+        return admitted
+
     def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
         rows = checks.array("points", points)
@@ -286,7 +297,7 @@ class Scene:
         # In batches, so that NumPy's intermediate results stay in the processor's cache.
         for begin in range(0, points.shape[1], _BATCH):
             batch = points[:, begin : begin + _BATCH]
-            suspects = np.flatnonzero(~(self.gaps(batch) <= 0.0).all(axis=0))
+            suspects = np.flatnonzero(~self.admits(batch))
             if suspects.size:
                 near = (self.distances_outside(batch[:, suspects]) <= distance).all(axis=0)
                 found.append(begin + suspects[~near])

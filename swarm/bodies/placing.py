@@ -99,7 +99,7 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
             # Each point only of those copies whose points before it are within.
             left = np.flatnonzero(inside)
             places = trial[:, left] + _turned(turn[:, :, left], arm[None])[:, 0]
-            inside[left] = (scene.gaps(places) <= 0.0).all(axis=0)
+            inside[left] = scene.admits(places)
         chosen = np.flatnonzero(inside)[: n - found]
         middles[:, found : found + len(chosen)] = trial[:, chosen]
         turns[:, :, found : found + len(chosen)] = turn[:, :, chosen]

@@ -214,20 +214,36 @@ def scratch(shape: Any, dtype: Any) -> Any:
     return np.zeros(shape, dtype)
 
 
+def unwritten(shape: Any, dtype: Any) -> Any:
+    """`scratch` that holds anything, for what is written first: zeros in 20 rows of lanes cost a lane 1 ns a pass."""
+    return np.zeros(shape, dtype)
+
+
 @type_callable(scratch)
+@type_callable(unwritten)
 def _type_of_scratch(_context):
     return lambda shape, dtype: types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
 
 
 @lower_builtin(scratch, types.Any, types.Any)
 def _emit_scratch(context, builder, signature, args):
+    return _on_stack(context, builder, signature, args, True)
+
+
+@lower_builtin(unwritten, types.Any, types.Any)
+def _emit_unwritten(context, builder, signature, args):
+    return _on_stack(context, builder, signature, args, False)
+
+
+def _on_stack(context: Any, builder: Any, signature: Any, args: Any, zeros: bool) -> Any:
     kind, asked = signature.return_type, signature.args[0]
     shape = cgutils.unpack_tuple(builder, args[0]) if isinstance(asked, types.BaseTuple) else [args[0]]
     size = functools.reduce(builder.mul, shape)
     number = context.get_data_type(kind.dtype)
     item = context.get_constant(types.intp, context.get_abi_sizeof(number))
     data = builder.alloca(number, size)
-    cgutils.memset(builder, data, builder.mul(size, item), 0)
+    if zeros:
+        cgutils.memset(builder, data, builder.mul(size, item), 0)
     strides = [item]
     for columns in reversed(shape[1:]):
         strides.insert(0, builder.mul(columns, strides[0]))

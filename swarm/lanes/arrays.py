@@ -30,7 +30,7 @@ with_distances = spaced(STRIDE)
 class Lanes(NamedTuple):
     """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
 
-    rows: Array  # (ROWS, stride) position, velocity, time left, the method's constants, impacts
+    rows: Array  # (ROWS + 6, stride) position, velocity, time left, constants, impacts; room for 6 rows of `seek`
     impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
     wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
@@ -93,7 +93,7 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
     """Lanes for one block, with so many rows of what walls give."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
-        rows=table(ROWS),
+        rows=table(ROWS + 6),
         impulse=table(rows),
         wall=table(1)[0],
         kappa=table(1)[0],

@@ -117,6 +117,7 @@ def test_phi_is_that_of_a_body_near_the_point(kind):
     each = np.array([solid.phi(points) for solid in solids_of(field)])
     found = field.phi(points)
     assert ((found < 0.0) == (each.min(axis=0) < 0.0)).all()
+    assert (field.contain(points) == (found < 0.0)).all()
     near = each.min(axis=0) < np.quantile(each.min(axis=0), 0.1)
     assert found[near] == pytest.approx(each.min(axis=0)[near], abs=1e-12)
     h = 1e-6

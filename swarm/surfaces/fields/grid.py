@@ -57,10 +57,14 @@ def cell_of(grid, r):
 
 @inlined
 def _place(d, inverse, count):
-    """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther."""
+    """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther.
+
+    What is before the first is -1, and beyond the last `count`: layers without end, whose other wall is like any other.
+    """
     place = d * inverse
-    low, high = (place < 0.0) & (place >= -0.5 * MARGIN), (place >= count) & (place < count + 0.5 * MARGIN)
-    return select(low, 0.0, select(high, count - 1.0, np.floor(place)))
+    layer, last = np.floor(place), count - 1.0
+    layer = select(layer < 0.0, 0.0, select(layer > last, last, layer))
+    return select(place < -0.5 * MARGIN, -1.0, select(place >= count + 0.5 * MARGIN, count, layer))
 
 
 class Block(NamedTuple):
@@ -131,13 +135,10 @@ def _along(gravity, axis, cells, place, x, v):
 @_along.register(Nothing)
 def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
-    # One division for both
-    ahead, among, below = v > 0.0, (place >= 0.0) & (place < count), place < 0.0
+    ahead = v > 0.0
     edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
-    face = select(below, low + margin, low + count * width - margin)
-    comes = (select(below, 1.0, -1.0) * v) > 0.0
-    ends = (among & (v != 0.0)) | ((not among) & comes)
-    return select(ends, (select(among, edge, face) - x) / v, np.inf)
+    never = (v == 0.0) | select(ahead, place >= count, place < 0.0)
+    return select(never, np.inf, (edge - x) / v)
 
 
 @_along.register(Gravity)

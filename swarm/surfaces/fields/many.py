@@ -13,6 +13,7 @@ from ..surface import UNBOUNDED, Box, Surface
 from .entering import grid_of
 from .grid import one_cell
 from .members import Few, Members, alike, nearest, table_of
+from .within import within
 
 Floats = NDArray[np.float64]
 # So many bodies are looked at one after the other, by all lanes together. In a sphere an impact among 5, 16 and 40
@@ -95,6 +96,13 @@ class Many(Surface):
 
     def walls(self) -> tuple[Members]:
         return (self.members,)
+
+    def contain(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is in a body: cheaper than phi, which asks for the nearest one."""
+        found = np.empty(points.shape[1], np.bool_)
+        with np.errstate(all="ignore"):
+            within(self.members, np.ascontiguousarray(points), found)
+        return found
 
     # --- For users ---------------------------------------------------------------------------------------
 
