@@ -8,6 +8,7 @@ of that away from it. In these coordinates the map from impact to impact keeps a
 python -m examples.poincare
 """
 
+import argparse
 import math
 import tempfile
 from pathlib import Path
@@ -55,10 +56,17 @@ def draw(path: Path) -> None:
     figure.savefig(path, dpi=100)
 
 
-if __name__ == "__main__":
-    picture = Path(__file__).with_suffix(".png")
-    draw(picture)
-    orbit, along, away = section(45.0, 60, 250.0)
+def main() -> None:
+    """Draw them, and say how well the regular one is kept."""
+    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask.add_argument("-o", "--output", type=Path, default=Path("poincare.png"))
+    given = ask.parse_args()
+    draw(given.output)
+    orbit, _along, away = section(45.0, 60, 250.0)
     spread = max(np.ptp(away[orbit == k]) for k in range(60))
     print(f"{len(orbit)} impacts at 45 degrees, where the velocity away from the wall is kept to {spread:.1e} m/s")
-    print(f"written to {picture}")
+    print(f"written to {given.output}")
+
+
+if __name__ == "__main__":
+    main()
