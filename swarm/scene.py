@@ -92,10 +92,11 @@ class Scene:
         object.__setattr__(self, "volumes", tuple(volumes_of(*one) for one in named))
         self._require_few_walls("")
         require_few(self.volumes)
-        for i in self._fields() if self.moves() else ():
+        for i in self._fields() if self.reacts() else ():
             raise SceneError(
-                f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where a surface moves, got {surfaces[i]}; "
-                f"list its bodies one by one, at most {MOST_WALLS} walls in all"
+                f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
+                f"{surfaces[i]}; give that surface a motion instead of a mass and an inertia, or list the bodies one "
+                f"by one, at most {MOST_WALLS} walls in all"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
         require_known(surfaces, lambda held: self._bounds(0.0, held))
@@ -113,7 +114,8 @@ class Scene:
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
                 "surfaces: each wall is compiled into the kernels, and with more the compiler runs out of stack; "
                 "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one "
-                "kind, of which any number is one field for Impact where nothing moves"
+                "kind, of which any number is one field for Impact where nothing moves, and as Spheres and the like "
+                "always"
             )
 
     def apart(self, what: str) -> "Scene":
@@ -159,7 +161,8 @@ class Scene:
         After them those of a body's `own`, where nothing moves.
         """
         if self.moves():
-            return carried(self._pieces, moment)
+            fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
+            return carried(fields, others, moment)
         return chain_in(self.order, self._pieces, self._groups, own)
 
     def walls_of_rows(self) -> NDArray[np.int64]:

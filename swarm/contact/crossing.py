@@ -10,7 +10,7 @@ from ..surfaces import fold as walls
 from ..surfaces.fields.grid import block_of, in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried, at
-from ..surfaces.posed import rising, straight_hit
+from ..surfaces.posed import Posed, in_frame, own_place, rising, straight_hit
 from .hold import is_held_by
 
 _EPSILON = 2.220446049250313e-16
@@ -47,26 +47,47 @@ def _(chain, ends, number, held, path, near):
 
 @meets.register(walls.Field)
 def _(chain, ends, number, held, path, near):
-    here = _meets_one(chain.first, number, held, path, near)
+    here = _meets_one(chain.first, ends.first, number, held, path, near)
     return here | meets(chain.rest, ends.rest, number + walls.count(chain.first), held, path, near)
 
 
 @outlined
-def _meets_one(members, number, held, path, near):
+def _meets_one(field, ends, number, held, path, near):
     """The same of the bodies of a field that has so many walls before it."""
-    grid = members.grid
+    grid = members_of(field).grid
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
         return True
-    block = block_of_path(grid, path, near)
+    block = block_of_path(grid, own_path(field, ends, path), near)
     for k in range(size_of(block)):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
-            m = grid.entries[entry]
-            body = member(members, index(m))
-            if (not is_held_by(held, number + m)) and _may_meet(body, body, path, near):
+            m = float(grid.entries[entry])
+            body, end = walls.member(field, m), walls.member(ends, m)
+            if (not is_held_by(held, number + m)) and _may_meet(body, end, path, near):
                 return True
     return False
+
+
+@by_type
+def members_of(field):
+    """The bodies of a field."""
+    return field
+
+
+members_of.register(Posed, lambda field: field.body)
+
+
+@by_type
+def own_path(field, ends, path):
+    """A step in the frame of a field, which is `ends` at its end."""
+    return path
+
+
+@own_path.register(Posed)
+def _(field, ends, path):
+    r0, v0 = own_place(field, path.r0), in_frame(field, path.r0, path.v0)
+    return Path(r0, v0, own_place(ends, path.r1), in_frame(ends, path.r1, path.v1), path.h)
 
 
 @inlined
@@ -163,12 +184,52 @@ arrival.register(type(None), lambda chain, number, held, path, near, left: Arriv
 
 @arrival.register(Carried)
 def _(chain, number, held, path, near, left):
+    return _arrival_later(chain.walls, chain, number, held, path, near, left)
+
+
+@by_type
+def _arrival_later(rest, chain, number, held, path, near, left):
+    """`arrival` at the walls of the rest, which has so many walls before it, of a chain where some move."""
+    return Arrival(math.inf, -1.0)
+
+
+@_arrival_later.register(walls.Chain)
+def _(rest, chain, number, held, path, near, left):
     found = Arrival(math.inf, -1.0)
-    for i in range(walls.length(chain)):
-        if not is_held_by(held, float(i)):
-            time = _deep_later(chain, float(i), path, near, left)
-            if time < found.time:
-                found = Arrival(time, float(i))
+    for i in range(walls.length(rest)):
+        found = _sooner_at(chain, number + i, held, path, near, left, found)
+    return found
+
+
+@_arrival_later.register(walls.Field)
+def _(rest, chain, number, held, path, near, left):
+    later = _arrival_later(rest.rest, chain, number + walls.count(rest.first), held, path, near, left)
+    found = _arrival_among(rest, chain, number, held, path, near, left)
+    return found if found.time < later.time else later
+
+
+@outlined
+def _arrival_among(rest, chain, number, held, path, near, left):
+    """The same at the bodies of the first field of the rest."""
+    found = Arrival(math.inf, -1.0)
+    field, ends = at(Carried(rest), left).first, at(Carried(rest), left - path.h).first
+    grid = members_of(field).grid
+    block = block_of_path(grid, own_path(field, ends, path), near)
+    for k in range(size_of(block)):
+        cell = index(in_block(grid, block, k))
+        for entry in range(grid.first[cell], grid.first[cell + 1]):
+            found = _sooner_at(chain, number + grid.entries[entry], held, path, near, left, found)
+    return found
+
+
+@inlined
+def _sooner_at(chain, wall, held, path, near, left, found):
+    """The sooner one of an arrival and that at this wall."""
+    if is_held_by(held, wall):
+        return found
+    time = _deep_later(chain, wall, path, near, left)
+    if time < found.time:
+        return Arrival(time, wall)
     return found
 
 

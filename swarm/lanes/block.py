@@ -280,6 +280,7 @@ def _(rest, chain, impulse, lane, wall, given):
 
 
 @_add_of.register(walls.Chain)
+@_add_of.register(walls.Field)
 def _(rest, chain, impulse, lane, wall, given):
     _add_to(chain, impulse, 0, lane, wall, given)
 

@@ -299,7 +299,7 @@ def account(method, chain, state, lanes, i):
     rows[TRIALS, i] = 0.0
     if wall_laws.is_given(methods.friction(method)):
         lose(state, lanes, i, rows[WORK, i])
-    work(wall_laws.moving(methods.laws(method)), state, lanes, i, lanes.gained[i], rows[GIVEN, i])
+    work(wall_laws.moving(methods.laws(method)), chain, state, lanes, i, lanes.gained[i], rows[GIVEN, i])
 
 
 @inlined
@@ -312,18 +312,18 @@ def push(chain, state, lanes, i, first, second):
 
 
 @by_type
-def work(moving, state, lanes, i, twice, second):
+def work(moving, chain, state, lanes, i, twice, second):
     """Book twice the work per mass of walls that move, and of it that of the second wall."""
 
 
 @work.register(wall_laws.Moves)
-def _(moving, state, lanes, i, twice, second):
+def _(moving, chain, state, lanes, i, twice, second):
     rows, p = lanes.rows, lanes.particle[i]
     behind = state.impulse.shape[0] // 2
     state.energy[p] = 0.5 * rows[TWICE, i]
-    state.impulse[behind + int(rows[WALL, i]), p] += 0.5 * (twice - second) * state.mass[p]
+    state.impulse[behind + walls.row(chain, rows[WALL, i]), p] += 0.5 * (twice - second) * state.mass[p]
     if rows[WALL + 1, i] >= 0.0:
-        state.impulse[behind + int(rows[WALL + 1, i]), p] += 0.5 * second * state.mass[p]
+        state.impulse[behind + walls.row(chain, rows[WALL + 1, i]), p] += 0.5 * second * state.mass[p]
 
 
 @inlined

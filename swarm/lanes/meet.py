@@ -15,6 +15,7 @@ from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
+from ..surfaces.near import count_near, list_near
 from ..surfaces.openings import Openings
 from . import log as impact_log
 from .arrays import following_particle, speed2_scale
@@ -187,7 +188,7 @@ def _book_work(chain, state, i, wall, given):
 
 @_book_work.register(Carried)
 def _(chain, state, i, wall, given):
-    state.impulse[walls.length(chain) + int(wall), i] += 0.5 * given * state.mass[i]
+    state.impulse[walls.length(chain) + walls.row(chain, wall), i] += 0.5 * given * state.mass[i]
 
 
 @kernel
@@ -286,6 +287,8 @@ def _have_closed(chain, method, r, left):
 @_have_closed.register(Carried)
 def _(chain, method, r, left):
     now, deepest = at(chain, left), 0.0
-    for i in range(walls.length(chain)):
-        deepest = max(deepest, walls.distance(now, float(i), r))
+    number = scratch(count_near(now, r), np.float64)
+    list_near(now, 0, 0.0, r, number)
+    for i in range(number.size):
+        deepest = max(deepest, walls.distance(now, number[i], r))
     return deepest > events.TOUCH * method.size

@@ -299,7 +299,7 @@ def _(moving, chain, gravity, state, lanes, i):
     given = twice - rows[TWICE, i] + lost
     rows[TWICE, i], rows[KEEP, i] = twice, 0.0
     lose(state, lanes, i, lost)
-    work(moving, state, lanes, i, given, 0.0)
+    work(moving, chain, state, lanes, i, given, 0.0)
     put(rows, V, i, u)
 
 

@@ -55,7 +55,7 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     moves_on = square(v - u) > slowest or _rubs(kind, methods.laws(method), now, lanes, i, r, slowest)
     if moves_on or not _rests(kind, method, now, gravity, lanes, i, r):
         return phase_of(kind)
-    pace, low, high, met = _pace(now), 0.0, 0.0, -1.0
+    pace, low, high, met = walls.shortest_pace(now), 0.0, 0.0, -1.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0:
         step = min(pace, left - low)
@@ -101,7 +101,7 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     put(rows, R, i, r1)
     put(rows, V, i, v1)
     push(chain, state, lanes, i, pressed, pressed_second)
-    work(moving, state, lanes, i, given, 0.0)
+    work(moving, chain, state, lanes, i, given, 0.0)
     state.contacts.sliding[lanes.particle[i]] += end
     if not after > 0.0:
         return ARRIVED
@@ -127,15 +127,6 @@ def _(kind, laws, now, lanes, i, r, slowest):
     second = lanes.rows[WALL + 1, i]
     slip = column(lanes.rows, V, i) - walls.velocity(now, second, r)
     return wall_laws.number_of(wall_laws.friction(laws), second) > 0.0 and square(slip) > slowest
-
-
-@outlined
-def _pace(now):
-    """The shortest pace of all walls."""
-    shortest = walls.pace(now, 0.0)
-    for k in range(1, walls.length(now)):
-        shortest = min(shortest, walls.pace(now, float(k)))
-    return shortest
 
 
 @outlined

@@ -1,5 +1,6 @@
 """The walls of a scene as shapes to draw, for any phi: triangles, their area, and the curves of a wire frame."""
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -77,10 +78,11 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
     for i, surface in enumerate(scene.surfaces):
         name = f"{i}_{type(surface).__name__.lower()}"
         if isinstance(surface, Spheres):
-            shapes.append(Shape(name, True, *_balls(surface)))
+            shapes.append(_placed(Shape(name, True, *_balls(surface)), scene.poses(time)[i]))
             continue
         if isinstance(surface, Many) or i in grouped:
-            shapes.append(Shape(name, True, *_bodies(surface, box)))
+            pose = scene.poses(time)[i]
+            shapes.append(_placed(Shape(name, True, *_bodies(surface, _given(box, pose))), pose))
             continue
         own = _of_surface(still, i, *coarse)
         around = _around(own[0], box) if len(own[0]) else _near(surface, scene.poses(time)[i], box)
@@ -89,6 +91,18 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
         wires = _wires(still, i, vertices, box) if len(vertices) else []
         shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
     return shapes
+
+
+def _placed(shape: Shape, pose: Pose) -> Shape:
+    """A shape where its surface is now."""
+    vertices, normals = pose.placed(shape.vertices.T).T, pose.turned(shape.normals.T).T
+    return replace(shape, vertices=vertices, normals=normals, wires=[pose.placed(wire.T).T for wire in shape.wires])
+
+
+def _given(box: Corners, pose: Pose) -> Corners:
+    """A box around a box of the scene in the frame in which a surface is given."""
+    corners = pose.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
+    return corners.min(axis=1), corners.max(axis=1)
 
 
 def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:

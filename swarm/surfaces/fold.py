@@ -5,6 +5,7 @@ before all other walls: whether a scene has one is the type of its chain.
 """
 
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -110,6 +111,18 @@ def _(chain, wall):
 
 
 row.register(Listed, lambda chain, wall: int(wall))
+
+
+@by_type
+def shortest_pace(chain):
+    """The shortest pace of all walls."""
+    return math.inf
+
+
+@shortest_pace.register(Chain)
+@shortest_pace.register(Field)
+def _(chain):
+    return min(contract.pace(chain.first), shortest_pace(chain.rest))
 
 
 # --- A function of one wall ------------------------------------------------------------------------------
@@ -235,7 +248,6 @@ velocity = of_wall(contract.velocity, ZERO)
 acceleration = of_wall(contract.acceleration, ZERO)
 carry = of_wall(contract.carry, ZERO)
 mean_velocity = of_wall(contract.mean_velocity, ZERO)
-pace = of_wall(contract.pace, 0.0)
 way = of_wall(contract.way, ZERO)
 unit_normal = of_wall(contract.unit_normal, ZERO)
 settle = of_wall(contract.settle, ZERO)

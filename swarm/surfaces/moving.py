@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..kernel.jit import by_type
 from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of, pose
-from .fold import Chain, length
+from .fold import Chain, Field, count, length, member, row
 from .posed import Drifting, Posed
 from .surface import Surface
 
@@ -35,11 +35,11 @@ class Following(NamedTuple):
 class Carried(NamedTuple):
     """The walls of a scene, some of which move, all of them uniformly."""
 
-    walls: Chain
+    walls: Chain | Field
 
 
 class Marched(Carried):
-    """The same where others move in any other way: flights to these end by safe steps."""
+    """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""
 
 
 class Strided(Marched):
@@ -47,18 +47,23 @@ class Strided(Marched):
 
 
 length.register(Carried, lambda chain: length(chain.walls))
+row.register(Carried, lambda chain, wall: row(chain.walls, wall))
 
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def carried(surfaces: Sequence[Surface], moment: float) -> Chain | Carried | None:
-    """The walls of a scene in the frame that ends at a moment [s]."""
+def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float) -> Chain | Field | Carried | None:
+    """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others."""
     of_surfaces = [_walls_of(surface, moment) for surface in surfaces]
-    chain = None
+    chain: Chain | Field | None = None
     for wall in reversed([wall for walls in of_surfaces for wall in walls]):
         chain = Chain(wall, chain)
-    if chain is None or all(surface.motion is None for surface in surfaces):
+    for field in reversed(fields):
+        chain = Field(_walls_of(field, moment)[0], chain)
+    if chain is None or all(surface.motion is None for surface in (*fields, *surfaces)):
         return chain
+    if fields:
+        return Marched(chain)
     marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]
     if not marched:
         return Carried(chain)
@@ -111,6 +116,12 @@ def _(chain, last, left, after):
     return Chain(made, _during(chain.rest, made, left, after))
 
 
+@_during.register(Field)
+def _(chain, last, left, after):
+    made = _wall(chain.first, None, left, after)
+    return Field(made, _during(chain.rest, None, left, after))
+
+
 @by_type
 def _wall(wall, last, left, after):
     return wall
@@ -137,3 +148,9 @@ def _with(last, body):
 
 _with.register(Posed, lambda last, body: Posed(body, last.pose, last.end, last.drive, last.left, last.after))
 _with.register(Drifting, lambda last, body: Drifting(body, last.pose, last.end, last.drive, last.left, last.after))
+
+# --- Of a field that moves -------------------------------------------------------------------------------
+
+count.register(Moving, lambda members: count(members.body))
+count.register(Posed, lambda members: count(members.body))
+member.register(Posed, lambda members, wall: _with(members, member(members.body, wall)))

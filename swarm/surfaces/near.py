@@ -63,6 +63,12 @@ def one_in_cell(members, k, r):
     raise NotImplementedError
 
 
+@by_type_outlined
+def deepest_in_cell(members, r):
+    """The largest distance outside of the admissible side of any of them."""
+    raise NotImplementedError
+
+
 @by_type
 def until_next_cell(members, r, v):
     """When a straight flight may meet another one."""

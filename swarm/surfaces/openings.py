@@ -18,9 +18,9 @@ from ..kernel.gravity import Nothing
 from ..kernel.jit import by_type, select
 from . import contract, required
 from .fields.many import Many
-from .fields.members import deepest
 from .fold import Chain, Field, chain_of
 from .images import Lengths, images_of
+from .near import deepest_in_cell
 from .room import has_room
 from .surface import SIDES, Surface
 
@@ -169,7 +169,7 @@ def _(volume, r):
 
 
 outside.register(Nothing, lambda volume, r: -math.inf)
-outside.register(Field, lambda volume, r: -deepest(volume.first, r))
+outside.register(Field, lambda volume, r: -deepest_in_cell(volume.first, r))
 
 
 @by_type

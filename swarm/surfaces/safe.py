@@ -4,14 +4,18 @@ import math
 from typing import Any, NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, by_type_outlined, outlined, select
+from ..kernel.jit import by_type, by_type_outlined, index, outlined, select
 from ..kernel.vector import ZERO
 from ..motion import Guide
 from . import contract, flights
 from .drive import drive_of
-from .flights import NEVER, Hit, hit, sooner
-from .fold import Chain
-from .moving import Marched, Moving, at
+from .fields.grid import cell_of
+from .fields.members import Members, member
+from .fields.moved import until_next_in_frame
+from .flights import NEVER, Hit, field_hit, hit, sooner, soonest
+from .fold import Chain, Field, count
+from .moving import Following, Marched, Moving, Translated, at
+from .near import until_next_cell
 from .posed import Drifting, Posed
 from .relative import Framed, bounds_of, flight_of, motion_of, seen_at
 from .rising import safe_step
@@ -55,6 +59,41 @@ def _(chain, number, last, flight, t, longest):
     mine = motion_of(chain.first, last, flight, t)
     rest = _nearest(chain.rest, number + 1.0, mine, flight, t, longest)
     return _nearer(mine, chain.first, number, rest, longest)
+
+
+@_nearest.register(Field)
+def _(chain, number, last, flight, t, longest):
+    rest = _nearest(chain.rest, number + count(chain.first), None, flight, t, longest)
+    return _nearest_of_field(chain.first, number, rest, flight, t, longest)
+
+
+@by_type
+def _nearest_of_field(field, number, rest, flight, t, longest):
+    """The `Nearest` of the bodies of a field and the rest."""
+    return rest
+
+
+@_nearest_of_field.register(Moving)
+def _(field, number, rest, flight, t, longest):
+    return _nearest_in_cell(field, number, rest, flight, t, longest)
+
+
+_nearest_of_field.register(Translated, lambda field, number, rest, flight, t, longest: rest)
+
+
+@outlined
+def _nearest_in_cell(field, number, rest, flight, t, longest):
+    """The same by the bodies of the cell in which a particle is then; to leave the cell ends a step, but is no hit."""
+    grid, mine = field.body.grid, Framed(field.drive, seen_at(field.drive, flight, t))
+    until, found = until_next_in_frame(grid, field.drive, mine.seen, min(rest.time, longest)), rest
+    if until < rest.time:
+        found = Nearest(until, -1.0, math.inf, 0.0, rest.past, rest.depth)
+    cell = index(cell_of(grid, mine.seen.r).number)
+    for k in range(grid.first[cell], grid.first[cell + 1]):
+        m = grid.entries[k]
+        body = Following(member(field.body, index(m)))
+        found = _nearer(mine, body, number + m, found, min(found.time, longest))
+    return found
 
 
 @by_type
@@ -131,6 +170,8 @@ def _needs_steps(surface: Surface) -> bool:
 
 
 def _is_unknown(wall: Any) -> bool:
+    if isinstance(wall, Members):
+        return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
     own = safe_step.dispatch(type(wall)) is safe_step.dispatch(object)
@@ -214,6 +255,21 @@ def _(chain, gravity, r, v):
     return sooner(time, found, rest)
 
 
+@closed_hit.register(Field)
+def _(chain, gravity, r, v):
+    rest = closed_hit(chain.rest, gravity, r, v)
+    return soonest(_closed_in_field(chain.first, gravity, r, v), rest, count(chain.first))
+
+
+@by_type
+def _closed_in_field(field, gravity, r, v):
+    return field_hit(field, gravity, r, v)
+
+
+_closed_in_field.register(Posed, lambda field, gravity, r, v: NEVER)
+_closed_in_field.register(Drifting, lambda field, gravity, r, v: field_hit(field, gravity, r, v))
+
+
 @by_type
 def _closed(surface, gravity, r, v):
     return hit(gravity, surface, r, v)
@@ -232,3 +288,21 @@ def _alone(surface, r, v, pull):
 
 contract.first_hit.register(Posed, lambda surface, r, v: _alone(surface, r, v, ZERO))
 contract.falling_hit.register(Posed, lambda surface, r, v, pull: _alone(surface, r, v, pull))
+
+
+@outlined
+def _field_alone(field, r, v, pull):
+    """The first hit of a flight with the bodies of a field, or how far it is surely free."""
+    chain = Field(Moving(field.body, field.drive), None)
+    return march(chain, flight_of(r, v, pull, field.left), field.left)
+
+
+@field_hit.register(Posed)
+def _(members, gravity, r, v):
+    return _field_alone(members, r, v, accelerated(gravity, ZERO, 1.0))
+
+
+@until_next_cell.register(Posed)
+def _(members, r, v):
+    seen = seen_at(members.drive, flight_of(r, v, ZERO, members.left), 0.0)
+    return until_next_in_frame(members.body.grid, members.drive, seen, members.left)

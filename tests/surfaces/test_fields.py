@@ -221,8 +221,6 @@ def test_what_knows_no_fields_says_so():
             swarm.simulate(scene, start, method, until=0.1)
     with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres with bodies and soft walls"):
         swarm.simulate(scene, swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Penalty(1e-3, 1e5), until=0.1)
-    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres where a surface moves"):
-        swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=swarm.Translation((0.1, 0.0, 0.0))), field])
 
 
 def test_other_methods_take_listed_solids_one_by_one():

@@ -9,6 +9,7 @@ from ...kernel.gravity import Gravity, Nothing
 from ...kernel.jit import Array, by_type, inlined, select
 from ...kernel.vector import Vec
 from ..course import rise_time
+from ..relative import Bounds
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.
@@ -153,6 +154,20 @@ def _(gravity, axis, cells, place, x, v):
         select(among, a, sign * a),
     )
     down = rise_time(low + place * width - margin - x, -b, -a)
+    return select(among & (down < up), down, up)
+
+
+@_along.register(Bounds)
+def _(gravity, axis, cells, place, x, v):
+    # At the soonest: the acceleration, along whatever axis, is no more than its bound.
+    low, width, margin, count = cells
+    b, a = 0.5 * v, 0.5 * gravity.acceleration
+    among, below = (place >= 0.0) & (place < count), place < 0.0
+    sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
+    up = rise_time(
+        select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)), select(among, b, sign * b), a
+    )
+    down = rise_time(low + place * width - margin - x, -b, a)
     return select(among & (down < up), down, up)
 
 

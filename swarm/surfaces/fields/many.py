@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ... import motion as motions
 from ...errors import SceneError
 from ..surface import UNBOUNDED, Box, Surface
 from .entering import grid_of
@@ -40,7 +41,7 @@ class Many(Surface):
         side, name = getattr(self, "side", "outside"), type(self).__name__
         if side != "outside":
             raise SceneError(f'side must be "outside" for {name}, which are solids, got {side!r}')
-        for what in ("rotation", "motion", "mass", "inertia"):
+        for what in ("rotation", "mass", "inertia"):
             if getattr(self, what) is not None:
                 raise SceneError(f"{what} must be None for {name}, got {getattr(self, what)!r}")
 
@@ -117,14 +118,15 @@ class Many(Surface):
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """phi of the nearest body at points (3, N): below 0 in it, above 0 outside of all; shape (N,)."""
-        return np.asarray(self._of_nearest(points)[3])
+        return np.asarray(self._of_nearest(points, time)[3])
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of that phi at points (3, N); shape (3, N)."""
-        return self._of_nearest(points)[:3]
+        found = self._of_nearest(points, time)[:3]
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
-    def _of_nearest(self, points: ArrayLike) -> NDArray[np.float64]:
-        rows = self._own_rows(points, 0.0)
+    def _of_nearest(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        rows = self._own_rows(points, time)
         flat = np.ascontiguousarray(np.array(rows).reshape(3, -1))
         found = np.empty((4, flat.shape[1]))
         with np.errstate(all="ignore"):

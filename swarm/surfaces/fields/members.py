@@ -180,9 +180,8 @@ def _(members, r, v):
     return until_next(None, members.grid, cell_of(members.grid, r), r, v)
 
 
-@outlined
-def deepest(members, r):
-    """The largest distance outside of the admissible side of any body."""
+@near.deepest_in_cell.register(Members)
+def _(members, r):
     grid, most = members.grid, -math.inf
     cell = index(cell_of(grid, r).number)
     for k in range(grid.first[cell], grid.first[cell + 1]):
