@@ -135,19 +135,9 @@ def _look_at_near(gravity, members, before, lanes, live):
             _give_back(seen, lanes, i)
 
 
-@by_type
+@inlined
 def _find_near(members, gravity, lanes, live, seen):
     """Which bodies are near each lane, and until when it knows that."""
-
-
-@_find_near.register(Few)
-def _(members, gravity, lanes, live, seen):
-    for i in range(index(live)):
-        seen.first[i], seen.number[i] = 0, members.table.shape[0]
-
-
-@_find_near.register(Members)
-def _(members, gravity, lanes, live, seen):
     grid = members.grid
     for i in range(index(live)):
         r = column(lanes.rows, R, i)

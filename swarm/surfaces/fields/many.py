@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
 from ...errors import SceneError
+from ..shapes.sphere import SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .entering import grid_of
 from .grid import one_cell
@@ -17,9 +18,11 @@ from .members import Few, Members, alike, nearest, table_of
 from .within import within
 
 Floats = NDArray[np.float64]
-# So many bodies are looked at one after the other, by all lanes together. In a sphere an impact among 5, 16 and 40
-# takes 31, 56 and 180 ns, from cell to cell 72, 120 and 260; under gravity cells are faster from 16 on.
-FEW = 24
+# So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
+# impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
+# longer, fewer; and in a cell that repeats, whose faces end flights too: among 27 balls 87 ns, from cell to cell 52.
+# Under gravity cells are faster from 16 on: so few are in one cell.
+_FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
 _COLUMNS = {
     "centers": ("x", "y", "z"), "radii": ("radius",), "lengths": ("length",),
     "axes": ("axis_x", "axis_y", "axis_z"), "half_widths": ("half_x", "half_y", "half_z"),
@@ -144,9 +147,11 @@ def field_of(
     like: Any, table: Floats, corners: Callable[[], tuple[Floats, Floats]], repeated: tuple[Floats, Floats] | None
 ) -> Members:
     """The field of the bodies of a table, with their bounds."""
-    if len(table) <= FEW:
+    if len(table) <= _IN_ONE_CELL:
         return Few(like, table, one_cell(len(table)))
-    return Members(like, table, grid_of(like, table, corners(), repeated))
+    few = _FEW_BALLS if repeated is None and isinstance(like, SphereNumbers) else _FEW
+    kind = Few if len(table) <= few else Members
+    return kind(like, table, grid_of(like, table, corners(), repeated))
 
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:

@@ -36,7 +36,7 @@ class Members(NamedTuple):
 
 
 class Few(Members):
-    """So few bodies that each lane looks at all of them, faster than from cell to cell; the grid is one cell."""
+    """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
 
 
 @inlined
