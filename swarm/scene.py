@@ -25,12 +25,13 @@ from .surfaces.fields.many import Many, members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
+from .surfaces.instant import box_of, gaps_of, gradient_of, planes_of
 from .surfaces.moving import Carried, carried
 from .surfaces.openings import Openings, openings_in, require_few, volumes_of
 from .surfaces.period import Period
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.room import has_room
-from .surfaces.surface import SIDES, UNBOUNDED, Box, HalfSpace, Surface
+from .surfaces.surface import UNBOUNDED, Box, Surface
 
 # Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
 MOST_WALLS = 24
@@ -268,7 +269,7 @@ class Scene:
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
-        return np.array([_gaps(images, rows, time).max(axis=0) for images in self._images])
+        return np.array([gaps_of(images, rows, time).max(axis=0) for images in self._images])
 
     def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
@@ -278,7 +279,7 @@ class Scene:
             if isinstance(image, Many):
                 admitted[admitted] = ~image.contain(rows[:, admitted])
             else:
-                admitted &= _gaps((image,), rows, 0.0)[0] <= 0.0
+                admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
         return admitted
 
     def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
@@ -291,7 +292,7 @@ class Scene:
             slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
             # At the centre of a ball the slope is 0, and a point is as far inside as can be.
             with np.errstate(over="ignore"):
-                found.append((_gaps(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
+                found.append((gaps_of(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
         return np.array(found)
 
     def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
@@ -317,7 +318,7 @@ class Scene:
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
         """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
         faces = [
-            (*n, offset) for surface in self.surfaces for n, offset in _placed(surface, surface.open_faces(), time)
+            (*n, offset) for surface in self.surfaces for n, offset in planes_of(surface, surface.open_faces(), time)
         ]
         rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
         # Through a face across the period nobody leaves.
@@ -332,12 +333,12 @@ class Scene:
 
     def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that some of the surfaces leave, and the cell that repeats."""
-        boxes = np.array([_box(surface, time) for surface in surfaces] or [UNBOUNDED])
+        boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
         if self.period is not None:
             corners = np.array(cell_of(self.period))
             low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
-        planes = [plane for surface in surfaces for plane in _placed(surface, surface.half_spaces(), time)]
+        planes = [plane for surface in surfaces for plane in planes_of(surface, surface.half_spaces(), time)]
         if planes:
             low, high = polyhedron_bounds(planes, low, high)
         return low, high
@@ -349,7 +350,7 @@ class Scene:
         # Open directions are searched as far as the scene itself extends.
         reach = 2.0 * self.extent()
         low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
-        return has_room(low, high, self.gaps, lambda i, points: _gradient(self._images[i], points))
+        return has_room(low, high, self.gaps, lambda i, points: gradient_of(self._images[i], points))
 
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
@@ -362,49 +363,7 @@ class Scene:
         return tuple(images_of(self.surfaces[i], self.period, f"surfaces[{i}]"))
 
 
-def _gaps(images: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """Signed gap of every image of a surface, (images, N)."""
-    return np.array([_side(image) * image.phi(points, time) for image in images])
-
-
-def _gradient(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Gradient of the gap of the image that has the largest one, (3, N)."""
-    gradients = np.array([_side(image) * image.gradient(points) for image in images])
-    worst = _gaps(images, points, 0.0).argmax(axis=0) if len(images) > 1 else np.zeros(points.shape[1], np.int64)
-    return np.asarray(gradients[worst, :, np.arange(points.shape[1])].T)
-
-
-def _box(surface: Surface, time: float) -> Box:
-    """The bounds of a surface at a time [s]."""
-    low, high = (np.array(corner) for corner in surface.bounds())
-    if surface.motion is not None:
-        found = motions.pose(surface.motion, time)
-        if np.array_equal(found.turn, np.eye(3)):
-            low, high = low + found.shift, high + found.shift
-        elif np.isfinite([low, high]).all():
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            middle, half = found.placed(middle[:, None])[:, 0], np.abs(found.turn) @ half
-            low, high = middle - half, middle + half
-        else:
-            low, high = np.full(3, -math.inf), np.full(3, math.inf)
-    return tuple(low.tolist()), tuple(high.tolist())
-
-
-def _placed(surface: Surface, planes: list[HalfSpace], time: float) -> list[HalfSpace]:
-    """Half-spaces of a surface at a time [s]."""
-    if surface.motion is None or not planes:
-        return planes
-    found = motions.pose(surface.motion, time)
-    normals = found.turned(np.array([normal for normal, _offset in planes]).T)
-    offsets = np.array([offset for _normal, offset in planes]) + (normals * found.position()[:, None]).sum(axis=0)
-    return [(tuple(normal), offset) for normal, offset in zip(normals.T.tolist(), offsets.tolist(), strict=True)]
-
-
 def _thermal(surface: Surface) -> Thermal:
     if surface.temperature is None:
         return _NO_HEAT
     return Thermal(surface.temperature, surface.accommodation)
-
-
-def _side(surface: Surface) -> float:
-    return SIDES[getattr(surface, "side", "inside")]
