@@ -11,9 +11,14 @@ from .errors import SceneError
 Floats = NDArray[np.float64]
 # What a ball and another body take at most while their table and the grid of cells are made [bytes]: of balls these are
 # arrays (260 measured), of others an object for each first (2000 capsules, 2750 cylinders).
-BALL, _BODY = 300, 3000
+_BALL, _BODY = 300, 3000
 # So many fit on every machine.
 _FEW = 1_000_000
+
+
+def balls(name: str, value: ArrayLike) -> Floats:
+    """`value` as points (n, 3), one a ball."""
+    return bodies(name, value, _BALL)
 
 
 def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...rows import BALL, bodies, lengths
+from ...rows import balls, lengths
 from ..shapes.sphere import SphereNumbers
 from .many import Floats, Many, field_of
 from .members import Members, aligned, gathered
@@ -40,7 +40,7 @@ class Spheres(Many):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers, BALL))
+        object.__setattr__(self, "centers", balls("centers", self.centers))
         object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
 
     def size(self) -> float:
