@@ -261,6 +261,10 @@ def judge(stops, levels, middles, time, found, near, touch):
 # --- One flight ------------------------------------------------------------------------------------------
 
 
+# A unit of time [s] longer than every flight in the tests, whose powers are still numbers.
+_LONGEST = 2.0**100
+
+
 class Flight:
     """The exact level of a surface's walls along one flight. Times are in seconds."""
 
@@ -277,7 +281,7 @@ class Flight:
             for k, part in enumerate(one.parts)
             if k and part > 0.0 and one.parts[0] > 0.0
         ]
-        self.unit = 2.0 ** round(math.log2(min(times, default=1.0)))
+        self.unit = 2.0 ** round(math.log2(min(*times, _LONGEST) if times else 1.0))
         self.polynomials = [
             [part * Fraction(self.unit) ** k for k, part in enumerate(one.parts)] for one in polynomials
         ]
