@@ -29,7 +29,8 @@ def places(n, seed=1):
 @pytest.fixture(autouse=True)
 def cells(monkeypatch):
     """Fields of a few bodies have cells too."""
-    monkeypatch.setattr(many, "FEW", 0)
+    for limit in ("_FEW", "_FEW_BALLS", "_IN_ONE_CELL"):
+        monkeypatch.setattr(many, limit, 0)
 
 
 @pytest.mark.parametrize(
