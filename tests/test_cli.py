@@ -308,14 +308,14 @@ def test_a_second_interrupt_ends_at_once_without_a_traceback(folder):
     code = INTERRUPTED.format(name="nothing").replace(
         "from swarm.__main__",
         """
-from swarm import cli
 from swarm.run import simulation
 real = simulation.Frame
 def frame(*about):
     signal.raise_signal(signal.SIGINT)
     return real(*about)
 simulation.Frame = frame
-cli._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
+from swarm.commands import run
+run._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
 from swarm.__main__""",
     )
     done = subprocess.run(

@@ -518,6 +518,7 @@ LAYERS = [
     ["__init__"],
     ["__main__"],
     ["cli"],
+    ["commands"],
     ["scene_file", "summary"],
     ["run"],
     ["output"],

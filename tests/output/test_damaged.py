@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import cli, scene_file, summary
+from swarm import scene_file, summary
+from swarm.commands import pictures
 from swarm.output import checkpoint, paths, playback, plots, recording, superblock
 
 SCENE = swarm.Scene([swarm.Sphere(0.5)])
@@ -266,7 +267,7 @@ def test_one_frame_is_drawn_recorded_and_told(whole):
         plots.draw(trajectory, whole.with_suffix(".png"))
         recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
     assert whole.with_suffix(".png").stat().st_size > 20_000
-    cli.view(whole.with_suffix(".rrd"), whole.with_suffix(".pdf"), None, False)
+    pictures.view(whole.with_suffix(".rrd"), whole.with_suffix(".pdf"), None, False)
 
 
 def test_no_frame_is_a_sentence(whole):

@@ -1,0 +1,26 @@
+"""`swarm info`: what a file holds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import SceneError
+from .shown import table
+
+
+def info(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A trajectory (.h5) or a recording (.rrd).")],
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Repair a recording that a crash truncated, in place.")
+    ] = False,
+) -> None:
+    """Show what a trajectory or a recording holds."""
+    from .. import summary
+
+    if file.suffix == ".rrd":
+        table(summary.of_recording(file, repair))
+    elif repair:
+        raise SceneError(f"--repair is for recordings (.rrd), got {file}; a trajectory needs none")
+    else:
+        table(summary.of_trajectory(file))

@@ -1,0 +1,100 @@
+"""`swarm record`, `swarm view` and `swarm plot`: recordings and pictures."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import SceneError
+
+
+def record(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
+    ] = None,
+    particles: Annotated[int, typer.Option(help="Most particles, or points of bodies, recorded.")] = 5000,
+    color: Annotated[str, typer.Option(help="Colour by speed or energy-error.")] = "speed",
+    megabytes: Annotated[float, typer.Option(help="Largest size; if needed, every k-th frame is recorded.")] = 100.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
+) -> None:
+    """Make a Rerun recording of a trajectory."""
+    from ..extras import needed_by
+
+    with needed_by("a recording", "record"):
+        from ..output import recording
+    from ..output import paths
+    from ..output.trajectory import load
+
+    target = paths.target_of("recording", output or file.with_suffix(".rrd"))
+    paths.check_distinct({"recording": target}, {"trajectory": file})
+    with load(file) as trajectory:
+        recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
+    print(f"written to {target} ({target.stat().st_size / 1e6:.1f} MB)")
+
+
+def view(
+    file: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="A recording.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
+    ] = None,
+    times: Annotated[
+        str | None, typer.Option(help="Frames near these times [s], as 0,5,10 [default: first, middle, last].")
+    ] = None,
+    viewer: Annotated[
+        bool | None,
+        typer.Option(
+            "--viewer/--no-viewer", help="By the Rerun viewer or by matplotlib [default: the viewer if it can]."
+        ),
+    ] = None,
+) -> None:
+    """Draw a contact sheet of a recording; no screen and no GPU are needed."""
+    from ..extras import needed_by
+
+    with needed_by("a contact sheet", "record"):
+        from ..output.playback import Playback
+    with needed_by("a contact sheet", "plot"):
+        from ..output import sheet
+
+    target = output or file.with_suffix(".png")
+    _check_picture(target, file)
+    by = sheet.draw(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
+    print(f"written to {target}; drawn by {by}")
+
+
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
+    ] = None,
+) -> None:
+    """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
+    from ..extras import needed_by
+
+    with needed_by("a plot", "plot"):
+        from ..output import plots
+    from ..output.trajectory import load
+
+    target = output or file.with_suffix(".png")
+    _check_picture(target, file)
+    with load(file) as trajectory:
+        plots.draw(trajectory, target)
+    print(f"written to {target}")
+
+
+def _check_picture(target: Path, source: Path) -> None:
+    """Raise a SceneError if the picture cannot be written; an old one is cheap to redraw, so overwritten."""
+    from ..output.paths import check_distinct, check_target
+
+    check_distinct({"picture": target}, {"file that it is drawn from": source})
+    check_target(target, overwrite=True, what="picture")
+    if target.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise SceneError(f"picture: expected a file name that ends in .png, .pdf or .svg, got {target}")
+
+
+def _numbers(name: str, text: str) -> list[float]:
+    """Comma-separated numbers."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"{name} must be comma-separated numbers, got {text!r}") from None

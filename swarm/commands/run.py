@@ -1,0 +1,140 @@
+"""`swarm run`: simulate a scene file."""
+
+import dataclasses
+import itertools
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import interrupt
+from ..errors import CompleteError, SwarmError, WallTimeError
+from .shown import table
+
+_INTERRUPTED = 130
+
+
+def run(  # noqa: PLR0913  one argument an option
+    scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene, the method and the run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Threads [default: all cores]; results do not depend on it.")
+    ] = None,
+    recording: Annotated[
+        Path | None, typer.Option("--record", metavar="OUT.rrd", help="Recording for Rerun and swarm view.")
+    ] = None,
+    impacts: Annotated[
+        Path | None, typer.Option("--impacts", metavar="OUT.h5", help="Log of every impact, for swarm.load_impacts.")
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Show the run in a Rerun viewer.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
+    ] = False,
+    walltime: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
+    ] = None,
+    compile: Annotated[
+        str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the outcome of the run as JSON, also if it fails.")
+    ] = False,
+) -> None:
+    """Simulate a scene file and write its trajectory."""
+    # An exception in the middle of an import may be lost; nothing is open yet.
+    with interrupt.at_once():
+        from .. import scene_file as files
+        from ..checks import duration
+        from ..output import paths
+        from ..run.simulation import carry_out
+        from ..summary import numbers, of_result
+
+    def report(status: str, written: Path | None = None, **more: Any) -> None:
+        if as_json:
+            print(json.dumps({"status": status, **(numbers(written) if written else {}), **more}, indent=2))
+
+    try:
+        with interrupt.at_once():
+            job = files.read(scene_file)
+            stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
+            target = paths.target_of("trajectory", output or stored)
+            options = dataclasses.replace(
+                job.run,
+                trajectory=target,
+                recording=recording or (None if resume else job.run.recording),
+                impacts=impacts or job.run.impacts,
+                live=live,
+                threads=job.run.threads if threads is None else threads,
+                progress=not quiet,
+                overwrite=overwrite,
+                scene_text=job.text,
+                resume=resume,
+                walltime=None if walltime is None else duration("--walltime", walltime),
+                compile=compile or job.run.compile,
+            )
+            # Before particles are made and kernels compiled.
+            inputs = {"scene file": scene_file, "file of the start": job.start_file()}
+            paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
+            paths.check_target(target, overwrite or resume)
+            if options.impacts is not None:
+                paths.check_target(options.impacts, overwrite or resume, "impacts")
+            if options.recording is not None:
+                paths.check_target(options.recording, overwrite, "recording")
+            before, start = paths.identity(target), job.start()
+            resumes = resume and paths.checkpoint_of(target).exists()
+        result = carry_out(job.scene, start, job.method, options)
+    except (KeyboardInterrupt, WallTimeError) as stop:
+        status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
+        # The files are closed: a second signal may end the process here.
+        with interrupt.at_once():
+            has_frames = target.exists() and (resumes or paths.identity(target) != before)
+            again = _stopped(status, target, has_frames)
+            if has_frames:
+                report(status, target, resume=again)
+            else:
+                report(status, frames=0, resume=again)
+        raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
+    except CompleteError as error:
+        print(error, file=sys.stderr)
+        report("complete", target)
+        return
+    except SwarmError as error:
+        report("failed", error=str(error))
+        raise
+    report("complete", target, wall_time=result.wall_time)
+    if not (quiet or as_json):
+        table(of_result(result, getattr(start, "volume", None)))
+
+
+def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
+    """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
+    from ..output import paths
+
+    reason = "interrupted" if status == "interrupted" else "the wall time limit is reached"
+    if not has_frames:
+        print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
+        return None
+    held = f"{reason}: {target} holds the frames that were finished"
+    if not paths.checkpoint_of(target).exists():
+        print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
+        return None
+    command = shlex.join(["swarm", *_arguments_again(sys.argv[1:]), "--resume"])
+    print(f"{held}; resume with\n  {command}", file=sys.stderr)
+    return command
+
+
+def _arguments_again(words: list[str]) -> list[str]:
+    """The arguments of this command, without those that do not apply to a resumed run."""
+    again: list[str] = []
+    for before, word in itertools.pairwise(["", *words]):
+        name = word.partition("=")[0]
+        if name not in ("--overwrite", "--resume", "--live", "--record") and before != "--record":
+            again.append(word)
+    return again
