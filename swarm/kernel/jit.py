@@ -24,7 +24,7 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
-from .parts import PartCompiler
+from .parts import KernelCompiler, PartCompiler
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -36,6 +36,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 # instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
 # through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+# C calls no kernel.
+_KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": KernelCompiler, **_FLAGS}
 # Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
 _OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
@@ -65,7 +67,7 @@ _find_scipy_only()
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    compiled: F = cache.kept(function, _FLAGS)
+    compiled: F = cache.kept(function, _KERNEL)
     return compiled
 
 

@@ -4,12 +4,33 @@ By itself Numba optimises each function, with all that it calls, and makes machi
 kernel links the text. For the 180 functions of `Impact` in an ellipsoid around a ball, under gravity, that was 3.9 of
 11.2 s. A kernel is no slower this way: 11.3 instead of 13.3 ns an impact of a fall in a sphere, 20.5 instead of 22.0 ns
 with Uzawa's loop, 5.4 and 5.4 ns in a sphere.
+
+What is left is Numba's own Python, 40 ms a helper. So helpers skip the passes that find nothing in them, and nothing is
+collected while a kernel compiles. Tried, and no faster: LLVM's passes of each function left to those of the kernel.
 """
 
+import contextlib
+import gc
+import inspect
+from collections.abc import Iterator
 from typing import Any
 
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+
+# Of closures, `literally`, functions that Numba itself is to inline, and expressions of whole arrays.
+_SKIPPED = (
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.InlineOverloads,
+    typed_passes.NopythonRewrites,
+    typed_passes.DumpParforDiagnostics,
+)
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]
@@ -36,6 +57,35 @@ class PartCompiler(Compiler):  # type: ignore[misc]
     """Numba's compiler for helpers, by `pipeline_class`, an option of `jit`."""
 
     def define_pipelines(self) -> Any:
-        """The passes of Numba, into a library that is a `_Part`."""
+        """The passes of Numba that a helper needs, into a library that is a `_Part`."""
         self.state.library = _Part(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        return super().define_pipelines()
+        pipelines: Any = super().define_pipelines()
+        # A user's function may have functions in it.
+        if not any(map(inspect.iscode, self.state.func_id.code.co_consts)):
+            for pipeline in pipelines:
+                pipeline.passes = [each for each in pipeline.passes if each[0] not in _SKIPPED]
+                pipeline.finalize()
+        return pipelines
+
+
+class KernelCompiler(Compiler):  # type: ignore[misc]
+    """Numba's compiler for kernels: what they are made of lives until they are done, so nothing is collected.
+
+    A search for garbage walks through all of it again and again, an eighth of the time.
+    """
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile a kernel with its helpers."""
+        with _uncollected():
+            return super().compile_extra(func)
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
