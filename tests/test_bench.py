@@ -165,6 +165,7 @@ def test_motion_quick():
         assert row in told
 
 
+@pytest.mark.long
 def test_fields_quick():
     told = printed("fields")
     for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):

@@ -1,5 +1,6 @@
 """Walls that move: the same physics in every frame, hits that none skips, work that is booked, contacts that last."""
 
+import itertools
 import math
 import re
 
@@ -113,10 +114,10 @@ def first_hit_by_scan(scene, r, v, pull, start, end, samples=4000):
         place = (r + v * t + 0.5 * t * t * np.array(pull))[:, None]
         return scene.gaps(place, start + t).max()
 
-    times = np.linspace(0.0, end, samples)
-    values = np.array([gap(t) for t in times])
-    found = np.flatnonzero((values[:-1] <= 0.0) & (values[1:] > 0.0))
-    return brentq(gap, times[found[0]], times[found[0] + 1], xtol=1e-15, rtol=9e-16) if found.size else math.inf
+    for low, high in itertools.pairwise((t, gap(t)) for t in np.linspace(0.0, end, samples)):
+        if low[1] <= 0.0 < high[1]:
+            return brentq(gap, low[0], high[0], xtol=1e-15, rtol=9e-16)
+    return math.inf
 
 
 @pytest.mark.parametrize("pull", [(0.0, 0.0, 0.0), (0.3, 0.0, -2.0)], ids=["straight", "falling"])
