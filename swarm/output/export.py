@@ -1,8 +1,8 @@
 """Trajectories in the formats of other programs, chosen by the suffix of the file.
 
 .vtkhdf (vtkhdf.py) for ParaView and VTK, .xyz (xyz.py) for OVITO and ASE, .gsd (gsd.py) for HOOMD-blue and freud.
-A frame is in memory at a time. Of 10 000 particles and 500 frames on one core, read and written: 2 s as .vtkhdf (448 MB
-in float64), 12 s as .xyz (650 MB), 2 s as .gsd (220 MB).
+A frame is in memory at a time. 10 000 particles and 500 frames take, read and written, 0.9 s of one core and 280 MB as
+.vtkhdf, 5.5 s and 660 MB as .xyz, 1.1 s and 200 MB as .gsd.
 """
 
 import contextlib
