@@ -41,6 +41,13 @@ def numbers(trajectory: Path) -> dict[str, Any]:
     }
 
 
+def of_file(file: Path) -> dict[str, str]:
+    """What an HDF5 file holds."""
+    from .output.stored import is_log
+
+    return of_impacts(file) if is_log(file) else of_trajectory(file)
+
+
 def of_trajectory(file: Path) -> dict[str, str]:
     """What a trajectory holds, and whether the run went well."""
     from .output.trajectory import load
@@ -61,6 +68,28 @@ def of_trajectory(file: Path) -> dict[str, str]:
         if len(times):
             rows |= _figures(seen)
     return rows
+
+
+def of_impacts(file: Path) -> dict[str, str]:
+    """What a log of impacts holds."""
+    from .output.impact_log import load_impacts
+
+    with load_impacts(file) as log:
+        times, scene = log.times, log.scene
+        counts = log.counts()
+        which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
+        return {
+            "impacts": f"{len(log):,}".replace(",", " "),
+            "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+            "particles": f"{which} of {log.count}",
+            "surfaces": "\n".join(
+                f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, counts, strict=True)
+            ),
+            **_period(scene.period),
+            "method": _call(log.method),
+            "columns": ", ".join(log.dtype.names or ()),
+            "size": f"{file.stat().st_size / 1e6:.1f} MB",
+        }
 
 
 def of_recording(file: Path, repair: bool) -> dict[str, str]:

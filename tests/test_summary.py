@@ -98,3 +98,25 @@ def test_a_file_of_an_older_version_is_read(path):
     assert summary.numbers(path)["sliding_time"] == 0.0
     with swarm.load(path) as trajectory:
         assert trajectory.observed().keys().isdisjoint(YOUNGER)
+
+
+def test_a_log_of_impacts_is_told(tmp_path):
+    """Not as a trajectory that is none."""
+    start = swarm.fill(HOT, 6, speed=0.5, seed=1)
+    for some, kept in (("all", 6), (4, 2), ([5, 3, 5], 2)):
+        swarm.simulate(
+            HOT, start, swarm.Impact(), until=1.0, every=0.5, compile="never", impacts=tmp_path / "log.h5",
+            impact_particles=some, overwrite=True,
+        )  # fmt: skip
+        with swarm.load_impacts(tmp_path / "log.h5") as log:
+            table, sizes = log.table(), log.counts()
+        assert len(table) > 0
+        assert sizes.tolist() == [(table["surface"] == i).sum() for i in range(2)]
+        rows = summary.of_file(tmp_path / "log.h5")
+        assert rows["impacts"] == str(len(table))
+        assert rows["particles"] == f"{kept} of 6"
+        assert rows["frames"] == "3, 0 s to 1 s"
+        assert rows["surfaces"].splitlines()[1] == f"Sphere(radius=0.2, side='outside'): {sizes[1]}"
+        assert rows["columns"].startswith("time, particle, surface, member, position")
+    with pytest.raises(swarm.SceneError, match=r"there is no file .*none\.h5; expected a trajectory or a log"):
+        summary.of_file(tmp_path / "none.h5")

@@ -10,12 +10,14 @@ from .shown import table
 
 
 def info(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A trajectory (.h5) or a recording (.rrd).")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A trajectory or a log of impacts (.h5), or a recording (.rrd).")
+    ],
     repair: Annotated[
         bool, typer.Option("--repair", help="Repair a recording that a crash truncated, in place.")
     ] = False,
 ) -> None:
-    """Show what a trajectory or a recording holds."""
+    """Show what a trajectory, a log of impacts or a recording holds."""
     from .. import summary
 
     if file.suffix == ".rrd":
@@ -23,4 +25,4 @@ def info(
     elif repair:
         raise SceneError(f"--repair is for recordings (.rrd), got {file}; a trajectory needs none")
     else:
-        table(summary.of_trajectory(file))
+        table(summary.of_file(file))

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..errors import FileError
-from . import paths, superblock
+from . import driver, paths, superblock
 
 # HDF5's default chunk cache, 1 MB a dataset, would fill during 100 000 frames, which looks like a memory leak.
 _SMALL_CACHE = 1 << 16
@@ -55,7 +55,7 @@ class AppendedFile:
         if mode == "r+":
             superblock.make_appendable(self._handle)
         # HDF5's locks would block readers.
-        self.file = h5py.File(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        self.file = driver.opened(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
         self._descriptor = _descriptor_of(self.file)
 
     def close(self, error: BaseException | None) -> None:

@@ -1,5 +1,6 @@
 """Logs of impacts, read on demand. impacts.py describes the file and writes it."""
 
+import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,6 +92,24 @@ class ImpactLog(Stored):
 
     def __repr__(self) -> str:
         return f"ImpactLog({str(self.path)!r}, {len(self)} impacts)"
+
+    @property
+    def kept(self) -> int | list[int]:
+        """The particles whose impacts are kept: k is every k-th one, or their numbers."""
+        with self._reading("which particles it keeps"):
+            kept = tomllib.loads(self._text("kept"))["particles"]
+            if kept == "all":
+                return 1
+            return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})
+
+    def counts(self) -> NDArray[np.int64]:
+        """How many impacts there are on each surface, with a last row of each particle that passed an opening."""
+        counts = np.zeros(self._surfaces(), np.int64)
+        for k in range(0, self._rows, _AT_ONCE):
+            with self._reading(f"its rows from {k} on"):
+                walls = self._columns["wall"][k : min(k + _AT_ONCE, self._rows)]
+                counts += np.bincount(self._surface[walls], minlength=len(counts))
+        return counts
 
     @property
     def identity(self) -> dict[str, Any]:

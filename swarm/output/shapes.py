@@ -67,8 +67,11 @@ class Still(NamedTuple):
     time: float
 
 
-def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]:
-    """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go."""
+def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = math.inf) -> list[Shape]:
+    """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go.
+
+    That of a surface of more than `most` bodies is empty.
+    """
     still = Still(scene, time)
     box = _box(still, positions)
     coarse = _triangles(still, box)
@@ -77,6 +80,9 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0) -> list[Shape]
     shapes = []
     for i, surface in enumerate(scene.surfaces):
         name = f"{i}_{type(surface).__name__.lower()}"
+        if isinstance(surface, Many) and len(surface) > most:
+            shapes.append(Shape(name, True, np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3)), []))
+            continue
         if isinstance(surface, Spheres):
             shapes.append(_placed(Shape(name, True, *_balls(surface)), scene.poses(time)[i]))
             continue

@@ -15,13 +15,10 @@ from .. import tables
 from ..errors import SceneError
 from ..methods import Method
 from ..scene import Scene
-from . import layout, paths, superblock
+from . import driver, layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
-# In one process HDF5 allows one setting of locks for a file and a driver, and other code may have opened the file with
-# another. The logging driver reads like the default one, logs nothing by default, and is rarely used.
-_DRIVER = "swarm"
 
 
 class Stored:
@@ -104,12 +101,18 @@ def _opened(path: Path) -> h5py.File:
     options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
     try:
         try:
-            return h5py.File(path, "r", driver=_DRIVER, **options)
+            if not driver.has_open(path):
+                return h5py.File(path, "r", driver=driver.NAME, **options)
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
-            # Its writer has marked it and not yet cleared the mark, or was killed in between.
-            return h5py.File(superblock.Unmarked(path), "r", **options)
+        # This process has it open, or its writer has marked it and not yet cleared the mark, or was killed in between.
+        file = h5py.File(superblock.Unmarked(path), "r", **options)
+        if not _joins(file):
+            return file
+        # The sources of virtual datasets are opened by the driver of the file that names them.
+        file.close()
+        return h5py.File(path, "r", driver=driver.NAME, **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
             raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
@@ -118,11 +121,17 @@ def _opened(path: Path) -> h5py.File:
         raise DamagedError(f"{path} is damaged: {reason(error)}") from error
 
 
-def _own_driver(plist: Any, **_options: Any) -> None:
-    plist.set_fapl_log(b"", 0, 0)
+def is_log(path: Path) -> bool:
+    """Whether an HDF5 file is a log of impacts, and no trajectory."""
+    require_file(path, "a trajectory or a log of impacts (.h5)")
+    with _opened(path) as file, contextlib.suppress(*DAMAGE):
+        return "impacts" in file and "h5md" not in file
+    return False  # what is damaged is said by who reads more of it
 
 
-h5py.register_driver(_DRIVER, _own_driver)
+def _joins(file: h5py.File) -> bool:
+    """Whether it has virtual datasets."""
+    return bool(file.visititems(lambda _name, found: getattr(found, "is_virtual", False) or None))
 
 
 def times_of(file: Any, name: str, frames: int) -> NDArray[np.float64]:

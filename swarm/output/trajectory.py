@@ -26,6 +26,7 @@ from .stored import Stored, finite, times_of, whole
 if TYPE_CHECKING:
     from ..bodies.body import Body
     from ..bodies.state import Bodies
+    from .exported import Progress
 
 
 class Trajectory(Stored):
@@ -102,6 +103,17 @@ class Trajectory(Stored):
             image = everything[f"{layout.IMAGES}/value"][k].T if layout.IMAGES in everything else None
             return Particles(position, velocity, everything["mass"][()], image)
 
+    def columns(self, k: int) -> dict[str, NDArray[Any]]:
+        """What frame k holds of each particle as it is on file, a row each: "position", "velocity", "impacts", ..."""
+        k = self._number(k)
+        with self._reading(f"frame {k}") as file:
+            everything = file["particles/all"]
+            kept = [
+                name for name in (*layout.PARTS, layout.COUNTS, layout.IMAGES, layout.ESCAPES) if name in everything
+            ]
+            held = {name: everything[f"{name}/value"][k] for name in kept}
+            return held | {name: finite(held[name], "particle") for name in layout.PARTS}
+
     def bodies(self, k: int) -> "Bodies":
         """The bodies at frame k; negative k count from the end.
 
@@ -158,12 +170,7 @@ class Trajectory(Stored):
 
     def particle(self, i: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """The path of particle i: its positions and velocities, (3, frames) each."""
-        i = whole(f"{self.path}: particle", i)
-        self._require_particles()
-        with self._reading("the numbers of its particles") as file:
-            ids = file["particles/all/id"][()]
-            if (np.diff(ids) <= 0).any() or ids[0] < 0 or ids[-1] >= self.count:
-                raise ValueError(f"expected some of 0 to {self.count - 1}, each once and in order")
+        i, ids = whole(f"{self.path}: particle", i), self.ids
         column = int(np.searchsorted(ids, i))
         if column == len(ids) or ids[column] != i:
             raise SceneError(
@@ -176,11 +183,74 @@ class Trajectory(Stored):
             )
         return position, velocity
 
+    @property
+    def ids(self) -> NDArray[np.int64]:
+        """The numbers of the particles that the file keeps, (N,)."""
+        self._require_particles()
+        with self._reading("the numbers of its particles") as file:
+            ids = file["particles/all/id"][()].astype(np.int64)
+            if (np.diff(ids) <= 0).any() or ids[0] < 0 or ids[-1] >= self.count:
+                raise ValueError(f"expected some of 0 to {self.count - 1}, each once and in order")
+        return np.asarray(ids)
+
+    @property
+    def bonds(self) -> NDArray[np.int64]:
+        """The pairs of points of bodies that are tied, (B, 2), as numbers of particles."""
+        with self._reading("its bonds") as file:
+            if "connectivity/bonds" not in file:
+                return np.zeros((0, 2), np.int64)
+            bonds = layout.dataset(file, "connectivity/bonds", "iu", (None, 2))[()].astype(np.int64)
+            if len(bonds) and not (bonds.min() >= 0 and bonds.max() < self.count):
+                raise ValueError(f"expected numbers from 0 to {self.count - 1}, got {bonds.min()} to {bonds.max()}")
+        return np.asarray(bonds)
+
     def _require_particles(self) -> None:
         with self._reading("its particles") as file:
             kept = "particles/all" in file
         if not kept:
             raise SceneError(f'{self.path} keeps no particles: it was run with frames = "none"')
+
+    def export(
+        self,
+        path: str | Path,
+        frames: slice | int | None = None,
+        particles: int = 1,
+        surfaces: bool = True,
+        overwrite: bool = False,
+        progress: "Progress | None" = None,
+    ) -> list[Path]:
+        """Write the trajectory to a file of another format; units are as they are, and so are the digits of .xyz.
+
+        Args:
+            path: its suffix says the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
+                for HOOMD-blue and freud, in which numbers are float32.
+            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all.
+            particles: k is every k-th particle, or body, beginning with the first.
+            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Those of surfaces of
+                more than 20 000 bodies are left out.
+            overwrite: replace existing files.
+            progress: is called with how many frames are written, and how many there are to write.
+
+        Returns:
+            The files. They have their names when they are whole; one frame at a time is in memory.
+
+        Raises:
+            SceneError: another suffix, an argument out of its range, a library that is missing, or a file that exists.
+            FileError: the file cannot be written.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         written = trajectory.export(folder + "/run.xyz", frames=-1)
+        ...     print(written[0].read_text().splitlines()[2])
+        X 0.0 0.0 0.0 -1.0 0.0 0.0 0 1
+        """
+        from .export import export
+
+        return export(self, path, frames, particles, surfaces, overwrite, progress)
 
     @functools.cached_property
     def body(self) -> "Body | None":

@@ -81,3 +81,12 @@ def test_each_of_many_bodies_is_drawn():
     # Normals point into the volume, as those of every wall.
     ball = shapes[0]
     assert (((ball.vertices - places[0]) * ball.normals).sum(axis=1) > 0.0).all()
+
+
+def test_more_bodies_than_are_wanted_are_not_drawn():
+    balls = swarm.Spheres(centers=[[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]], radii=0.1)
+    scene, somewhere = swarm.Scene([balls, swarm.Sphere(1.0)]), np.full((3, 1), 0.5)
+    for most, drawn in ((2, [True, True]), (1, [False, True])):
+        shapes = shapes_of(scene, somewhere, most=most)
+        assert [len(shape.triangles) > 0 for shape in shapes] == drawn
+        assert [shape.name for shape in shapes] == ["0_spheres", "1_sphere"]

@@ -93,7 +93,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
 
     def logged(name, mode, **options):
         logs.append(Log(name))
-        options.pop("locking")
+        del options["locking"], options["driver"]
         return real(logs[-1], mode, **options)
 
     unmark = superblock.unmark

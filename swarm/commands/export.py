@@ -1,0 +1,55 @@
+"""`swarm export`: trajectories for other programs."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import SceneError
+
+
+def export(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf for ParaView, OUT.xyz or OUT.gsd.")
+    ],
+    frames: Annotated[
+        str | None,
+        typer.Option(metavar="A:B:K", help="Frames A to before B, every K-th, or one, as -1 [default: all]."),
+    ] = None,
+    particles: Annotated[int, typer.Option(metavar="K", help="Every K-th particle or body.")] = 1,
+    surfaces: Annotated[
+        bool, typer.Option("--surfaces/--no-surfaces", help="With .vtkhdf, also the walls: OUT.surfaces.vtkhdf.")
+    ] = True,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+) -> None:
+    """Write a trajectory for ParaView (.vtkhdf), OVITO and ASE (.xyz), or HOOMD-blue and freud (.gsd)."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ..output.trajectory import load
+
+    chosen = None if frames is None else _frames(frames)
+    hidden = not sys.stderr.isatty()
+    with load(file) as trajectory, Progress(console=Console(stderr=True), transient=True, disable=hidden) as bar:
+        task = bar.add_task("frames")
+        written = trajectory.export(
+            output, chosen, particles, surfaces, overwrite,
+            lambda done, total: bar.update(task, completed=done, total=total),
+        )  # fmt: skip
+    for path in written:
+        print(f"written to {path} ({path.stat().st_size / 1e6:.1f} MB)")
+
+
+def _frames(text: str) -> slice | int:
+    """A number, or numbers and nothing between colons."""
+    try:
+        parts = [int(part) if part.strip() else None for part in text.split(":")]
+        if len(parts) == 1 and parts[0] is not None:
+            return parts[0]
+        if 2 <= len(parts) <= 3:
+            return slice(*parts)
+    except ValueError:
+        pass
+    raise SceneError(f"--frames must be a number, or A:B or A:B:K as for a slice of Python, got {text!r}")

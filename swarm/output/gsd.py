@@ -1,0 +1,54 @@
+"""GSD files in the schema of HOOMD-blue, by its library: particles, masses, images, and bonds of bodies.
+
+Its numbers are float32, and its box is around the origin. Where the scene repeats, that is its cell: positions are less
+the center of the cell, which is log/center. In a direction in which it does not, the box is as wide as the scene, or as
+the particles need, and nothing is shifted: the schema has no box that does not repeat. Frames have the step number, and
+log/time [s], log/particles/id, log/particles/impacts, and log/particles/escape_time where there are openings.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import gsd.hoomd
+import numpy as np
+from numpy.typing import NDArray
+
+from .exported import Exported, Moment
+
+
+def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
+    """Write the particles."""
+    low, high = np.array(chosen.trajectory.scene.bounds())
+    center = np.where(chosen.periods > 0.0, 0.5 * (low + high), 0.0)
+    needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low), abs(high)), 0.0)
+    with gsd.hoomd.open(str(path), "w") as file:
+        for done, moment in enumerate(chosen.moments()):
+            file.append(_frame(chosen, moment, center, needed))
+            told(done + 1)
+
+
+def _frame(
+    chosen: Exported, moment: Moment, center: NDArray[np.float64], needed: NDArray[np.float64]
+) -> gsd.hoomd.Frame:
+    n, bonds = len(chosen), chosen.bonds
+    position = (moment.position - center).astype(np.float32)
+    edges = np.maximum(needed, 2.0 * abs(position).max(axis=0)).astype(np.float32)
+    # Particles that have no room in a direction, as in a plane, get some.
+    edges[edges == 0.0] = edges.max() or 1.0
+    edges = np.where(chosen.periods > 0.0, chosen.periods.astype(np.float32), edges)
+    frame = gsd.hoomd.Frame()
+    frame.configuration.step, frame.configuration.dimensions = moment.number, 3
+    frame.configuration.box = [*edges, 0.0, 0.0, 0.0]
+    of = frame.particles
+    of.N, of.types, of.typeid = n, ["A"], np.zeros(n, np.uint32)
+    # Rounded to float32 what is at the edge of the cell may be beyond it.
+    of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
+    of.mass = chosen.mass.astype(np.float32)
+    if "image" in moment.more:
+        of.image = moment.more["image"].astype(np.int32)
+    if len(bonds):
+        frame.bonds.N, frame.bonds.types, frame.bonds.group = len(bonds), ["bond"], bonds.astype(np.int32)
+        frame.bonds.typeid = np.zeros(len(bonds), np.uint32)
+    frame.log = {"time": np.array([moment.time]), "center": center, "particles/id": chosen.ids}
+    frame.log |= {f"particles/{name}": column for name, column in moment.more.items() if name != "image"}
+    return frame
