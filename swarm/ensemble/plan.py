@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from .. import scene_file
-from ..checks import closest, count, listed, number
+from ..checks import count, listed, number, one_of
 from ..errors import SceneError
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
@@ -96,9 +96,7 @@ def _lists(table: Any) -> tuple[dict[str, list[Any]], str]:
     """The values of every key, and how they are combined."""
     if not isinstance(table, dict):
         raise SceneError(f"sweep: expected a [sweep] table, got {table!r:.200}")
-    way = table.get(_COMBINE, _WAYS[0])
-    if way not in _WAYS:
-        raise SceneError(f"sweep.combine: expected {listed(_WAYS)}, got {way!r:.200}{closest(way, _WAYS)}")
+    way = one_of(f"sweep.{_COMBINE}", table.get(_COMBINE, _WAYS[0]), _WAYS)
     given = dict(_flat({key: value for key, value in table.items() if key != _COMBINE}))
     if not given:
         raise SceneError('sweep: expected at least one list, such as "particles.seed" = {range = 20}, got none')
@@ -239,10 +237,8 @@ def _put(place: Any, steps: list[str], value: Any, key: str) -> Any:
     if not isinstance(place, list):
         raise SceneError(f'sweep."{key}": {passed} is {place!r:.100}, which has no {step!r}')
     if not (step.isascii() and step.isdecimal() and int(step) < len(place)):
-        numbers = "only 0" if len(place) == 1 else f"0 to {len(place) - 1}" if place else "none"
-        raise SceneError(
-            f'sweep."{key}": {passed} has {len(place)} entries, expected the number of one ({numbers}), got {step!r}'
-        )
+        there = {0: "is empty", 1: "has one entry, number 0"}.get(len(place), f"has the entries 0 to {len(place) - 1}")
+        raise SceneError(f'sweep."{key}": {passed} {there}, got {step!r}')
     changed = list(place)
     changed[int(step)] = _put(place[int(step)], rest, value, key) if rest else value
     return changed
