@@ -55,7 +55,7 @@ def sweep(  # noqa: PLR0913  one argument an option
         options = SweepOptions(output, processes, threads, resume, overwrite, not quiet, written, latest)
         outcome = carry_out(sweep_file, options)
     except KeyboardInterrupt:  # the second one
-        print("interrupted: the runs under way have saved nothing since their last checkpoints", file=sys.stderr)
+        print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
             print(json.dumps({"status": "interrupted"}))
         raise typer.Exit(INTERRUPTED) from None
