@@ -112,6 +112,7 @@ def _carried_out(order: dict[str, Any], line: _Line) -> dict[str, Any]:
     if order["goes_on"] and target.exists():
         before = of_trajectory(target, job.run.until)
         if before is not None:
+            paths.checkpoint_of(target).unlink(missing_ok=True)  # a kill came between the last frame and this
             return {"state": "done", "observables": before}
         if paths.checkpoint_of(target).exists():
             # A SceneError: it is damaged, or of another version. The run begins anew, and says what else is wrong.

@@ -7,6 +7,7 @@ import hashlib
 import logging
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ _LOG = logging.getLogger("swarm")
 _LOCK = ".lock"
 _COMPILING = "compiling kernels for this scene, once: {}"
 _kernels: list[Any] = []
+_compiling = threading.local()
 # The definitions that code outside of this package has registered, by their class.
 _outside: dict[Any, list[Callable[..., Any]]] = {}
 
@@ -143,10 +145,15 @@ def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) ->
     The others wait, and find it on disk: 50 runs that start together took the compile time of 50.
     """
     kinds = tuple(sigutils.normalize_signature(signature)[0])
-    if _is_found(kernel, kinds):
+    # A kernel that is compiled within another takes no lock: no two processes can wait for each other.
+    if getattr(_compiling, "one", False) or _is_found(kernel, kinds):
         return compile(signature)
     with held(_lock_of(kernel, kinds)):
-        return compile(signature)  # looks at the disk first
+        _compiling.one = True
+        try:
+            return compile(signature)  # looks at the disk first
+        finally:
+            _compiling.one = False
 
 
 def _key_of(kernel: Any, kinds: Any) -> Any:

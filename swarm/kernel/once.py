@@ -1,7 +1,6 @@
 """One process at a time: locks of names in the folder of compiled kernels, which the system releases at any death."""
 
 import contextlib
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,28 +9,19 @@ from pathlib import Path
 _LONGEST = 300.0
 # A waiting process looks so often [s]; a compilation takes seconds.
 _GLANCE = 0.05
-_of_this_thread = threading.local()
 
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, or none where it cannot be had: the folder is read-only, or its disk has no locks.
-
-    A thread that holds one takes no second one: no two processes can wait for each other.
-    """
+    """Hold the lock of a file, or none where it cannot be had: the folder is read-only, or its disk has no locks."""
     import filelock
 
-    if getattr(_of_this_thread, "holds", False):
-        yield
-        return
     lock = filelock.FileLock(path, timeout=_LONGEST)
     with contextlib.suppress(OSError, NotImplementedError):  # among the first: filelock.Timeout
         lock.acquire(poll_interval=_GLANCE)
-    _of_this_thread.holds = True
     try:
         yield
     finally:
-        _of_this_thread.holds = False
         if lock.is_locked:
             # While it is locked: who has it open notices that its name is gone, and makes a new one.
             with contextlib.suppress(OSError):

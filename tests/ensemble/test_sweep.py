@@ -1,79 +1,21 @@
 """Sweeps as a whole, with real worker processes and real kills. In plain Python: nothing here depends on the tier."""
 
-import csv
 import json
-import os
 import signal
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pandas as pd
 import psutil
 import pytest
+from sweep_sessions import RUNNING, assert_the_same_table, until_there_is, write
 
 import swarm
 from swarm.ensemble import results
 from swarm.ensemble.sweeping import SweepOptions, carry_out
 from swarm.output import paths
-
-SCENE = """
-[particles]
-count = {count}
-speed = 1.0
-
-[[surface]]
-kind = "sphere"
-radius = 0.5
-
-[method]
-kind = "impact"
-
-[run]
-until = 2.0
-every = 0.5
-compile = "never"
-{run}
-[sweep]
-{sweep}
-"""
-RUNNING = 60.0  # seconds after which a test gives up
-
-
-def write(path, sweep, count=5, run=""):
-    path.write_text(SCENE.format(count=count, run=run, sweep=sweep))
-    return path
-
-
-def until_there_is(condition):
-    end = time.monotonic() + RUNNING
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def table_of(folder):
-    """Every cell but the wall times, as text."""
-    with open(folder / "results.csv", newline="") as file:
-        return [{key: cell for key, cell in row.items() if key != "wall_time"} for row in csv.DictReader(file)]
-
-
-def command(folder, *words):
-    """`swarm sweep` of the file beside a folder, in a process group of its own, as a shell starts it."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "swarm", "sweep", str(folder.parent / "sweep.toml"), "-o", str(folder), *words],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-
-
-def workers_of(session):
-    try:
-        return psutil.Process(session.pid).children()
-    except psutil.NoSuchProcess:
-        return []
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +40,7 @@ def test_the_frame_has_a_row_for_each_run(whole):
 
 
 def test_a_run_is_an_ordinary_one(whole):
-    folder, frame, path = whole
+    folder, frame, _path = whole
     assert not list(folder.glob("*.checkpoint"))
     row = frame.iloc[1]
     with swarm.load(folder / row["file"]) as trajectory:
@@ -185,34 +127,9 @@ def test_a_worker_that_dies_fails_its_run_alone(tmp_path):
 
 
 def test_killed_and_resumed_the_table_is_the_same(tmp_path):
-    """Kills of the parent, which no worker survives, and Ctrl-C for all; how far each session comes does not matter."""
-    sweep = '"particles.seed" = {range = 3}\n"surface.0.restitution" = [1.0, 0.8]'
-    path = write(tmp_path / "sweep.toml", sweep, count=30, run="checkpoint = 0.05\nthreads = 1")
-    swarm.sweep(path, tmp_path / "whole", processes=2)
-    folder, draw = tmp_path / "out", np.random.default_rng(1)
-    for kind in (signal.SIGKILL, signal.SIGINT):
-        session = command(folder, "--resume", "--processes", "2")
-        workers = []
-        until_there_is(lambda: workers.extend(workers_of(session)) or workers or session.poll() is not None)
-        until_there_is(lambda: list(folder.glob("*.h5")) or session.poll() is not None)
-        time.sleep(draw.uniform(0.0, 0.3))
-        (os.kill if kind == signal.SIGKILL else os.killpg)(session.pid, kind)
-        output, errors = session.communicate(timeout=RUNNING)
-        _gone, alive = psutil.wait_procs(workers, timeout=RUNNING)
-        assert not alive
-        if kind == signal.SIGINT:
-            assert session.returncode in (0, 130), errors
-            if session.returncode == 130:
-                assert "--resume" in errors
-                assert "waiting" in output
-                assert {row["state"] for row in table_of(folder)} <= {"done", "waiting"}
-        assert "Traceback" not in errors
-    last = command(folder, "--resume", "--json")
-    output, errors = last.communicate(timeout=RUNNING)
-    assert last.returncode == 0, errors
-    assert json.loads(output)["done"] == 6
-    assert table_of(folder) == table_of(tmp_path / "whole")
-    assert not list(folder.glob("*.checkpoint"))
+    """Kills of the parent, which no worker survives, and Ctrl-C for all; tests/long has many."""
+    kinds = (signal.SIGKILL, signal.SIGINT)
+    assert_the_same_table(tmp_path, kinds, np.random.default_rng(1), longest=0.3)
 
 
 def test_a_checkpoint_is_gone_on_with(tmp_path):
