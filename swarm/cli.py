@@ -42,7 +42,7 @@ def _options(
 
 
 app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")(run)
-app.command(epilog="Example:  swarm sweep examples/sweeps/restitution.toml -o restitution")(sweep)
+app.command(epilog="Example:  swarm sweep examples/sweeps/cooling.toml -o cooling")(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
 app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
