@@ -127,7 +127,7 @@ def main(quick: bool = False) -> None:
     """Print the report."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        rows = _short_runs(folder, *((1, 20, 0.1) if quick else (10, 2000, 8.0)))
+        rows = _short_runs(folder, *((1, 20, 0.1) if quick else (10, 2000, 4.0)))
         rows += _many_runs(folder, 2 if quick else 200)
     show(rows)
     if not quick:

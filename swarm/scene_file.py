@@ -152,8 +152,14 @@ def document_of(text: str, path: Path) -> dict[str, Any]:
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
 
 
-def job_of(document: dict[str, Any], text: str, path: Path) -> Job:
+def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None = None) -> Job:
     """The job of the tables of a scene file; files that it names are beside `path`.
+
+    Args:
+        document: the tables.
+        text: the file itself.
+        path: its path.
+        scene: that of its tables, where it is known; None: it is made.
 
     Raises:
         SceneError: a key is unknown, missing or out of its range; the sentence begins with the key.
@@ -168,7 +174,8 @@ def job_of(document: dict[str, Any], text: str, path: Path) -> Job:
         came = "both" if "body" in document else "neither"
         raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
     return Job(
-        scene=tables.scene_of(
+        scene=scene
+        or tables.scene_of(
             _with_bodies(document.get("surface"), path), document.get("gravity"), document.get("period")
         ),
         method=tables.method_of(document["method"]),

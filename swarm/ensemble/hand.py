@@ -9,13 +9,13 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from ..errors import RunError
 
 # Of what a process printed before it died, a sentence has so many bytes.
 _LAST = 2000
+_WORKER = "import json, sys; sys.path[:] = json.loads(sys.argv.pop()); from swarm.ensemble.worker import main; main()"
 
 
 class Hand:
@@ -26,18 +26,14 @@ class Hand:
     """
 
     def __init__(self) -> None:
-        # The package that this process has imported, wherever it is; and nothing from the current folder, where a file
-        # queue.py would be imported in place of Python's.
-        root = str(Path(__file__).parents[2])
-        found = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
+        # Packages are found where this process finds them, but none of Python's own in the current folder (-P).
+        command = [sys.executable, "-P", "-c", _WORKER, json.dumps([str(place) for place in sys.path])]
         self._writing = threading.Lock()  # of the thread that hands out runs, and the one that stops them
         self._printed = tempfile.TemporaryFile("a+b")  # noqa: SIM115  closed by `close`
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "swarm.ensemble.worker"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._printed, encoding="utf-8",
-                env={**os.environ, "PYTHONPATH": found},
-            )  # fmt: skip
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._printed, encoding="utf-8"
+            )
         except OSError as error:
             self._printed.close()
             raise RunError(f"a worker process cannot be started: {error}") from error

@@ -16,6 +16,7 @@ import tomli_w
 from .. import scene_file
 from ..checks import count, listed, number, one_of
 from ..errors import SceneError
+from ..scene import Scene
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
 _MOST = 1_000_000
@@ -25,6 +26,8 @@ _WITHOUT_EFFECT = ("threads", "checkpoint", "compile")
 _DIGITS = 12
 STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
 _COMBINE, _WAYS = "combine", ("product", "zip")
+# Keys of a document that make its scene.
+_SCENE = ("surface", "gravity", "period")
 # Keys of a document that name files, whose content is part of what is computed.
 _FILES = ("from", "file")
 
@@ -190,13 +193,20 @@ def _combined(lists: dict[str, list[Any]], way: str) -> Iterator[dict[str, Any]]
 def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list[Variant]:
     """The runs, each with the scene that it has been found to describe."""
     contents: dict[Path, str] = {}
+    # A formula or a mesh takes long, and the scenes of many meshes much memory: each is made once, and the last of them
+    # stands for those that are known to be right.
+    right: set[str] = set()
+    last: Scene | None = None
     variants: list[Variant] = []
     known: dict[str, Variant] = {}
     for parameters in rows:
         own = _with(document, parameters)
         try:
             # The files that particles are read from are not opened yet.
-            job = scene_file.job_of(own, "", path)
+            scene = _digest_of([own.get(name) for name in _SCENE])
+            job = scene_file.job_of(own, "", path, last if scene in right else None)
+            right.add(scene)
+            last = job.scene
             start = job.start_file()
             if start is not None and not start.is_file():
                 raise SceneError(f"{'particles' if 'particles' in own else 'body'}.from: there is no file {start}")
@@ -269,8 +279,11 @@ def _digest(document: Document, path: Path, contents: dict[Path, str]) -> str:
         if file not in contents:
             contents[file] = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
         files.append(contents[file])
-    whole = json.dumps([what, files], sort_keys=True, default=str)
-    return hashlib.sha256(whole.encode()).hexdigest()[:_DIGITS]
+    return _digest_of([what, files])[:_DIGITS]
+
+
+def _digest_of(tables: Any) -> str:
+    return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _named_files(place: Any) -> Iterator[str]:
@@ -283,7 +296,7 @@ def _named_files(place: Any) -> Iterator[str]:
 
 def _kind(document: Document) -> str:
     """The tables without their numbers."""
-    return hashlib.sha256(json.dumps(_unnumbered(document), sort_keys=True).encode()).hexdigest()
+    return _digest_of(_unnumbered(document))
 
 
 def _unnumbered(value: Any) -> Any:

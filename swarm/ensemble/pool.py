@@ -55,6 +55,7 @@ class Pool:
         """Begin no more runs, and let those under way end with a checkpoint."""
         # Without the lock: it is called from a handler of signals, in a thread that may hold it.
         self._stops = True
+        self._sentence = "stopping: the runs under way save checkpoints; a second Ctrl-C ends them at once"
         for hand in list(self._hands):
             hand.stop()
 
@@ -114,6 +115,7 @@ class Pool:
             made.wait_until_ready()
         except RunError:
             if not self._stops:
+                self._let_go(made)
                 raise
         return made
 

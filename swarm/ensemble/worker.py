@@ -158,7 +158,3 @@ def _display(line: _Line) -> Any:
         every=_A_MOMENT,
         compiling=lambda sentence: line.send(compiling=sentence),
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -132,6 +132,16 @@ def test_killed_and_resumed_the_table_is_the_same(tmp_path):
     assert_the_same_table(tmp_path, kinds, np.random.default_rng(1), longest=0.3)
 
 
+def test_the_wall_time_ends_a_sweep(tmp_path):
+    """Also while its workers start."""
+    path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
+    path.write_text(path.read_text().replace("every = 0.5\n", ""))
+    outcome = carry_out(path, SweepOptions(tmp_path / "out", walltime=0.5))
+    assert outcome.stopped == "walltime"
+    assert [row["state"] for row in outcome.results.rows()] == ["waiting", "waiting"]
+    assert (tmp_path / "out" / "results.csv").exists()
+
+
 def test_a_checkpoint_is_gone_on_with(tmp_path):
     """Also one that is damaged: that run begins anew."""
     path = write(tmp_path / "sweep.toml", '"particles.seed" = {range = 3}', count=30)
