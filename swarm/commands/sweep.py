@@ -87,8 +87,8 @@ def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
         print(f"{reason}: {numbers['waiting']} runs are left; resume with\n  {again}", file=sys.stderr)
     if others := results.others():
         print(
-            f"{results.folder} also holds {len(others)} runs that {results.plan.path} does not have, such as "
-            f"{others[0]}.h5",
+            f"{results.folder} also holds {len(others)} run{'s' * (len(others) > 1)} that {results.plan.path} does not "
+            f"have, such as {others[0]}.h5",
             file=sys.stderr,
         )
     if as_json:
