@@ -48,12 +48,12 @@ def sweep(  # noqa: PLR0913  one argument an option
     """Carry out the runs of a sweep file, and write one table of their results."""
     with interrupt.at_once():
         from ..checks import duration
-        from ..ensemble.sweeping import SweepOptions, carry_out
+        from ..ensemble import sweeping
 
     try:
         latest = None if walltime is None else duration("--walltime", walltime)
-        options = SweepOptions(output, processes, threads, resume, overwrite, not quiet, written, latest)
-        outcome = carry_out(sweep_file, options)
+        options = sweeping.SweepOptions(output, processes, threads, resume, overwrite, not quiet, written, latest)
+        outcome = sweeping.carry_out(sweep_file, options)
     except KeyboardInterrupt:  # the second one
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
