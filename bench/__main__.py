@@ -16,6 +16,7 @@ from . import (
     report,
     scenes,
     stability,
+    sweeps,
     throughput,
 )
 from .peers import race
@@ -40,6 +41,7 @@ def main() -> None:
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("sweep", help="many short runs: the wall time beside its parts, the memory of a thousand")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -61,6 +63,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "sweep": sweeps,
         "endurance": endurance,
     }
     before = report.stolen()

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
     from .bodies.state import Bodies
     from .bodies.strain import Strain
+    from .ensemble.sweeping import sweep
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
     from .frames import Frame
@@ -59,6 +60,7 @@ _HOMES = {
     "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
     "bodies.state": ("Bodies",),
     "bodies.strain": ("Strain",),
+    "ensemble.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
     "frames": ("Frame",),
@@ -85,7 +87,7 @@ __all__ = [
     "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres",
     "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
     "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts",
-    "place", "rigid", "simulate", "tetrahedron",
+    "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from .commands.export import export
 from .commands.info import info
 from .commands.pictures import plot, record, view
 from .commands.run import run
+from .commands.sweep import sweep
 from .errors import SceneError, SwarmError
 from .version import VERSION
 
@@ -42,6 +43,7 @@ def _options(
 
 
 app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")(run)
+app.command(epilog="Example:  swarm sweep examples/sweeps/cooling.toml -o cooling")(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
 app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)

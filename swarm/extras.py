@@ -10,7 +10,11 @@ _PACKAGES = {
     "plot": "matplotlib scikit-image",
     "bodies": "scipy",
     "mesh": "trimesh libigl",
-    "table": "pandas",
+    "table": "pandas xarray",
+    "parquet": "pandas pyarrow",
+    "film": "imageio-ffmpeg",
+    "notebook": "'rerun-sdk[notebook]'",
+    "cluster": "distributed",
     "gsd": "gsd",
 }
 

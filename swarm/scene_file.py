@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .bodies.table import Made
 
 _TABLES = ("gravity", "period", "particles", "body", "surface", "method", "run")
+SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
 
 
@@ -119,21 +120,50 @@ def read(path: str | Path) -> Job:
         SceneError: the file cannot be read, is not TOML, or a key is unknown, missing or out of its range.
     """
     path = Path(path)
+    text = text_of(path)
+    document = document_of(text, path)
+    if SWEEP in document:
+        raise SceneError(
+            f"{path}: a file with a [{SWEEP}] table describes many runs, which swarm sweep {path} carries out, or "
+            "swarm.sweep in Python"
+        )
     try:
-        # Editors on Windows begin a file with a byte order mark.
-        text = path.read_text(encoding="utf-8-sig")
-        document = tomllib.loads(text)
-    except RecursionError:
-        raise SceneError(f"cannot read the scene file {path}: its arrays or tables are nested too deeply") from None
-    except (OSError, ValueError) as error:  # among the second: not UTF-8, not TOML, a number of too many digits
-        raise SceneError(f"cannot read the scene file {path}: {error}") from error
-    try:
-        return _job(document, text, path)
+        return job_of(document, text, path)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 
 
-def _job(document: dict[str, Any], text: str, path: Path) -> Job:
+def text_of(path: Path) -> str:
+    """The text of a scene file; a SceneError if it cannot be read."""
+    try:
+        # Editors on Windows begin a file with a byte order mark.
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # the second: not UTF-8
+        raise SceneError(f"cannot read the scene file {path}: {error}") from error
+
+
+def document_of(text: str, path: Path) -> dict[str, Any]:
+    """The tables of a scene file; a SceneError if its text is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise SceneError(f"cannot read the scene file {path}: its arrays or tables are nested too deeply") from None
+    except ValueError as error:  # also a number of too many digits
+        raise SceneError(f"cannot read the scene file {path}: {error}") from error
+
+
+def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None = None) -> Job:
+    """The job of the tables of a scene file; files that it names are beside `path`.
+
+    Args:
+        document: the tables.
+        text: the file itself.
+        path: its path.
+        scene: that of its tables, where it is known; None: it is made.
+
+    Raises:
+        SceneError: a key is unknown, missing or out of its range; the sentence begins with the key.
+    """
     for key in document:
         if key not in _TABLES:
             raise SceneError(f"{key}: unknown key, expected {listed(_TABLES)}{closest(key, _TABLES)}")
@@ -144,7 +174,8 @@ def _job(document: dict[str, Any], text: str, path: Path) -> Job:
         came = "both" if "body" in document else "neither"
         raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
     return Job(
-        scene=tables.scene_of(
+        scene=scene
+        or tables.scene_of(
             _with_bodies(document.get("surface"), path), document.get("gravity"), document.get("period")
         ),
         method=tables.method_of(document["method"]),

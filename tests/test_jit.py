@@ -519,6 +519,7 @@ LAYERS = [
     ["__main__"],
     ["cli"],
     ["commands"],
+    ["ensemble"],
     ["scene_file", "summary"],
     ["run"],
     ["output"],

@@ -61,6 +61,7 @@ def test_ci_runs_the_readme_test_command():
 @pytest.mark.physics
 def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "examples" / "sweeps", "examples/sweeps")
     Path("cavity.h5").touch()  # what the command above the first block has written
     names = {}
     for block in re.findall(r"```python\n(.*?)```", ALL, re.DOTALL):
@@ -83,7 +84,10 @@ def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
 
 
 # What the words of a command stand for.
-NAMES = {"SCENE.toml": "scene.toml", "RUN.h5": "scene.h5", "OUT.h5": "out.h5", "OUT.rrd": "out.rrd", "N": "2"}
+NAMES = {
+    "SCENE.toml": "scene.toml", "SWEEP.toml": "sweep.toml", "RUN.h5": "scene.h5", "OUT.h5": "out.h5",
+    "OUT.rrd": "out.rrd", "N": "2",
+}  # fmt: skip
 SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
 
 
@@ -104,16 +108,20 @@ def settings():
 
 @pytest.mark.physics
 def test_the_commands_run_in_their_order(tmp_path):
-    shutil.copytree(ROOT / "examples" / "scenes", tmp_path / "examples" / "scenes")
+    for name in ("scenes", "sweeps"):
+        shutil.copytree(ROOT / "examples" / name, tmp_path / "examples" / name)
     (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')
     found = list(commands())
-    assert {words[0] for words in found} == {"run", "record", "view", "plot", "export", "info"}
+    assert {words[0] for words in found} == {"run", "record", "view", "plot", "export", "info", "sweep"}
     assert len(found) >= 12
     for words in found:
         outputs = [after for word, after in itertools.pairwise(words) if word in ("-o", "--record")]
         if words[0] == "run" and "--resume" not in words and "-o" not in words:
             outputs.append(Path(words[1]).stem + ".h5")
         for output in outputs:
+            if (tmp_path / output).is_dir():
+                shutil.rmtree(tmp_path / output)
             (tmp_path / output).unlink(missing_ok=True)
         done = command(*words, cwd=tmp_path)
         assert done.returncode == 0, (words, done.stderr)

@@ -159,3 +159,23 @@ def test_kernels_of_another_process_are_found(tmp_path):
 def test_another_word_is_refused():
     with pytest.raises(swarm.SceneError, match="compile must be one of 'auto', 'always' and 'never', got 'alwyas'"):
         swarm.simulate(SPHERE, swarm.fill(SPHERE, 2, speed=1.0), swarm.Impact(), until=1.0, compile="alwyas")
+
+
+@compiled_only
+def test_while_another_process_compiles_a_run_goes_on_in_plain_python(monkeypatch):
+    monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
+    for waits in (True, False):
+        monkeypatch.setattr(cache, "is_being_compiled", lambda *call, waits=waits: waits)
+        tier = tiers.Tier("auto", (), 3)
+        tier.left = -1.0
+        assert tier.choose([(None, ())]) is not waits
+        assert tier.is_plain is waits
+        assert (tier.left > 0.0) is waits
+    # Not for ever, and never where plain Python has other bits or does too little.
+    monkeypatch.setattr(cache, "is_being_compiled", lambda *call: True)
+    tier = tiers.Tier("auto", (), 3)
+    tier.left, tier._latest = -1.0, 0.0
+    assert tier.choose([(None, ())])
+    many = tiers.Tier("auto", (), 1_000_000)
+    many.choose([(None, ())])
+    assert not many.is_plain

@@ -14,7 +14,7 @@ from .. import interrupt
 from ..errors import CompleteError, SwarmError, WallTimeError
 from .shown import table
 
-_INTERRUPTED = 130
+INTERRUPTED = 130
 
 
 def run(  # noqa: PLR0913  one argument an option
@@ -100,7 +100,7 @@ def run(  # noqa: PLR0913  one argument an option
                 report(status, target, resume=again)
             else:
                 report(status, frames=0, resume=again)
-        raise typer.Exit(0 if status == "walltime" else _INTERRUPTED) from None
+        raise typer.Exit(0 if status == "walltime" else INTERRUPTED) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
         report("complete", target)
@@ -125,12 +125,12 @@ def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
     if not paths.checkpoint_of(target).exists():
         print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
         return None
-    command = shlex.join(["swarm", *_arguments_again(sys.argv[1:]), "--resume"])
+    command = shlex.join(["swarm", *arguments_again(sys.argv[1:]), "--resume"])
     print(f"{held}; resume with\n  {command}", file=sys.stderr)
     return command
 
 
-def _arguments_again(words: list[str]) -> list[str]:
+def arguments_again(words: list[str]) -> list[str]:
     """The arguments of this command, without those that do not apply to a resumed run."""
     again: list[str] = []
     for before, word in itertools.pairwise(["", *words]):

@@ -7,21 +7,25 @@ import hashlib
 import logging
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba import types
-from numba.core import event
+from numba.core import event, sigutils
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from .frozen import Frozen
+from .once import held, is_held
 
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
+_LOCK = ".lock"
 _COMPILING = "compiling kernels for this scene, once: {}"
 _kernels: list[Any] = []
+_compiling = threading.local()
 # The definitions that code outside of this package has registered, by their class.
 _outside: dict[Any, list[Callable[..., Any]]] = {}
 
@@ -105,6 +109,9 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
         disk = made._cache
         name = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}"
         disk._cache_file = IndexDataCacheFile(cache_path=disk.cache_path, filename_base=name, source_stamp="")
+    # On the object: Numba's own code calls it from C and from other kernels, and a class of ours would have to be
+    # registered as its target's.
+    made.compile = functools.partial(_compile_once, made, made.compile)
     _kernels.append(made)
     return made
 
@@ -125,7 +132,48 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
         for environment in made._find_referenced_environments():
             made.library.codegen.set_env(environment.env_name, environment)
-        super().save_overload(kinds, made)
+        # Of two processes that save the same kernel for other arguments, both would take the same name for their code
+        # and one would lose its entry of the index: a kernel for other arguments than it says would be loaded.
+        # A disk that is full costs the next process its time, and this one nothing.
+        with held(Path(self._cache_file._index_path + _LOCK)), contextlib.suppress(OSError):
+            super().save_overload(kinds, made)
+
+
+def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) -> Any:
+    """What Numba's `compile` does, of all processes in one at a time for the same kernel and arguments.
+
+    The others wait, and find it on disk: 50 runs that start together took the compile time of 50.
+    """
+    kinds = tuple(sigutils.normalize_signature(signature)[0])
+    # A kernel that is compiled within another takes no lock: no two processes can wait for each other.
+    if getattr(_compiling, "one", False) or _is_found(kernel, kinds):
+        return compile(signature)
+    with held(_lock_of(kernel, kinds)):
+        _compiling.one = True
+        try:
+            return compile(signature)  # looks at the disk first
+        finally:
+            _compiling.one = False
+
+
+def _key_of(kernel: Any, kinds: Any) -> Any:
+    return kernel._cache._index_key(kinds, kernel.targetctx.codegen())
+
+
+def _lock_of(kernel: Any, kinds: Any) -> Path:
+    """The file that a process locks while it compiles a kernel for such arguments."""
+    digest = hashlib.sha256(repr(_key_of(kernel, kinds)).encode()).hexdigest()[:16]
+    return Path(f"{kernel._cache._cache_file._index_path}.{digest}{_LOCK}")
+
+
+def _is_found(kernel: Any, kinds: Any) -> bool:
+    """Whether a kernel is compiled for arguments of these types, in this process or on disk."""
+    if kinds in kernel.overloads:
+        return True
+    file = kernel._cache._cache_file
+    name = file._load_index().get(_key_of(kernel, kinds))
+    # A kill may come between the entry of the index and its file.
+    return name is not None and os.path.exists(file._data_path(name))
 
 
 def _digests(kinds: Any) -> Iterator[str]:
@@ -152,11 +200,12 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     """
     if in_python(kernel) is kernel:
         return True  # the compiler is disabled
-    kinds = tuple(map(numba.typeof, arguments))
-    disk = kernel._cache
-    return kinds in kernel.overloads or (
-        disk._index_key(kinds, kernel.targetctx.codegen()) in disk._cache_file._load_index()
-    )
+    return _is_found(kernel, tuple(map(numba.typeof, arguments)))
+
+
+def is_being_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether another process compiles a kernel for such arguments now."""
+    return in_python(kernel) is not kernel and is_held(_lock_of(kernel, tuple(map(numba.typeof, arguments))))
 
 
 @contextlib.contextmanager

@@ -9,7 +9,6 @@ import hashlib
 import io
 import json
 import math
-import os
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -21,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import tables
-from ..errors import FileError, SceneError
+from ..errors import SceneError
 from ..particles import Particles
-from . import paths
+from .replaced import replaced
 from .sources import DAMAGE, DamagedError, reason
 
 Arrays = dict[str, NDArray[Any]]
@@ -106,27 +105,8 @@ def save(path: Path, job: Job, arrays: Arrays) -> None:
     Raises:
         FileError: it cannot be written.
     """
-    part = paths.part_of(path)
-    try:
-        with open(part, "wb") as file:
-            np.savez(file, allow_pickle=False, job=json.dumps(asdict(job)), **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-        if os.name == "posix":
-            _sync_folder(path.parent)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise FileError(f"cannot write the checkpoint {path}: {error}; the previous checkpoint is unchanged") from error
-
-
-def _sync_folder(path: Path) -> None:
-    """Flush the names in a folder to the disk; other systems cannot open folders."""
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    with replaced(path, "checkpoint") as file:
+        np.savez(file, allow_pickle=False, job=json.dumps(asdict(job)), **arrays)
 
 
 def is_one(path: Path) -> bool:

@@ -9,8 +9,8 @@ from . import paths
 
 
 @contextlib.contextmanager
-def only_writer(target: Path, what: str = "trajectory") -> Iterator[None]:
-    """Hold the lock of a file that a run writes.
+def only_writer(target: Path, what: str = "trajectory", patience: float = 0.0) -> Iterator[None]:
+    """Hold the lock of a file that a run writes, after `patience` [s] at the latest.
 
     A file beside it is locked, since a lock on the file itself would block readers. A lock file that is left by a
     killed run blocks no later run.
@@ -21,7 +21,7 @@ def only_writer(target: Path, what: str = "trajectory") -> Iterator[None]:
     import filelock
 
     path = paths.lock_of(target)
-    lock = filelock.FileLock(path, blocking=False)
+    lock = filelock.FileLock(path, timeout=patience)
     try:
         lock.acquire()
     except filelock.Timeout as error:

@@ -24,6 +24,11 @@ _OFTEN = 0.01
 _OF_A_SESSION = {"in_file": False}
 
 
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """How long a run is, what it writes, and how it is carried out; `simulate` describes each.
@@ -113,9 +118,7 @@ class RunOptions:
 
     def thread_count(self) -> int:
         """Number of threads that compute."""
-        if self.threads is not None:
-            return self.threads
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return cores() if self.threads is None else self.threads
 
     def checkpoint_file(self) -> Path | None:
         """The checkpoint; None without a trajectory."""

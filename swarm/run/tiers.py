@@ -4,6 +4,7 @@ Plain Python takes 30 to 150 us an impact, the compiler 3 to 10 s for a new kind
 """
 
 import math
+import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -16,6 +17,8 @@ from ..surfaces.formulas.numbers import OwnNumbers
 CHOICES = ("auto", "always", "never")
 # Seconds of plain Python after which a run compiles its kernels.
 _PATIENCE = 1.0
+# Seconds at most for which a run stays in plain Python because another process compiles its kernels.
+_LONGEST_COMPILATION = 120.0
 # In that time more particles than this have a few impacts each: nearly all of such a run is compiled anyway.
 _FEW = 2000
 
@@ -24,8 +27,8 @@ class Tier:
     """The tier of a run.
 
     Args:
-        choice: "auto": compiled where the kernels are found compiled, else in plain Python for about a second first;
-            "always" or "never" compiled.
+        choice: "auto": compiled where the kernels are found compiled, else in plain Python for about a second first,
+            and on while another process compiles them; "always" or "never" compiled.
         numbers: the arguments of the kernels. Where they call library functions, whose last bit may differ between
             the tiers, "auto" compiles at once: the result must not depend on the wall time.
         particles: their number.
@@ -36,11 +39,19 @@ class Tier:
         # Time left for plain Python [s].
         self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
         self.is_plain = self.left > 0.0
+        self._latest = time.monotonic() + _LONGEST_COMPILATION if self.is_plain else -math.inf
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
         """Choose the tier for the next calls, kernels and their arguments; whether it has changed."""
         before, may = self.is_plain, self.left > 0.0
-        self.is_plain = may and (self.left == math.inf or not all(cache.is_compiled(*call) for call in calls))
+        if self.left == math.inf:
+            return False
+        missing = [call for call in calls if (before or may) and not cache.is_compiled(*call)]
+        if before and missing and not may and time.monotonic() < self._latest:
+            # Where another process has begun, to wait for it would waste a core.
+            may = any(cache.is_being_compiled(*call) for call in missing)
+            self.left = _PATIENCE if may else self.left
+        self.is_plain = may and bool(missing)
         return self.is_plain != before
 
     def kernel(self, kernel: Any) -> Any:

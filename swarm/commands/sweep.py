@@ -1,0 +1,104 @@
+"""`swarm sweep`: carry out the runs of a sweep file."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .. import interrupt
+from ..errors import SwarmError
+from .run import INTERRUPTED, arguments_again
+from .shown import table
+
+if TYPE_CHECKING:
+    from ..ensemble.sweeping import Outcome
+
+_FAILED = 1
+# So many failures are printed; the table has all.
+_SHOWN = 5
+
+
+def sweep(  # noqa: PLR0913  one argument an option
+    sweep_file: Annotated[Path, typer.Argument(metavar="SWEEP.toml", help="A scene file with a [sweep] table.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FOLDER", help="Of all files [default: SWEEP, here].")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option(help="Runs at the same time [default: all cores]; results do not depend on it.")
+    ] = None,
+    threads: Annotated[int | None, typer.Option(help="Threads of a run [default: the cores for each].")] = None,
+    written: Annotated[
+        str, typer.Option("--table", metavar="KIND", help="Table of the results: csv or parquet.")
+    ] = "csv",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the runs that the folder holds.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
+    ] = False,
+    walltime: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
+    ] = False,
+) -> None:
+    """Carry out the runs of a sweep file, and write one table of their results."""
+    with interrupt.at_once():
+        from ..checks import duration
+        from ..ensemble import sweeping
+
+    try:
+        latest = None if walltime is None else duration("--walltime", walltime)
+        options = sweeping.SweepOptions(output, processes, threads, resume, overwrite, not quiet, written, latest)
+        outcome = sweeping.carry_out(sweep_file, options)
+    except KeyboardInterrupt:  # the second one
+        print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
+        if as_json:
+            print(json.dumps({"status": "interrupted"}))
+        raise typer.Exit(INTERRUPTED) from None
+    except SwarmError as error:
+        if as_json:
+            print(json.dumps({"status": "failed", "error": str(error)}))
+        raise
+    with interrupt.at_once():
+        _report(outcome, quiet, as_json)
+    if outcome.stopped:
+        raise typer.Exit(0 if outcome.stopped == "walltime" else INTERRUPTED)
+    if outcome.results.of_state("failed"):
+        raise typer.Exit(_FAILED)
+
+
+def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
+    from ..ensemble.plan import told
+
+    results = outcome.results
+    numbers = {state: len(results.of_state(state)) for state in ("done", "failed", "waiting")}
+    failures = [
+        (results.trajectory(variant).name, variant.parameters, (status or {})["error"])
+        for variant, status in results.of_state("failed")
+    ]
+    again = None
+    if outcome.stopped:
+        again = shlex.join(["swarm", *arguments_again(sys.argv[1:]), "--resume"])
+        reason = "interrupted" if outcome.stopped == "interrupted" else "the wall time limit is reached"
+        print(f"{reason}: {numbers['waiting']} runs are left; resume with\n  {again}", file=sys.stderr)
+    if others := results.others():
+        print(
+            f"{results.folder} also holds {len(others)} run{'s' * (len(others) > 1)} that {results.plan.path} does not "
+            f"have, such as {others[0]}.h5",
+            file=sys.stderr,
+        )
+    if as_json:
+        status = outcome.stopped or ("failed" if failures else "complete")
+        told_failures = [dict(zip(("file", "parameters", "error"), one, strict=True)) for one in failures]
+        more: dict[str, Any] = {"table": str(results.path), "wall_time": outcome.wall_time, "failures": told_failures}
+        print(json.dumps({"status": status, **numbers, **more, "resume": again}, indent=2, default=str))
+    elif not quiet:
+        shown = [f"{file}, {told(parameters)}: {error}" for file, parameters, error in failures[:_SHOWN]]
+        more_failures = [f"and {len(failures) - _SHOWN} more, in the table"] if len(failures) > _SHOWN else []
+        rows = {"runs": ", ".join(f"{count} {state}" for state, count in numbers.items() if count)}
+        rows |= {"failed": "\n".join(shown + more_failures)} if failures else {}
+        table({**rows, "wall time": f"{outcome.wall_time:.2f} s", "table": str(results.path)})

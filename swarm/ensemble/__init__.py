@@ -1,0 +1,1 @@
+"""Sweeps: many runs of one scene file, carried out by worker processes, and their results in one table."""

@@ -1,0 +1,174 @@
+"""The results of a sweep: a status file for every run, and one table of all."""
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import SceneError
+from ..extras import needed_by
+from ..output import paths
+from ..output.replaced import replaced
+from .plan import STEM, Plan, Variant
+
+TABLES = ("csv", "parquet")
+# What observables of three or four components are, (x, y, z) and quaternions; the others have an entry a surface.
+_AXES = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
+_VECTORS = ("momentum", "angular_momentum")
+Status = dict[str, Any]
+
+
+def final(observables: dict[str, Any]) -> dict[str, int | float]:
+    """The observables of the last frame, numbers by name: momentum_x, impulse_0, wall_position_0_x."""
+    last: dict[str, int | float] = {}
+    for name, values in observables.items():
+        end = np.asarray(values)[-1]
+        for at in np.ndindex(end.shape):
+            parts = [str(i) for i in at]
+            if parts and (name in _VECTORS or len(parts) > 1):
+                parts[-1] = _AXES[end.shape[-1]][at[-1]]
+            last["_".join([name, *parts])] = end[at].item()
+    return last
+
+
+def of_trajectory(path: Path, until: float) -> dict[str, int | float] | None:
+    """The observables of the last frame, or None if the trajectory does not reach its end."""
+    from ..output.trajectory import load
+
+    try:
+        with load(path) as trajectory:
+            times = trajectory.times
+            return final(trajectory.observed()) if len(times) and times[-1] >= until else None
+    except SceneError:
+        return None  # damaged: the run is carried out again
+
+
+class Results:
+    """What is known of the runs of a plan, in memory and in the folder.
+
+    Args:
+        plan: the runs.
+        folder: of all files.
+        table: "csv" or "parquet".
+    """
+
+    def __init__(self, plan: Plan, folder: Path, table: str) -> None:
+        self.plan, self.folder = plan, folder
+        self.path = folder / f"results.{table}"
+        self._statuses: dict[str, Status] = {}
+        values = [variant.parameters for variant in plan.variants]
+        # A column has values of one type; of others their JSON.
+        self._plain = {
+            key: len({_type_of(row[key]) for row in values}) == 1 and _type_of(values[0][key]) is not None
+            for key in values[0]
+        }
+
+    def trajectory(self, variant: Variant) -> Path:
+        """The trajectory of a run."""
+        return self.folder / f"{variant.stem}.h5"
+
+    def impacts(self, variant: Variant) -> Path | None:
+        """Its log of impacts, or None."""
+        return self.folder / f"{variant.stem}.impacts.h5" if variant.has_impacts else None
+
+    def status_file(self, variant: Variant) -> Path:
+        """Where its end is noted."""
+        return self.folder / f"{variant.stem}.json"
+
+    def find(self) -> None:
+        """Take up what the status files of the folder say."""
+        for variant in self.plan.variants:
+            try:
+                status = json.loads(self.status_file(variant).read_text(encoding="utf-8"))
+                known = {key: status[key] for key in ("state", "error", "wall_time", "observables")}
+            except (OSError, ValueError, KeyError, TypeError):
+                continue  # none, or none that is whole: the trajectory says what there is
+            self._statuses[variant.stem] = known
+
+    def remove(self) -> None:
+        """Remove the files of the plan's runs, which begin anew."""
+        self._statuses.clear()
+        for variant in self.plan.variants:
+            files = (self.status_file(variant), paths.checkpoint_of(self.trajectory(variant)), self.trajectory(variant))
+            for path in (*files, self.impacts(variant)):
+                if path is not None:
+                    path.unlink(missing_ok=True)
+
+    def add(self, variant: Variant, status: Status) -> None:
+        """Note the end of a run."""
+        with replaced(self.status_file(variant), "status") as file:
+            noted = {"parameters": variant.parameters, **status}
+            file.write((json.dumps(noted, indent=1, default=str) + "\n").encode())
+        self._statuses[variant.stem] = status
+
+    def of_state(self, state: str) -> list[tuple[Variant, Status | None]]:
+        """The runs that are "done", "failed", or "waiting" (have not ended), and what is known of them."""
+        every = [(variant, self._statuses.get(variant.stem)) for variant in self.plan.variants]
+        return [(variant, status) for variant, status in every if (status or {"state": "waiting"})["state"] == state]
+
+    def others(self) -> list[str]:
+        """The runs in the folder that the plan does not have."""
+        mine = {variant.stem for variant in self.plan.variants}
+        there = {path.stem for path in self.folder.glob("*.h5") if STEM.fullmatch(path.stem)}
+        return sorted(there - mine)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The table, a row for every run of the plan in its order."""
+        made = []
+        for variant in self.plan.variants:
+            status = self._statuses.get(variant.stem, {})
+            parameters = {
+                key: value if self._plain[key] else json.dumps(value, default=str)
+                for key, value in variant.parameters.items()
+            }
+            about = {
+                "state": status.get("state", "waiting"),
+                "error": status.get("error"),
+                "wall_time": status.get("wall_time"),
+            }
+            made.append({"file": self.trajectory(variant).name, **parameters, **about, **status.get("observables", {})})
+        return made
+
+    def frame(self) -> Any:
+        """The table as a pandas frame."""
+        import pandas as pd
+
+        rows = self.rows()
+        return pd.DataFrame(rows, columns=_columns(rows))
+
+    def write(self) -> None:
+        """Replace the table in the folder."""
+        rows = self.rows()
+        with replaced(self.path, "table") as file:
+            if self.path.suffix == ".csv":
+                text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+                writer = csv.DictWriter(text, _columns(rows), lineterminator="\n")
+                writer.writeheader()
+                writer.writerows(rows)
+                text.flush()
+                text.detach()
+            else:
+                self.frame().to_parquet(file, engine="pyarrow", index=False)
+
+
+def require_written(table: str) -> None:
+    """Raise a SceneError if the packages that write such a table are missing."""
+    if table == "parquet":
+        with needed_by("a table in Parquet", "parquet"):
+            import pandas  # noqa: F401
+            import pyarrow  # noqa: F401
+
+
+def _columns(rows: list[dict[str, Any]]) -> list[str]:
+    """The names of all columns, in the order in which they first come."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def _type_of(value: Any) -> str | None:
+    """What values of one type are; None for lists and tables."""
+    if isinstance(value, bool):
+        return "truth"
+    return "number" if isinstance(value, (int, float)) else "text" if isinstance(value, str) else None

@@ -1,0 +1,46 @@
+"""One process at a time: locks of names in the folder of compiled kernels, which the system releases at any death."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+# No compilation takes so long [s]: a lock that lasts is one of a disk that has none. Two processes that compile the
+# same kernel are slower, but not wrong.
+_LONGEST = 300.0
+# A waiting process looks so often [s]; a compilation takes seconds.
+_GLANCE = 0.05
+
+
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold the lock of a file, or none where it cannot be had: the folder is read-only, or its disk has no locks."""
+    import filelock
+
+    lock = filelock.FileLock(path, timeout=_LONGEST)
+    with contextlib.suppress(OSError, NotImplementedError):  # among the first: filelock.Timeout
+        lock.acquire(poll_interval=_GLANCE)
+    try:
+        yield
+    finally:
+        if lock.is_locked:
+            # While it is locked: who has it open notices that its name is gone, and makes a new one.
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+            lock.release()
+
+
+def is_held(path: Path) -> bool:
+    """Whether another process, or another thread, holds the lock of a file."""
+    import filelock
+
+    if not path.exists():
+        return False
+    lock = filelock.FileLock(path, blocking=False)
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        return True
+    except (OSError, NotImplementedError):
+        return False
+    lock.release()
+    return False

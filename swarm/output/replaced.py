@@ -1,0 +1,40 @@
+"""Files that are replaced as a whole: the old one stays until the new one is completely on the disk."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from ..errors import FileError
+from . import paths
+
+
+@contextlib.contextmanager
+def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
+    """A file to write in place of `path`, which takes its name at the end.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    part = paths.part_of(path)
+    try:
+        with open(part, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+        if os.name == "posix":
+            _sync_folder(path.parent)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FileError(f"cannot write the {what} {path}: {error}; the previous {what} is unchanged") from error
+
+
+def _sync_folder(path: Path) -> None:
+    """Flush the names in a folder to the disk; other systems cannot open folders."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

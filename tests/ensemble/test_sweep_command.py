@@ -1,0 +1,62 @@
+"""What `swarm sweep` prints, and its exit codes; Ctrl-C: test_sweep.py."""
+
+import json
+
+import pytest
+import typer
+from sweep_sessions import write
+
+import swarm
+from swarm.commands import sweep as module
+from swarm.commands.sweep import sweep
+from swarm.ensemble import sweeping
+
+
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory):
+    """The folder of six runs that fail as soon as they begin, and the outcome that the command reports."""
+    folder = tmp_path_factory.mktemp("command")
+    path = write(folder / "sweep.toml", '"particles.count" = {range = [1_000_000_000_000_000, 1_000_000_000_000_006]}')
+    outcomes = []
+
+    def kept(*arguments):
+        outcomes.append(carry_out(*arguments))
+        return outcomes[0]
+
+    carry_out = sweeping.carry_out
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweeping, "carry_out", kept)
+        with pytest.raises(typer.Exit) as end:
+            sweep(path, folder / "out", processes=1, quiet=True)
+    assert end.value.exit_code == 1
+    return folder, outcomes[0]
+
+
+def test_failures_are_told_with_their_sentences(failed, capsys):
+    module._report(failed[1], False, False)
+    told = " ".join(capsys.readouterr().out.split())
+    assert "runs 6 failed" in told
+    assert '"particles.count" = 1000000000000000: ' in told
+    assert "and 1 more, in the table" in told
+    assert "results.csv" in told.replace(" ", "")
+
+
+def test_json_has_the_same_also_of_bad_input(failed, capsys):
+    folder, outcome = failed
+    module._report(outcome, False, True)
+    told = json.loads(capsys.readouterr().out)
+    assert (told["status"], told["failed"], told["done"], told["waiting"]) == ("failed", 6, 0, 0)
+    assert told["failures"][5]["parameters"]["particles.count"] == 10**15 + 5
+    with pytest.raises(swarm.SceneError):
+        sweep(folder / "sweep.toml", folder / "out", as_json=True)
+    assert "--resume" in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_runs_that_the_file_no_longer_has_are_named(failed, capsys):
+    folder, outcome = failed
+    (folder / "out" / "0123456789ab.h5").touch()
+    module._report(outcome, True, False)
+    told = capsys.readouterr()
+    assert "also holds 1 run that" in told.err
+    assert "0123456789ab.h5" in told.err
+    assert told.out == ""
