@@ -126,10 +126,14 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles are its own copy. Of bodies they are all points."""
+    """A run, checked; the particles are its own copy. Of bodies they are all points.
+
+    `first` is the number of the first particle, or body, in the run of which this one is a shard.
+    """
 
     scene: Scene
     particles: Particles
     method: Method
     options: RunOptions
     bodies: Bodies | None = None
+    first: int = 0
