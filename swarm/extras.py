@@ -11,6 +11,7 @@ _PACKAGES = {
     "bodies": "scipy",
     "mesh": "trimesh libigl",
     "table": "pandas",
+    "cluster": "distributed",
 }
 
 

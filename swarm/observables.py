@@ -222,22 +222,22 @@ def drift(seen: dict[str, Any]) -> float:
 def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
     """What is summed over particles, of each chunk of them: (quantities, chunks).
 
-    The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall with
-    the work of walls that move behind it, and the heat of each wall. Chunks are summed on their own and in their order,
-    so those of a part of the particles, of whole chunks, are a part of those of all.
+    The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall
+    with the work of walls that move behind it, and the heat of each wall. Chunks are summed on their own and in their
+    order, so those of a part of the particles, of whole chunks, are a part of those of all.
     """
     contacts = state.contacts if lasts else None
-    rows = [np.ascontiguousarray(partial.T[:_ENERGY_ERROR])]
-    for values in (state.dissipated, None if contacts is None else contacts.sliding, state.impulse, state.heat):
-        rows.append(_of_chunks(values, state.mass.size))
-    return np.vstack(rows)
+    added = state.dissipated, None if contacts is None else contacts.sliding, state.impulse, state.heat
+    return np.vstack([partial.T[:_ENERGY_ERROR], *(_of_chunks(values, state.mass.size) for values in added)])
 
 
 def _of_chunks(values: Floats | None, n: int) -> Floats:
     """Sums of values (n,) or (rows, n) over chunks; one row of zeros if there are none."""
     if values is None or values.size == 0:
         return np.zeros((1, -(-n // CHUNK)))
-    return np.asarray(np.add.reduceat(np.atleast_2d(values), np.arange(0, n, CHUNK), axis=1))
+    rows, whole = np.atleast_2d(values), n - n % CHUNK
+    sums = rows[:, :whole].reshape(len(rows), -1, CHUNK).sum(axis=2)
+    return sums if whole == n else np.hstack([sums, rows[:, whole:].sum(axis=1)[:, None]])
 
 
 def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict[str, Any]:
@@ -245,7 +245,8 @@ def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict
 
     `owners` says which surface each wall belongs to, `booked` how many rows of impulse and work there are.
     """
-    kinetic, fall, stored, *_rest = totals = sums.sum(axis=1).tolist()
+    # NumPy adds rows in an order that depends on how they lie in memory.
+    kinetic, fall, stored, *_rest = totals = np.ascontiguousarray(sums).sum(axis=1).tolist()
     walls = np.array(totals[_ENERGY_ERROR + 2 :])
     pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.

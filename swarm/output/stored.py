@@ -30,7 +30,7 @@ class Stored:
     def __init__(self, path: str | Path, what: str, opener: str) -> None:
         self.path, self._opener = paths.given("path", path), opener
         require_file(self.path, what)
-        self._file = _opened(self.path)
+        self._file = opened(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -98,7 +98,12 @@ class Stored:
             return layout.text(file[f"parameters/{name}"], self.path)
 
 
-def _opened(path: Path) -> h5py.File:
+def opened(path: Path) -> h5py.File:
+    """The file, open for reading.
+
+    Raises:
+        SceneError: it cannot be read.
+    """
     # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
     # Without locking, a file that is still being written can be read.
     options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}

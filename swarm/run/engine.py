@@ -342,6 +342,10 @@ class Run:
             escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
         return {**seen, **self._poses(), "escaped": int(escaped)}
 
+    def chunk_sums(self) -> NDArray[np.float64]:
+        """What `observables.summed` takes, of the last frame."""
+        return observables.chunk_sums(self._partial, self.state, bool(self._kinds))
+
     def _poses(self) -> dict[str, NDArray[Any]]:
         """Where the surfaces are, if any moves."""
         if not self._scene.moves():

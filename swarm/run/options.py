@@ -56,6 +56,8 @@ class RunOptions:
     walltime: float | None = field(default=None, metadata=_OF_A_SESSION)
     compile: str = "auto"
     seed: int = 0
+    cluster: Any = field(default=None, metadata=_OF_A_SESSION)
+    shards: int | None = field(default=None, metadata=_OF_A_SESSION)
 
     def __post_init__(self) -> None:
         for name in ("trajectory", "recording", "impacts"):
@@ -68,7 +70,7 @@ class RunOptions:
             checks.positive("walltime", self.walltime)
         times = self.times
         object.__setattr__(self, "until", times.until)
-        for name in ("threads", "block_size"):
+        for name in ("threads", "block_size", "shards"):
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
         checks.one_of("compile", self.compile, CHOICES)
@@ -128,7 +130,8 @@ class RunOptions:
 class Task:
     """A run, checked; the particles are its own copy. Of bodies they are all points.
 
-    `first` is the number of the first particle, or body, in the run of which this one is a shard.
+    Of a shard of a run `start` is a digest of all particles of that run, and `first` the number of the first particle,
+    or body, of the shard.
     """
 
     scene: Scene
@@ -137,3 +140,9 @@ class Task:
     options: RunOptions
     bodies: Bodies | None = None
     first: int = 0
+    start: str = ""
+
+    @property
+    def is_shard(self) -> bool:
+        """Whether it is a shard of a run."""
+        return bool(self.start)

@@ -38,9 +38,11 @@ class Display:
 
 
 @contextlib.contextmanager
-def display(progress: bool | Callable[[Any], None]) -> Iterator[Display]:
-    """Nothing, the caller's own function, or a bar or lines on standard error."""
-    if callable(progress):
+def display(progress: bool | Callable[[Any], None] | Display) -> Iterator[Display]:
+    """Nothing, the caller's own function or display, or a bar or lines on standard error."""
+    if isinstance(progress, Display):
+        yield progress
+    elif callable(progress):
         # It gets a copy of the observables, which it may change.
         yield Display(lambda frame: progress(frame.apart()))
     elif not progress:
