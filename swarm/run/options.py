@@ -73,6 +73,8 @@ class RunOptions:
         for name in ("threads", "block_size", "shards"):
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
+        if self.shards is not None and self.cluster is None:
+            raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
         checks.one_of("compile", self.compile, CHOICES)
         checks.flag("member_impacts", self.member_impacts)
         self._check_impacts()
