@@ -8,6 +8,7 @@ from . import (
     accuracy,
     bars,
     bodies,
+    cluster,
     compare,
     contacts,
     endurance,
@@ -40,6 +41,7 @@ def main() -> None:
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("cluster", help="two workers against two threads, and what 200 shards take of a scheduler")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -61,6 +63,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "cluster": cluster,
         "endurance": endurance,
     }
     before = report.stolen()

@@ -67,16 +67,23 @@ def carry_out(task: Task, session: Session) -> End:
         writer = writer_of(task, session, recorder, log)
         history = _frames(task, session, run, writer, show, log)
         session.finish()
-        trajectory = task.options.trajectory
         return End(
             task.particles,
-            _columns(history) if trajectory is None else read_back(trajectory),
+            _observables(task, history),
             session.wall_time(),
             run.state.multipliers,
             run.state.impacts,
             np.full(len(task.particles), np.nan) if run.state.escape_time is None else run.state.escape_time,
             None if tally is None else tally.of_members(),
         )
+
+
+def _observables(task: Task, history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Those of all frames; none of a shard, which are joined to those of the others."""
+    if task.is_shard:
+        return {}
+    trajectory = task.options.trajectory
+    return _columns(history) if trajectory is None else read_back(trajectory)
 
 
 def warn_open() -> None:

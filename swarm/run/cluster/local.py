@@ -30,7 +30,7 @@ def started(workers: int) -> Iterator[str]:
     # Functions of the user's modules are looked up where this process finds them.
     folders = [str(_ROOT), *(os.path.abspath(folder) for folder in sys.path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
-    command = [sys.executable, "-m", "swarm.run.cluster.local", str(workers)]
+    command = [sys.executable, "-P", "-m", "swarm.run.cluster.local", str(workers)]
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, env=environment,
