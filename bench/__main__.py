@@ -8,6 +8,7 @@ from . import (
     accuracy,
     bars,
     bodies,
+    cluster,
     compare,
     contacts,
     endurance,
@@ -42,6 +43,7 @@ def main() -> None:
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
     commands.add_parser("sweep", help="many short runs: the wall time beside its parts, the memory of a thousand")
+    commands.add_parser("cluster", help="two workers against two threads, and what 200 shards take of a scheduler")
     for command in commands.choices.values():
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
@@ -64,6 +66,7 @@ def main() -> None:
         "motion": motion,
         "fields": fields,
         "sweep": sweeps,
+        "cluster": cluster,
         "endurance": endurance,
     }
     before = report.stolen()

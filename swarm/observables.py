@@ -219,37 +219,70 @@ def drift(seen: dict[str, Any]) -> float:
     return float(change / abs(energy[0]) if energy[0] else change)
 
 
-def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> dict[str, Any]:
-    """The observables of one frame from the partial sums (chunks, ROWS); NumPy adds pairwise.
+def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
+    """What is summed over particles, of each chunk of them: (quantities, chunks).
 
-    `owners` says which surface each wall belongs to, `lasts` whether a contact has lasted in this run.
+    The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall
+    with the work of walls that move behind it, and the heat of each wall. Chunks are summed on their own and in their
+    order, so those of a part of the particles, of whole chunks, are a part of those of all.
     """
-    multipliers, contacts = state.multipliers, state.contacts if lasts else None
+    contacts = state.contacts if lasts else None
+    added = state.dissipated, None if contacts is None else contacts.sliding, state.impulse, state.heat
+    return np.vstack([partial.T[:_ENERGY_ERROR], *(_of_chunks(values, state.mass.size) for values in added)])
+
+
+def _of_chunks(values: Floats | None, n: int) -> Floats:
+    """Sums of values (n,) or (rows, n) over chunks; one row of zeros if there are none."""
+    if values is None or values.size == 0:
+        return np.zeros((1, -(-n // CHUNK)))
+    rows, whole = np.atleast_2d(values), n - n % CHUNK
+    sums = rows[:, :whole].reshape(len(rows), -1, CHUNK).sum(axis=2)
+    return sums if whole == n else np.hstack([sums, rows[:, whole:].sum(axis=1)[:, None]])
+
+
+def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict[str, Any]:
+    """The observables that are sums over particles, from those of all chunks (quantities, chunks); NumPy adds pairwise.
+
+    `owners` says which surface each wall belongs to, `booked` how many rows of impulse and work there are.
+    """
+    # NumPy adds rows in an order that depends on how they lie in memory.
+    kinetic, fall, stored, *_rest = totals = np.ascontiguousarray(sums).sum(axis=1).tolist()
+    walls = np.array(totals[_ENERGY_ERROR + 2 :])
+    pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.
-    booked = state.impulse.sum(axis=1)
-    impulse = np.bincount(owners, weights=booked[: len(owners)])
-    moves = {} if booked.size == len(owners) else {"wall_work": np.bincount(owners, weights=booked[len(owners) :])}
-    heat = np.zeros_like(impulse) if state.heat is None else np.bincount(owners, weights=state.heat.sum(axis=1))
-    loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
-    totals = np.ascontiguousarray(partial.T[:_ENERGY_ERROR]).sum(axis=1)
-    kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
-    energy_error, depth = partial[:, _ENERGY_ERROR:].max(axis=0).tolist()
+    moves = {} if booked == len(owners) else {"wall_work": np.bincount(owners, weights=pushed[len(owners) :])}
+    impulse = np.bincount(owners, weights=pushed[: len(owners)])
     return {
         "kinetic_energy": kinetic,
         "potential_energy": fall,
         "contact_energy": stored,
         "total_energy": kinetic + fall + stored,
-        "dissipated_energy": float(state.dissipated.sum()),
+        "dissipated_energy": totals[_ENERGY_ERROR],
+        "momentum": np.array(totals[_PX : _PZ + 1]),
+        "angular_momentum": np.array(totals[_LX : _LZ + 1]),
+        "impulse": impulse,
+        "sliding_time": totals[_ENERGY_ERROR + 1],
+        "wall_heat": np.bincount(owners, weights=heat) if has_heat else np.zeros_like(impulse),
+        **moves,
+    }
+
+
+def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
+    """The observables that are largest values, or numbers of something: the order does not matter to them."""
+    multipliers, contacts = state.multipliers, state.contacts if lasts else None
+    energy_error, depth = partial[:, _ENERGY_ERROR:].max(axis=0).tolist()
+    loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
+    return {
         "energy_error": energy_error,
-        "momentum": totals[_PX : _PZ + 1],
-        "angular_momentum": totals[_LX : _LZ + 1],
         "max_penetration": depth,
         "impacts": int(state.impacts.sum()),
-        "impulse": impulse,
         "sliding": 0 if contacts is None else int(np.count_nonzero(contacts.phase)),
-        "sliding_time": 0.0 if contacts is None else float(contacts.sliding.sum()),
-        "wall_heat": heat,
-        **moves,
         **loops,
         "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }
+
+
+def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> dict[str, Any]:
+    """The observables of one frame from the partial sums (chunks, ROWS); `lasts`: a contact has lasted in this run."""
+    sums = chunk_sums(partial, state, lasts)
+    return summed(sums, owners, len(state.impulse), state.heat is not None) | counted(partial, state, lasts)

@@ -112,7 +112,7 @@ def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
     lasting = observe(law, scene, state._replace(contacts=contacts, heat=heat))
     assert (lasting["sliding"], lasting["sliding_time"]) == (12, pytest.approx(sliding.sum(), rel=1e-13))
     assert lasting["wall_heat"] == pytest.approx(heat.sum(axis=1), rel=1e-12)
-    partial = np.zeros((1, observables.ROWS))
+    partial = np.zeros((-(-N // observables.CHUNK), observables.ROWS))
     of_one = observables.summary(partial, state._replace(heat=heat), [0, 0], True)
     assert of_one["wall_heat"] == pytest.approx([heat.sum()], rel=1e-12)
     for name in found.keys() - {"sliding", "sliding_time", "wall_heat"}:

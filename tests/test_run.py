@@ -46,7 +46,7 @@ def test_every_particle_that_is_not_done_follows_once(n, size):
     phase = np.where(np.random.default_rng(n).random(n) < 0.4, events.ARRIVED, events.FLYING).astype(np.int8)
     number, pending = -(-n // size), np.zeros(events.PHASES, np.int64)
     draws = lanes.Draws(np.zeros(1, np.int64), np.arange(number), size, np.empty(number, np.int64))
-    share = lanes.Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0, 1.0)
+    share = lanes.Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0, 0, 1.0)
     i, stop, drawn, found = 0, 0, 0, []
     while True:
         i, stop, drawn = lanes.following_particle(share, events.FLYING, i, stop, drawn)

@@ -8,6 +8,7 @@ from test_sessions import stopped_at
 
 import swarm
 from swarm.run.engine import Run
+from swarm.run.state import Seeding
 from swarm.run.tally import Tally, Watched
 
 MANY = {
@@ -71,7 +72,7 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
 
     def begun():
         tally = Tally(scene)
-        return Run(scene, start.copy(), swarm.Impact(), 1, None, "never", 0, Watched(None, tally)), tally
+        return Run(scene, start.copy(), swarm.Impact(), 1, None, "never", Seeding(), Watched(None, tally)), tally
 
     one, tally = begun()
     for moment in (1.0, 2.0):

@@ -69,11 +69,15 @@ class Bodies:
 
     def moved(self, particles: Particles) -> "Bodies":
         """These bodies where their points, as `particles` gives them, are now."""
-        shape, end = self.position.shape, object.__new__(Bodies)
-        # Not checked again: a tolerance of Uzawa's loop is the run's, and more than what a start may be off by.
-        end.body = self.body
-        end.position, end.velocity = particles.position.reshape(shape), particles.velocity.reshape(shape)
-        return end
+        shape = self.position.shape
+        return Bodies.unchecked(self.body, particles.position.reshape(shape), particles.velocity.reshape(shape))
+
+    @staticmethod
+    def unchecked(body: Body, position: Floats, velocity: Floats) -> "Bodies":
+        """Bodies of a run: a tolerance of Uzawa's loop is the run's, and more than what a start may be off by."""
+        made = object.__new__(Bodies)
+        made.body, made.position, made.velocity = body, position, velocity
+        return made
 
     def particles(self) -> Particles:
         """All points as particles: point p of copy i is number p n + i.

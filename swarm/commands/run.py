@@ -43,6 +43,13 @@ def run(  # noqa: PLR0913  one argument an option
     compile: Annotated[
         str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
     ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
+    ] = None,
+    shards: Annotated[
+        int | None, typer.Option(help="Shards of a run on a cluster [default: one for each thread of its workers].")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the outcome of the run as JSON, also if it fails.")
     ] = False,
@@ -78,6 +85,8 @@ def run(  # noqa: PLR0913  one argument an option
                 resume=resume,
                 walltime=None if walltime is None else duration("--walltime", walltime),
                 compile=compile or job.run.compile,
+                cluster=cluster,
+                shards=shards,
             )
             # Before particles are made and kernels compiled.
             inputs = {"scene file": scene_file, "file of the start": job.start_file()}
@@ -95,7 +104,7 @@ def run(  # noqa: PLR0913  one argument an option
         # The files are closed: a second signal may end the process here.
         with interrupt.at_once():
             has_frames = target.exists() and (resumes or paths.identity(target) != before)
-            again = _stopped(status, target, has_frames)
+            again = _stopped(status, target, has_frames, cluster is not None)
             if has_frames:
                 report(status, target, resume=again)
             else:
@@ -113,15 +122,15 @@ def run(  # noqa: PLR0913  one argument an option
         table(of_result(result, getattr(start, "volume", None)))
 
 
-def _stopped(status: str, target: Path, has_frames: bool) -> str | None:
+def _stopped(status: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
     """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
     from ..output import paths
 
     reason = "interrupted" if status == "interrupted" else "the wall time limit is reached"
-    if not has_frames:
+    if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):
         print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
         return None
-    held = f"{reason}: {target} holds the frames that were finished"
+    held = f"{reason}: {target} holds the frames that were finished" if has_frames else f"{reason}: no frame is whole"
     if not paths.checkpoint_of(target).exists():
         print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
         return None

@@ -84,6 +84,7 @@ class Share(NamedTuple):
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
     seed: int  # of random numbers
+    first: int  # the number of particle 0 in the whole run, for them
     moment: float  # at which the frame ends [s]
     log: Any = None  # `log.Log` of impacts
     counts: Any = None  # `log.Counts` of them

@@ -200,7 +200,7 @@ def _(thermal, method, chain, gravity, share, lanes, live):
         wall, p = lanes.wall[i], index(lanes.particle[i])
         if wall >= 0.0:
             r, v = column(rows, R, i), column(rows, V, i)
-            draw = Draw(share.seed, lanes.particle[i], state.impacts[p] + np.int64(rows[HITS, i]))
+            draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(rows[HITS, i]))
             now, laws = at(chain, rows[LEFT, i]), methods.laws(method)
             left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:

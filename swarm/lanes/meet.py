@@ -124,7 +124,7 @@ def _(thermal, method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     now = at(chain, contacts.left[i])
-    left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, i, state.impacts[i]))
+    left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i]))
     if not left.happens:
         return False
     before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)

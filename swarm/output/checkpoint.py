@@ -29,6 +29,8 @@ Arrays = dict[str, NDArray[Any]]
 # The name of an archive's first entry ends here.
 _FIRST = b"job.npy"
 _HEAD = 30 + len(_FIRST)
+# The array of a checkpoint of a run on a cluster that holds the bounds of its shards.
+SHARDS = "shards"
 _HINT = "use the inputs that it was started with, or start again with --overwrite"
 
 
@@ -44,6 +46,7 @@ class Job:
         seed: of thermal walls.
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
         member_impacts: whether the impacts on each member are counted.
+        first: of a shard the number of its first particle, or body, in the whole run.
     """
 
     version: str
@@ -60,6 +63,7 @@ class Job:
     kept: str = ""
     rows: int = 0
     member_impacts: bool = False
+    first: int = 0
 
     def require_same(self, other: "Job", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""

@@ -1,11 +1,14 @@
 """The layout that a trajectory is checked for before it is read: datasets, their types, and consistent shapes."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 from numpy.typing import NDArray
+
+from ..errors import SceneError
 
 PARTS = ("position", "velocity")
 # The impacts of each particle, beside these; files of older versions have none.
@@ -64,6 +67,31 @@ def frames(file: Any, path: Path) -> int:
     if "particles/all" in file:
         _require_particles(file, n, count, path)
     return n
+
+
+def require_shards(file: Any, n: int, path: Path, open_file: Callable[[Path], Any]) -> None:
+    """Raise an error that names the file where one is missing or damaged that holds particles of n frames of this one.
+
+    HDF5 would fill in zeros for what it does not find.
+    """
+    held: dict[str, dict[str, int]] = {}
+    for name in (*PARTS, IMAGES, COUNTS, ESCAPES):
+        value = file.get(f"particles/all/{name}/value")
+        for one in value.virtual_sources() if value is not None and value.is_virtual else ():
+            _begin, end = one.src_space.get_select_bounds()
+            held_there = held.setdefault(one.file_name, {})
+            held_there[one.dset_name] = max(held_there.get(one.dset_name, 0), end[1] + 1)
+    for shard_name, needed in held.items():
+        shard = path.parent / shard_name
+        if not shard.is_file():
+            raise SceneError(f"{path} needs {shard}, which holds a part of its particles, got none; move both together")
+        with open_file(shard) as part:
+            for source, entries in needed.items():
+                if part[source].shape[0] < n or part[source].shape[1] < entries:
+                    raise SceneError(
+                        f"{shard} must hold {n} frames of {entries} particles of {path}, got {source} of the shape "
+                        f"{part[source].shape}: it is of another run, or was changed"
+                    )
 
 
 def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
@@ -156,6 +184,8 @@ def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | N
 
 def require_fits(dataset: Any, rows: int, path: Path) -> None:
     """Raise a ValueError if the file is too small for so many rows, before memory is allocated for them."""
+    if dataset.is_virtual:
+        return  # `require_shards` looks at the files that hold them
     size, packed = path.stat().st_size, dataset.id.get_create_plist().get_nfilters() > 0
     wanted = rows * math.prod(dataset.shape[1:]) * dataset.dtype.itemsize
     if wanted > size * (_DENSEST if packed else 1):

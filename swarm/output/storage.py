@@ -40,11 +40,11 @@ class Storage:
         checks.one_of("precision", self.precision, _PRECISIONS)
         checks.one_of("compression", self.compression, _COMPRESSIONS)
 
-    def kept(self) -> slice:
-        """The particles that it keeps."""
+    def kept(self, first: int = 0) -> slice:
+        """The particles that it keeps, of those from number `first` on."""
         if isinstance(self.frames, str):
             return slice(None) if self.frames == "all" else slice(0)
-        return slice(None, None, self.frames)
+        return slice(-first % self.frames, None, self.frames)
 
     def bytes_of(self, n: int) -> int:
         """Bytes that n particles take in a frame, if they are not compressed."""

@@ -27,7 +27,7 @@ class Stored:
     def __init__(self, path: str | Path, what: str, opener: str) -> None:
         self.path, self._opener = paths.given("path", path), opener
         require_file(self.path, what)
-        self._file = _opened(self.path)
+        self._file = opened(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -95,7 +95,12 @@ class Stored:
             return layout.text(file[f"parameters/{name}"], self.path)
 
 
-def _opened(path: Path) -> h5py.File:
+def opened(path: Path) -> h5py.File:
+    """The file, open for reading.
+
+    Raises:
+        SceneError: it cannot be read.
+    """
     # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
     # Without locking, a file that is still being written can be read.
     options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}
@@ -124,7 +129,7 @@ def _opened(path: Path) -> h5py.File:
 def is_log(path: Path) -> bool:
     """Whether an HDF5 file is a log of impacts, and no trajectory."""
     require_file(path, "a trajectory or a log of impacts (.h5)")
-    with _opened(path) as file, contextlib.suppress(*DAMAGE):
+    with opened(path) as file, contextlib.suppress(*DAMAGE):
         return "impacts" in file and "h5md" not in file
     return False  # what is damaged is said by who reads more of it
 

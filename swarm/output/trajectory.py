@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..particles import Particles
 from . import layout
-from .stored import Stored, finite, times_of, whole
+from .stored import Stored, finite, opened, times_of, whole
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
@@ -49,6 +49,7 @@ class Trajectory(Stored):
             with self._reading("its structure") as file:
                 foreign = layout.missing(file)
                 self._frames = 0 if foreign else layout.frames(file, self.path)
+                layout.require_shards(file, self._frames, self.path, opened)
             if foreign:
                 raise SceneError(f"{self.path} is an HDF5 file, but not a trajectory of swarm: it has no {foreign}")
         except SceneError:
@@ -69,12 +70,16 @@ class Trajectory(Stored):
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
         """All observables, one entry a frame."""
-        seen = {"time": self.times}
+        return {"time": self.times, **self.observables_of(slice(self._frames))}
+
+    def observables_of(self, some: slice) -> dict[str, NDArray[Any]]:
+        """All observables of some frames but their times."""
+        seen = {}
         with self._reading("its observables") as file:
             group = file.get("observables", {})
             for name in group:
                 with self._reading(f"its observable {name}"):
-                    seen[name] = finite(group[name]["value"][: self._frames])
+                    seen[name] = finite(group[name]["value"][some])
         return seen
 
     def observed(self) -> dict[str, NDArray[Any]]:

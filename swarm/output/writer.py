@@ -29,6 +29,8 @@ _CHUNK = (10, 1000)
 # The chunk cache of positions holds the chunks of one frame, up to this many bytes; that of an observable its last
 # chunks.
 _LARGEST_CACHE = 1 << 28
+# Entries of a chunk of an observable, and its most bytes: a shard has one that is as long as it has chunks.
+_ENTRIES, _MOST_BYTES = 1024, 1 << 20
 _PACKED: dict[str, dict[str, Any]] = {
     "none": {},
     "gzip": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
@@ -62,7 +64,8 @@ class TrajectoryWriter:
         self._path, self._storage, self._scene, self._method = path, storage, scene, method
         self._bodies = None if isinstance(particles, Particles) else particles
         particles = particles if isinstance(particles, Particles) else particles.particles()
-        self._count, self._mass, self._text = len(particles), particles.mass[storage.kept()], scene_text
+        self._kept = storage.kept(identity.get("first", 0))
+        self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
         self._identity, self._following = identity, following
         self._grown = AppendedFile(path, "trajectory", following)
         self._edges: Any = None
@@ -116,18 +119,22 @@ class TrajectoryWriter:
         if repeats is not None:
             self._edges = self._element("particles/all/box/edges", (3,), np.float64, (1024, 3))
         everything["mass"] = self._mass
-        everything["id"] = np.arange(self._count)[self._storage.kept()]
+        everything["id"] = np.arange(self._count)[self._kept]
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
+        for name, width, kind in _kept_of(self._scene, self._storage.precision):
+            self._make_particles(name, (n, *width), kind)
+
+    def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
+        """The element of the particles of this name."""
+        n, *width = shape
         options = _PACKED[self._storage.compression]
         # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
         deep = 1 if options else _CHUNK[0]
         options = {**options, "rdcc_nbytes": self._cache()}
-        for name, width, kind in _kept_of(self._scene, self._storage.precision):
-            self._values[name] = self._element(
-                f"particles/all/{name}", (n, *width), kind, (deep, min(n, _CHUNK[1]), *width), **options
-            )
+        chunk = deep, min(n, _CHUNK[1]), *width
+        self._values[name] = self._element(f"particles/all/{name}", shape, kind, chunk, **options)
 
     def _open(self) -> None:
         parameters = self._file["parameters"]
@@ -162,7 +169,7 @@ class TrajectoryWriter:
                 for name in (name for name in seen if name != "time"):
                     entry = np.asarray(seen[name])
                     self._observables[name] = self._element(
-                        f"observables/{name}", entry.shape, entry.dtype, (1024, *entry.shape)
+                        f"observables/{name}", entry.shape, entry.dtype, (_entries(entry), *entry.shape)
                     )
                 self._grown.begin()
             for name, dataset in self._values.items():
@@ -185,6 +192,10 @@ class TrajectoryWriter:
             self._file = self._grown.file
             self._open()
         paths.checkpoint_of(self._path).unlink(missing_ok=True)
+
+
+def _entries(entry: NDArray[Any]) -> int:
+    return max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes)))
 
 
 def _kept_of(scene: Scene, precision: str) -> Iterator[tuple[str, tuple[int, ...], Any]]:

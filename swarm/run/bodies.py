@@ -16,7 +16,8 @@ from ..kernel.vector import column
 from ..lanes.tied.advance import advance_bodies
 from ..lanes.tied.arrays import BodyState, Rule
 from ..methods.base import Method
-from ..particles import Particles, State
+from ..observables import CHUNK
+from ..particles import Floats, Particles, State
 from ..scene import Scene
 from ..status import Status
 from .tiers import Tier
@@ -41,9 +42,9 @@ class BodyRun:
 
     def __init__(
         self, scene: Scene, bodies: Bodies, particles: Particles, method: Method, threads: int,
-        block_size: int | None = None, compile: str = "always",
+        block_size: int | None = None, compile: str = "always", first: int = 0,
     ) -> None:  # fmt: skip
-        self._scene, self._body, self._method = scene, bodies.body, method
+        self._scene, self._body, self._method, self._first = scene, bodies.body, method, first
         self._law = method.law()
         looped = method.has_multipliers()
         n, points, walls = len(bodies), len(bodies.body), len(scene.owners())
@@ -92,11 +93,16 @@ class BodyRun:
         self._threads = min(threads, math.ceil(n / self._size))
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
         self._cut_short = False
-        self._led_start = self._led_energy()
-        self._start = self._energies()
+        pull = math.hypot(*gravity) * self._ties.mass.sum()
+        self._led_start, self._start, self._scale = np.zeros((3, n))
+        for some, r, v in self._blocks():
+            kinetic = self._kinetic(v)
+            self._led_start[some] = self._led_energy(r, v)
+            self._start[some] = start = kinetic + self._fall(r) + self._elastic(r) + self._stored(r)
+            self._scale[some] = np.maximum(np.abs(start), kinetic) + pull * size
         self._bodies.energy[:] = self._start
-        self._scale = np.maximum(np.abs(self._start), self._kinetic()) + self._fall_scale()
         self._seen: dict[str, Any] = {}
+        self._sums = np.zeros((0, 0))
         self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
         if not self._tier.is_plain and lanes == 1:
             self._rule = self._rule._replace(lanes=most)
@@ -139,7 +145,7 @@ class BodyRun:
 
     def _failure(self, status: Status, number: int, moment: float) -> str:
         time_of = moment - self._bodies.left[number]
-        sentence = f"the frame at {moment:g} s failed at body {number}, at {time_of:.6g} s: "
+        sentence = f"the frame at {moment:g} s failed at body {self._first + number}, at {time_of:.6g} s: "
         if status == Status.UNSOLVED:
             return sentence + (
                 f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; lengths at its start "
@@ -161,22 +167,27 @@ class BodyRun:
 
     # --- What is observed --------------------------------------------------------------------------------
 
-    def _kinetic(self) -> NDArray[np.float64]:
-        v = self._bodies.velocity
+    def _blocks(self) -> Iterator[tuple[slice, Floats, Floats]]:
+        """The bodies by chunks: which they are, their positions and velocities.
+
+        BLAS rounds a column by how many there are, and NumPy a sum by where its numbers lie: with arrays of its own a
+        chunk has the same bits in every run that it is a part of.
+        """
+        for begin in range(0, len(self._bodies.left), CHUNK):
+            some = slice(begin, begin + CHUNK)
+            both = self._bodies.position[..., some], self._bodies.velocity[..., some]
+            yield some, np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
+
+    def _kinetic(self, v: Floats) -> Floats:
         moving = np.tensordot(self._ties.mass, v, axes=(1, 1))  # (P, 3, n)
         return np.asarray(0.5 * (moving.transpose(1, 0, 2) * v).sum(axis=(0, 1)))
 
-    def _fall(self) -> NDArray[np.float64]:
-        mass = self._ties.mass.sum(axis=1)
-        center = np.tensordot(mass, self._bodies.position, axes=(0, 1))
+    def _fall(self, r: Floats) -> Floats:
+        center = np.tensordot(self._ties.mass.sum(axis=1), r, axes=(0, 1))
         return np.asarray(-(self._rule.gravity @ center))
 
-    def _fall_scale(self) -> NDArray[np.float64]:
-        pull = math.hypot(*self._rule.gravity) * self._ties.mass.sum()
-        return np.full(len(self._bodies.left), pull * self._scene.finite_size())
-
-    def _elastic(self) -> NDArray[np.float64]:
-        r, ties = self._bodies.position, self._ties
+    def _elastic(self, r: Floats) -> Floats:
+        ties = self._ties
         total = np.zeros(r.shape[2])
         for _row, (i, j, k, length) in enumerate(self._body.springs):
             total += 0.5 * k * (np.sqrt(((r[:, i] - r[:, j]) ** 2).sum(axis=0)) - length) ** 2
@@ -186,12 +197,11 @@ class BodyRun:
             total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
         return total
 
-    def _stored(self) -> NDArray[np.float64]:
+    def _stored(self, r: Floats) -> Floats:
         """What walls that are springs store, of each copy."""
-        total = np.zeros(len(self._bodies.left))
+        total = np.zeros(r.shape[2])
         if self._law is not None:
-            places = [(self._scene, self._contact_points())]
-            r = self._bodies.position
+            places = [(self._scene, self._contact_points(r))]
             for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
                 places.append((scene, (r[:, point] - r[:, carrier])[:, None, :]))
             for scene, points in places:
@@ -200,17 +210,14 @@ class BodyRun:
                     total[k % total.size] += contact_energy(self._law, chain, 1.0, column(flat, 0, k))
         return total
 
-    def _contact_points(self) -> NDArray[np.float64]:
+    def _contact_points(self, r: Floats) -> Floats:
         """(3, K, n)"""
-        return np.tensordot(self._body.contacts, self._bodies.position, axes=(1, 1)).transpose(1, 0, 2)
+        return np.tensordot(self._body.contacts, r, axes=(1, 1)).transpose(1, 0, 2)
 
-    def _energies(self) -> NDArray[np.float64]:
-        return self._kinetic() + self._fall() + self._elastic() + self._stored()
-
-    def _led_energy(self) -> NDArray[np.float64]:
+    def _led_energy(self, r: Floats, v: Floats) -> Floats:
         """Kinetic and potential energy of led points themselves."""
         led = led_points(self._body)
-        r, v, mass = self._bodies.position[:, led], self._bodies.velocity[:, led], self._ties.mass[np.ix_(led, led)]
+        r, v, mass = r[:, led], v[:, led], self._ties.mass[np.ix_(led, led)]
         moving = np.tensordot(mass, v, axes=(1, 1)).transpose(1, 0, 2)
         fall = np.tensordot(mass.sum(axis=1), r, axes=(0, 1))
         return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - self._rule.gravity @ fall)
@@ -244,43 +251,42 @@ class BodyRun:
 
     def observe(self) -> None:
         """Observe the bodies as they are."""
-        state, bodies = self.state, self._bodies
-        kinetic, fall, elastic = self._kinetic(), self._fall(), self._elastic() + self._stored()
-        work = bodies.work + self._led_energy() - self._led_start
-        error = np.abs(kinetic + fall + elastic + bodies.dissipated - work - self._start)
-        scaled = np.divide(error, self._scale, out=np.zeros_like(error), where=self._scale > 0.0)
-        state.impacts[:] = np.tile(bodies.impacts, len(self._body))
-        momentum = np.tensordot(self._ties.mass, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
-        spin = np.cross(bodies.position, momentum, axis=0).sum(axis=(1, 2))
-        depth = max([0.0, *(out.max() for out in self._out_of_own())])
-        if len(self._body.contacts):
-            depth = max(depth, self._scene.distances_outside(self._contact_points().reshape(3, -1)).max(initial=0.0))
-        pushed, walls = bodies.impulse.sum(axis=1), len(self._owners)
-        impulse = np.bincount(self._owners, weights=pushed[:walls], minlength=len(self._scene.surfaces))
+        bodies, surfaces = self._bodies, len(self._scene.surfaces)
+        self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
+        sums, errors, depths = zip(*(self._observed(*block) for block in self._blocks()), strict=True)
+        self._sums = np.ascontiguousarray(np.array(sums).T)
         self._seen = {
-            "kinetic_energy": float(kinetic.sum()),
-            "potential_energy": float(fall.sum()),
-            "contact_energy": float(elastic.sum()),
-            "total_energy": float((kinetic + fall + elastic).sum()),
-            "dissipated_energy": float(bodies.dissipated.sum()),
-            "energy_error": float(scaled.max()),
-            "momentum": momentum.sum(axis=(1, 2)),
-            "angular_momentum": spin,
-            "max_penetration": float(depth),
+            **summed(self._sums, self._owners, surfaces, len(self._body.cavities)),
+            "energy_error": max(errors),
+            "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
             "impacts": int(bodies.impacts.sum()),
-            "impulse": impulse,
             "sliding": int(np.count_nonzero(bodies.lasting)),
-            "sliding_time": float(bodies.sliding.sum()),
-            "wall_heat": np.zeros(len(self._scene.surfaces)),
             "unconverged": int(bodies.unconverged.sum()),
             "escaped": 0,
             "link_error": self._link_error(),
-            "work": float(work.sum()),
         }
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
-        if self._body.cavities:
-            self._seen["cavity_impulse"] = pushed[walls + self._touching.guides :]
+
+    def _observed(self, some: slice, r: Floats, v: Floats) -> tuple[list[float], float, float]:
+        """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
+        bodies = self._bodies
+        kinetic, fall, elastic = self._kinetic(v), self._fall(r), self._elastic(r) + self._stored(r)
+        total, lost = kinetic + fall + elastic, bodies.dissipated[some]
+        work = bodies.work[some] + self._led_energy(r, v) - self._led_start[some]
+        error, scale = np.abs(total + lost - work - self._start[some]), self._scale[some]
+        scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
+        momentum = np.tensordot(self._ties.mass, v, axes=(1, 1)).transpose(1, 0, 2)
+        numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
+        vectors = momentum.sum(axis=(1, 2)), np.cross(r, momentum, axis=0).sum(axis=(1, 2))
+        pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
+        points = self._contact_points(r).reshape(3, -1)
+        depth = self._scene.distances_outside(points).max(initial=0.0) if points.size else 0.0
+        return [*(one.sum() for one in numbers), *np.concatenate([*vectors, pushed])], scaled.max().item(), float(depth)
+
+    def chunk_sums(self) -> Floats:
+        """What `summed` takes, (quantities, chunks of bodies), of the last frame."""
+        return self._sums
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
@@ -291,7 +297,9 @@ class BodyRun:
         r = self._bodies.position
         if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
             good = np.isfinite(r).all(axis=(0, 1)) & np.isfinite(self._bodies.velocity).all(axis=(0, 1))
-            raise RunError(f"the frame at {moment:g} s failed at body {int(np.argmin(good))}: {_NOT_FINITE}")
+            raise RunError(
+                f"the frame at {moment:g} s failed at body {self._first + int(np.argmin(good))}: {_NOT_FINITE}"
+            )
         if seen["max_penetration"] > self._deepest:
             raise RunError(
                 f"the frame at {moment:g} s failed: a point of a body is {seen['max_penetration']:.3g} m outside its "
@@ -310,3 +318,26 @@ class BodyRun:
 
 
 _NOT_FINITE = Status.NOT_FINITE.sentence
+
+
+def summed(sums: Floats, owners: list[int], surfaces: int, cavities: int) -> dict[str, Any]:
+    """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
+
+    `owners` says which surface each wall belongs to; the last `cavities` rows are the impulse of those of the bodies.
+    """
+    kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()
+    pushed = totals[13:]
+    return {
+        "kinetic_energy": kinetic,
+        "potential_energy": fall,
+        "contact_energy": elastic,
+        "total_energy": total,
+        "dissipated_energy": lost,
+        "momentum": np.array(vectors[:3]),
+        "angular_momentum": np.array(vectors[3:]),
+        "impulse": np.bincount(owners, weights=pushed[: len(owners)], minlength=surfaces),
+        "sliding_time": sliding,
+        "wall_heat": np.zeros(surfaces),
+        "work": work,
+        **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),
+    }

@@ -24,7 +24,7 @@ from ..scene import Scene
 from ..status import Status
 from . import failures
 from .impacts import Page
-from .state import state_of
+from .state import Seeding, state_of
 from .tally import Watched
 from .tiers import Tier
 from .waiting import result_of
@@ -44,7 +44,7 @@ _MUCH_WRITING = 1.0 / 3.0
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 # A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
 _PARTS = 4
-_UNWATCHED = Watched()
+_UNWATCHED, _UNSEEDED = Watched(), Seeding()
 # (status, particle, what a halt left in the lanes)
 _End = tuple[int, int, lanes.Halted | None]
 _DONE: _End = (int(Status.DONE), 0, None)
@@ -55,7 +55,7 @@ class Run:
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always", seed: int = 0, watched: Watched = _UNWATCHED,
+        compile: str = "always", seeding: Seeding = _UNSEEDED, watched: Watched = _UNWATCHED,
     ) -> None:  # fmt: skip
         self._impacts, self._tally = watched
         n, self._owners = len(particles), scene.owners()
@@ -77,7 +77,8 @@ class Run:
         self._halt = np.full(1, blocks.NEVER)
         self._phase = np.zeros(n, np.int8)
         # Kernels have signed numbers, of the same 64 bits.
-        self._seed = seed - 2**64 if seed >= 2**63 else seed
+        self._seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
+        self._first = seeding.first
         self._order = np.arange(self._draws)
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(self._booked)
@@ -143,7 +144,8 @@ class Run:
         if status == Status.INTERRUPTED:
             self._keep([left for *_, left in ends if left is not None])
         elif status != Status.DONE:
-            raise RunError(failures.of_frame(self._scene, self._method, self.state, (Status(status), particle), moment))
+            ended = Status(status), particle
+            raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, self._first))
         elif span > 0.0:
             self._halted = lanes.none_halted(self._booked)
             self._pace = seconds * (others + helps) / span
@@ -261,7 +263,7 @@ class Run:
         pending = np.zeros(PHASES, np.int64)
         log = None if self._impacts is None else self._impacts.example
         counts = None if self._tally is None else self._tally.counts()
-        frame = span, self._seed, self._moment
+        frame = span, self._seed, self._first, self._moment
         return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, *frame, log, counts)
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
@@ -340,6 +342,10 @@ class Run:
             escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
         return {**seen, **self._poses(), "escaped": int(escaped)}
 
+    def chunk_sums(self) -> NDArray[np.float64]:
+        """What `observables.summed` takes, of the last frame."""
+        return observables.chunk_sums(self._partial, self.state, bool(self._kinds))
+
     def _poses(self) -> dict[str, NDArray[Any]]:
         """Where the surfaces are, if any moves."""
         if not self._scene.moves():
@@ -352,7 +358,7 @@ class Run:
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
-        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment)
+        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
 
 
 def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:

@@ -12,10 +12,10 @@ from ..scene import Scene
 from ..status import Status
 
 
-def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float) -> str:
-    """The sentence about a frame that ended with this status and particle."""
+def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, first: int = 0) -> str:
+    """The sentence about a frame that ended with this status and particle; `first` is the number of particle 0."""
     status, particle = end
-    sentence = f"{_failed(moment)} {particle}: {status.sentence}"
+    sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
     if status == Status.STALLED:
         place = state.position[:, particle]
         wall = int(np.argmax(scene.distances_outside(place[:, None], moment)[:, 0]))
@@ -33,13 +33,15 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
     return sentence
 
 
-def require_admissible(scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float) -> None:
+def require_admissible(
+    scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float, first: int = 0
+) -> None:
     """Raise a RunError where a state is not finite, or deeper than `deepest` [m] in a wall."""
     position, size = state.position, scene.finite_size()
     # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
     if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
         good = np.isfinite(position).all(axis=0) & np.isfinite(state.velocity).all(axis=0)
-        raise RunError(f"{_failed(moment)} {int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
+        raise RunError(f"{_failed(moment)} {first + int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
     if seen["max_penetration"] <= deepest:
         return
     distances = scene.distances_outside(position, moment)
@@ -50,7 +52,7 @@ def require_admissible(scene: Scene, state: State, seen: dict[str, Any], deepest
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
         depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
-        raise RunError(f"{_failed(moment)} {particle}: it is {depth}")
+        raise RunError(f"{_failed(moment)} {first + particle}: it is {depth}")
 
 
 def _failed(moment: float) -> str:

@@ -61,6 +61,8 @@ class RunOptions:
     walltime: float | None = field(default=None, metadata=_OF_A_SESSION)
     compile: str = "auto"
     seed: int = 0
+    cluster: Any = field(default=None, metadata=_OF_A_SESSION)
+    shards: int | None = field(default=None, metadata=_OF_A_SESSION)
 
     def __post_init__(self) -> None:
         for name in ("trajectory", "recording", "impacts"):
@@ -73,9 +75,11 @@ class RunOptions:
             checks.positive("walltime", self.walltime)
         times = self.times
         object.__setattr__(self, "until", times.until)
-        for name in ("threads", "block_size"):
+        for name in ("threads", "block_size", "shards"):
             if getattr(self, name) is not None:
                 checks.count(name, getattr(self, name))
+        if self.shards is not None and self.cluster is None:
+            raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
         checks.one_of("compile", self.compile, CHOICES)
         checks.flag("member_impacts", self.member_impacts)
         self._check_impacts()
@@ -129,10 +133,21 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles are its own copy. Of bodies they are all points."""
+    """A run, checked; the particles are its own copy. Of bodies they are all points.
+
+    Of a shard of a run `start` is a digest of all particles of that run, and `first` the number of the first particle,
+    or body, of the shard.
+    """
 
     scene: Scene
     particles: Particles
     method: Method
     options: RunOptions
     bodies: Bodies | None = None
+    first: int = 0
+    start: str = ""
+
+    @property
+    def is_shard(self) -> bool:
+        """Whether it is a shard of a run."""
+        return bool(self.start)

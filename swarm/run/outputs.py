@@ -39,7 +39,7 @@ def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impa
     # The impacts of a frame are on the disk before it is: who reads the frame finds them.
     outputs = [
         (_impacts(task, session, log), slice(0)),
-        (_trajectory(task, session), task.options.storage.kept()),
+        (_trajectory(task, session), task.options.storage.kept(task.first)),
         (recorder, slice(None)),
     ]
     used = [(one, kept) for one, kept in outputs if one is not None]

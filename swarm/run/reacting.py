@@ -185,6 +185,10 @@ class ReactingRun:
         kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum()
         return kept
 
+    def chunk_sums(self) -> NDArray[np.float64]:
+        """What `observables.summed` takes: no shard has walls that react."""
+        raise NotImplementedError
+
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False)
         walls = self._walls

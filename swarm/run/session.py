@@ -66,13 +66,27 @@ class Session:
         """
         if self._trajectory is None and log is None:
             return
+        self._hold(task, log)
+        if self._trajectory is None or self._path is None or not self._resumes:
+            return
+        overwrite, until = task.options.overwrite, task.options.until
+        if self._path.exists():
+            self._resume(self._trajectory, until)
+        elif self._trajectory.exists() and not overwrite:
+            self._refuse_to_restart(self._trajectory, until)
+        if log is not None:
+            self._find_log(task.options.impacts, overwrite)
+
+    def _hold(self, task: Task, log: Impacts | None) -> None:
+        """Lock the files of the run, and describe it."""
         from ..output import checkpoint
         from ..output.lock import only_writer
         from ..output.writer import body_text, descriptions
 
-        overwrite, until, impacts = task.options.overwrite, task.options.until, task.options.impacts
+        overwrite, impacts = task.options.overwrite, task.options.impacts
         body = "" if task.bodies is None else body_text(task.bodies.body)
-        self.identity = {"start": checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
+        self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
+        self.identity |= {"first": task.first} if task.is_shard else {}
         self._log = log
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
@@ -89,14 +103,6 @@ class Session:
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
         texts["kept"], texts["member_impacts"] = "" if log is None else log.kept, task.options.member_impacts
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
-        if not self._resumes:
-            return
-        if self._path.exists():
-            self._resume(self._trajectory, until)
-        elif self._trajectory.exists() and not overwrite:
-            self._refuse_to_restart(self._trajectory, until)
-        if log is not None:
-            self._find_log(impacts, overwrite)
 
     def _find_log(self, path: Path, overwrite: bool) -> None:
         """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""
@@ -143,6 +149,8 @@ class Session:
         assert self._job is not None
         assert self._path is not None
         saved, arrays = checkpoint.read(self._path)
+        if checkpoint.SHARDS in arrays:
+            raise SceneError(f"{self._path} is of a run on a cluster; resume it on one, by cluster= or --cluster")
         saved.require_same(self._job, self._path)
         if not trajectory.exists():
             raise SceneError(

@@ -1,37 +1,23 @@
-"""From a scene to frames: the loop over frames, and their observers."""
+"""From a scene to frames, on this machine or on a cluster."""
 
-import contextlib
-import logging
 import os
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import interrupt
 from ..bodies.state import Bodies
 from ..frames import Frame
-from ..kernel.cache import kernels_compiled
 from ..methods.base import Method
 from ..particles import Multipliers, Particles
 from ..scene import Scene
+from . import machine
 from .admission import task_of
-from .impacts import Impacts, log_of
-from .options import RunOptions, Task
-from .outputs import recorder_of, writer_of
-from .runs import AnyRun, run_of
+from .options import RunOptions
 from .session import Session
-from .tally import Watched, tally_of
-
-if TYPE_CHECKING:
-    from ..output.background import Background
-    from .progress import Display
-
-_LOG = logging.getLogger("swarm")
 
 
 @dataclass(frozen=True)
@@ -98,6 +84,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     walltime: float | None = None,
     compile: str = "auto",
     seed: int = 0,
+    cluster: Any = None,
+    shards: int | None = None,
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
@@ -142,6 +130,12 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             and after about a second the rest of the run is compiled. "always": compiled from the start. "never":
             plain Python only.
         seed: of the random numbers of thermal walls, from 0 to 2**64 - 1: the same seed gives the same bits.
+        cluster: where to run: None for this machine; "local:N", N worker processes on it; the address of a scheduler of
+            Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. Needs a trajectory, and the packages of the
+            extra "cluster". The particles are shards, each with files in the folder TRAJECTORY.shards, which the
+            trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
+            on from its checkpoint, by default of every 60 s.
+        shards: their number, of a cluster; None: one for each thread of its workers.
 
     Returns:
         A `Result`.
@@ -166,96 +160,24 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
 def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Result:
     """`simulate` with its keywords as `RunOptions`."""
-    session = Session(options)
-    task = task_of(scene, particles, method, options)
-    if scene.is_open():
-        _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
+    if options.cluster is None:
+        session = Session(options)
+        task = task_of(scene, particles, method, options)
+        end = machine.carry_out(task, session)
+    else:
+        from . import cluster  # `distributed` takes half a second to import
 
-    from .progress import display  # rich is imported only when it is shown
-
-    recorder = recorder_of(task)
-    log, tally = log_of(task), tally_of(task)
-    runs: list[AnyRun] = []
-
-    def stop() -> None:
-        session.stop()
-        for one in runs:
-            one.halt()
-
-    with session, interrupt.taken_by(stop), display(options.progress) as show, kernels_compiled(show.compiling):
-        session.prepare(task, log)
-        _require_room(task, session)
-        run = run_of(task, Watched(log, tally))
-        runs.append(run)
-        session.restore(run)
-        writer = writer_of(task, session, recorder, log)
-        history = _frames(task, session, run, writer, show, log)
-        session.finish()
-        return Result(
-            task.particles,
-            _columns(history) if options.trajectory is None else _read_back(options.trajectory),
-            session.wall_time(),
-            options.trajectory,
-            run.state.multipliers,
-            run.state.impacts,
-            np.full(len(task.particles), np.nan) if run.state.escape_time is None else run.state.escape_time,
-            None if tally is None else tally.of_members(),
-            None if task.bodies is None else task.bodies.moved(task.particles),
-        )
-
-
-def _frames(
-    task: Task, session: Session, run: AnyRun, writer: "Background | None", show: "Display", log: Impacts | None
-) -> list[dict[str, Any]]:
-    """All frames of this session: their observables, if no trajectory holds them."""
-    history: list[dict[str, Any]] = []
-    until, span_of = task.options.until, task.method.span
-    with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
-        for number, before, moment in task.options.times:
-            session.require_same_time(number, moment)
-            if number < session.first:
-                continue
-            if number == 0:
-                run.observe()
-            else:
-                span = span_of("time", moment) - span_of("time", before)
-                if log is not None:
-                    log.begin = before
-                while not run.advance(span, moment, *_meanwhile(session, writer, show)):
-                    show.within(before + run.share_done(span) * (moment - before), until)
-                    session.look(run, writer, number - 1, before, moment)
-            seen = {"time": moment, **run.seen()}
-            run.require_admissible(seen, moment)
-            if task.options.trajectory is None:
-                history.append(seen)
-            if log is not None:
-                log.ends[number] = log.total
-            write(number, moment, run.state, seen)
-            show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
-            if moment < until:
-                session.look(run, writer, number, moment, None)
-    return history
-
-
-def _meanwhile(session: Session, writer: "Background | None", show: "Display") -> tuple[float, float]:
-    """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
-    return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
-
-
-def _require_room(task: Task, session: Session) -> None:
-    """Raise a SceneError if the frames do not fit on the disk or in memory."""
-    options, storage = task.options, task.options.storage
-    numbers, packed = storage.bytes_of(len(task.particles)), storage.compression != "none"
-    options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed)
-
-
-def _columns(history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    return {name: np.array([seen[name] for seen in history]) for name in history[0]}
-
-
-def _read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
-    """All frames of all sessions. During the run they are not kept in memory, which would grow without limit."""
-    from ..output.trajectory import load
-
-    with load(trajectory) as written:
-        return written.observables
+        sharded = cluster.Sharded(options)
+        task = task_of(scene, particles, method, options)
+        end = cluster.carry_out(task, sharded)
+    return Result(
+        end.particles,
+        end.observables,
+        end.wall_time,
+        options.trajectory,
+        end.multipliers,
+        end.impacts,
+        end.escape_time,
+        end.members,
+        None if task.bodies is None else task.bodies.moved(end.particles),
+    )

@@ -1,6 +1,7 @@
 """The state of a run at its start, of particles that are independent of one another."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,16 @@ from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..surfaces.openings import Openings
 from ..surfaces.period import Period
+
+
+class Seeding(NamedTuple):
+    """What random numbers depend on besides the impacts: the seed, and the number of the first particle of this run.
+
+    That is 0 but for a shard: its particles are numbered as in the whole run.
+    """
+
+    seed: int = 0
+    first: int = 0
 
 
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:

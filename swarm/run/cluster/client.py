@@ -1,0 +1,180 @@
+"""A run on a cluster, from the side of who started it: it hands out shards, waits for them and joins their files.
+
+What a thousand workers do: see README of bench.
+"""
+
+import dataclasses
+import functools
+import math
+import secrets
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ... import interrupt
+from ...errors import RunError, SceneError, WallTimeError
+from ...frames import Frame
+from .. import machine
+from ..machine import End, warn_open
+from ..options import RunOptions, Task
+from . import connection, joined, shards, worker
+from .sharded import Sharded
+
+if TYPE_CHECKING:
+    from ..progress import Display
+
+_COMPLETE, _FAILED = "complete", "failed"
+# Seconds from one checkpoint of a shard to the next where the options name none; from one look at the shards to the
+# next; until they are told again to stop; and from one look at their frames to the next.
+_SAVED, _GLANCE, _TOLD, _FOLLOWS = 60.0, 0.2, 1.0, 1.0
+# To read frames of many shards takes at most about this part of the time.
+_READING = 0.1
+
+
+def require_options(options: RunOptions) -> None:
+    """Raise a SceneError where options do not go with a cluster."""
+    if options.trajectory is None:
+        raise SceneError("trajectory must be given with a cluster, whose shards it joins, got none; add trajectory=")
+    if options.recording is not None or options.live:
+        raise SceneError(
+            "recording and live must be left out with a cluster; make the recording from the trajectory afterwards: "
+            "swarm record RUN.h5 -o OUT.rrd"
+        )
+    if options.impacts is not None:
+        raise SceneError(
+            f"impacts must be None with a cluster, whose shards keep no common log, got {options.impacts}; run without "
+            "a cluster"
+        )
+
+
+def require_independent(task: Task) -> None:
+    """Raise a SceneError where what the run advances is not independent of one another."""
+    if task.scene.reacts():
+        i = next(i for i, surface in enumerate(task.scene.surfaces) if surface.reacts())
+        raise SceneError(
+            f"surfaces[{i}] must not react with a cluster: through a wall that has a mass or an inertia every particle "
+            "depends on all others, so that they cannot be shards; give the wall a motion in place of it, or run "
+            "without a cluster"
+        )
+
+
+def carry_out(task: Task, session: Sharded) -> End:
+    """Carry out a run that is checked, on the cluster of its options.
+
+    Raises:
+        SceneError: the run cannot be one on a cluster, or the cluster cannot carry it out; nothing has run.
+        RunError: a shard failed.
+        KeyboardInterrupt, WallTimeError: it was stopped; its shards have saved their checkpoints.
+    """
+    require_options(task.options)
+    require_independent(task)
+    if task.scene.is_open():
+        warn_open()
+    target = Path(task.options.trajectory).absolute()
+    saved = task.options.checkpoint or _SAVED
+    task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))
+    from ..progress import display
+
+    stopped = threading.Event()
+    with session, interrupt.taken_by(stopped.set):
+        session.prepare_shards(task)
+        with connection.connected(task.options.cluster, stopped) as client, display(task.options.progress) as show:
+            connection.require_same_versions(client)
+            connection.require_shared(client, target.parent)
+            one = _Run(task, session, client, stopped, show)
+            one.wait()
+        end = shards.joined_end(one.folder, task, one.bounds)
+        session.finish()
+        return end._replace(observables=machine.read_back(target), wall_time=session.wall_time())
+
+
+class _Run:
+    """The shards of a run, handed out."""
+
+    def __init__(self, task: Task, session: Sharded, client: Any, stopped: threading.Event, show: "Display") -> None:
+        if stopped.is_set():
+            raise KeyboardInterrupt
+        self._task, self._session, self._client, self._stopped, self._show = task, session, client, stopped, show
+        self._token = secrets.token_hex(8)
+        self._shares: dict[int, float] = {}
+        self._seen, self._read, self._reading = 0, time.monotonic(), 0.0
+        threads = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
+        self.folder, self.bounds = session.begin(task, task.options.shards or threads)
+        self._count = len(self.bounds) - 1
+        client.subscribe_topic(self._token, self._hear)
+        self._changed = threading.Event()
+        submit = functools.partial(client.submit, worker.run, str(self.folder), pure=False)
+        self._left = {submit(k, self._token, key=f"swarm-{self._token}-{k}"): k for k in range(self._count)}
+        for future in self._left:
+            future.add_done_callback(lambda _future: self._changed.set())
+
+    async def _hear(self, event: tuple[float, dict[str, Any]]) -> None:
+        """Take a report of a shard, in the thread of the client."""
+        _when, said = event
+        self._shares[said["shard"]] = said["share"]
+
+    def wait(self) -> None:
+        """Wait for all shards, and join what they have stored, also where they were stopped or one failed."""
+        failed, stops, told = "", False, -math.inf
+        try:
+            while self._left:
+                for future in [future for future in self._left if future.done()]:
+                    k = self._left.pop(future)
+                    self._shares[k] = 1.0
+                    state, sentence = self._outcome(future, k)
+                    failed, stops = failed or sentence, stops or state != _COMPLETE
+                now = time.monotonic()
+                if self._left and now >= told + _TOLD and (stops or self._stopped.is_set() or now >= self._session.end):
+                    stops, told = True, now
+                    # Told again: to shards that begin later, or on a worker that takes the place of another.
+                    self._client.run(worker.stop, self._token, on_error="ignore")
+                self._look()
+                self._changed.wait(_GLANCE)
+                self._changed.clear()
+        finally:
+            self._client.unsubscribe_topic(self._token)
+            self._client.cancel(list(self._left))
+        frames, moment = joined.write(self.folder, self._task, self.bounds, self._session.identity)
+        self._follow()
+        if stops:
+            self._session.keep(max(0, frames - 1), moment)
+        if failed:
+            raise RunError(failed)
+        if stops and self._stopped.is_set():
+            raise KeyboardInterrupt
+        if stops:
+            raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+
+    def _outcome(self, future: Any, k: int) -> tuple[str, str]:
+        """What became of a shard: its state, and the sentence of a failure."""
+        if future.status == "finished":
+            state, sentence = future.result()
+            return state, sentence
+        what = "particles" if self._task.bodies is None else "bodies"
+        sentence = f"the shard of {what} {self.bounds[k]} to {self.bounds[k + 1] - 1} failed: "
+        error = future.exception() if future.status == "error" else None
+        if error is None:
+            return _FAILED, sentence + "the scheduler has lost it; the run can be resumed"
+        if type(error).__name__ == "KilledWorker":
+            return _FAILED, sentence + (
+                f"each of the {error.allowed_failures + 1} workers that took it has died, last "
+                f"{error.last_worker.address}, perhaps for lack of memory; see their logs; the run can be resumed"
+            )
+        return _FAILED, f"{sentence}{type(error).__name__}: {error}"
+
+    def _look(self) -> None:
+        """Show how far the shards are on average, and now and then the frames that all of them have."""
+        until, now = self._task.options.times.until, time.monotonic()
+        if len(self._shares) == self._count and now - self._read >= max(_FOLLOWS, self._reading / _READING):
+            self._follow()
+            self._read = time.monotonic()
+            self._reading = self._read - now
+        self._show.within(until * sum(self._shares.values()) / self._count, until)
+
+    def _follow(self) -> None:
+        """Show the frames that all shards have by now."""
+        until = self._task.options.times.until
+        for count, seen in joined.seen_of(self.folder, self._task, self.bounds, self._seen):
+            self._show.frame(Frame(self._seen, seen["time"], until, seen, count))
+            self._seen += 1

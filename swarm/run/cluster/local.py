@@ -1,0 +1,74 @@
+"""A cluster on this machine: `python -m swarm.run.cluster.local N` runs a scheduler and N workers of one thread each.
+
+It prints its address and ends, with all its processes, when its standard input does: also when the process that started
+it is killed. Ctrl-C in a terminal does not reach it, so that shards can save their checkpoints first. Unlike the
+`LocalCluster` of a script or a notebook it does not import the user's main module again.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ...errors import RunError
+
+_ROOT = Path(__file__).parents[3]
+# Seconds until its processes have ended by themselves.
+_ENDS = 10.0
+
+
+@contextmanager
+def started(workers: int) -> Iterator[str]:
+    """The address of a cluster of so many workers on this machine, which ends with the context.
+
+    Raises:
+        RunError: it does not start.
+    """
+    # Functions of the user's modules are looked up where this process finds them.
+    folders = [str(_ROOT), *(os.path.abspath(folder) for folder in sys.path)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
+    command = [sys.executable, "-P", "-m", "swarm.run.cluster.local", str(workers)]
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, env=environment,
+            start_new_session=True, text=True,
+        )  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            address = process.stdout.readline().strip()
+            if not address:
+                process.wait()
+                said.seek(0)
+                lines = said.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+                raise RunError(f"the local cluster did not start: {lines[-1]}")
+            yield address
+        finally:
+            process.stdin.close()
+            process.stdout.close()
+            try:
+                process.wait(_ENDS)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def main() -> None:
+    """Run a cluster until the standard input ends."""
+    import logging
+
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
+        silence_logs=logging.CRITICAL, worker_dashboard_address=None,
+    ) as cluster:  # fmt: skip
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""Shards: contiguous ranges of the particles, or bodies, of a run, each an ordinary run with files of its own.
+
+Beside RUN.h5 they are in the folder RUN.shards: what is run and its start, which the client writes once, and of shard k
+its trajectory k.h5, its checkpoint and its end. Workers read the start there: a worker that takes the place of another
+needs nothing from the client, and the scheduler carries short messages only.
+"""
+
+import dataclasses
+import functools
+import itertools
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...bodies.body import Body
+from ...bodies.state import Bodies
+from ...errors import SceneError
+from ...methods.base import Method
+from ...observables import CHUNK
+from ...output import paths
+from ...particles import Multipliers, Particles
+from ...scene import Scene
+from ..machine import End
+from ..options import RunOptions, Task
+
+_SUFFIX = ".shards"
+_ARRAYS = ("position", "velocity", "mass", "image")
+
+
+class Whole(NamedTuple):
+    """What all shards of a run have in common; the start is in files."""
+
+    scene: Scene
+    method: Method
+    options: RunOptions
+    body: Body | None
+    bounds: list[int]  # shard k has the particles, or bodies, from bounds[k] to bounds[k + 1]
+    start: str
+
+
+def folder_of(trajectory: Path) -> Path:
+    """The folder of the shards of a trajectory."""
+    return trajectory.with_suffix(_SUFFIX)
+
+
+def file_of(folder: Path, k: int) -> Path:
+    """The trajectory of shard k."""
+    return folder / f"{k:04}.h5"
+
+
+def end_of(folder: Path, k: int) -> Path:
+    """The file with the end of shard k, which is there when it is complete."""
+    return folder / f"{k:04}.end"
+
+
+def bounds_of(n: int, shards: int) -> list[int]:
+    """Bounds of so many shards of n particles, or of fewer: each begins a chunk of them.
+
+    >>> bounds_of(1000, 2)
+    [0, 512, 1000]
+    """
+    chunks = -(-n // CHUNK)
+    shards = min(shards, chunks)
+    return [min(n, CHUNK * (k * chunks // shards)) for k in range(shards + 1)]
+
+
+# --- What the client writes -----------------------------------------------------------------------------
+
+
+def write(folder: Path, task: Task, bounds: list[int], start: str) -> None:
+    """Write what is run, and its start."""
+    import cloudpickle
+
+    body = None if task.bodies is None else task.bodies.body
+    options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None)
+    whole = Whole(task.scene, task.method, options, body, bounds, start)
+    _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
+    for name in _ARRAYS:
+        array = getattr(task.particles, name)
+        if array is not None and not (name == "mass" and body):
+            _replace(folder / f"{name}.npy", functools.partial(_save, array))
+
+
+def _save(*arrays_and_file: Any) -> None:
+    """Write arrays one behind the other: an archive of NumPy has checksums, which take three times as long."""
+    *arrays, file = arrays_and_file
+    for array in arrays:
+        np.save(file, array)
+
+
+def _replace(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
+    """Write a file that is there as a whole or not at all."""
+    part = paths.part_of(path)
+    with open(part, "wb") as file:
+        write(file)
+    os.replace(part, path)
+
+
+def clear(folder: Path) -> None:
+    """Remove the files of an earlier run from the folder, or make it.
+
+    Raises:
+        SceneError: it holds something else.
+    """
+    folder.mkdir(exist_ok=True)
+    ours = [path for path in folder.iterdir() if path.is_file() and path.name.partition(".")[0] in _names(path.name)]
+    if len(ours) < len(list(folder.iterdir())):
+        raise SceneError(
+            f"{folder} must hold the shards of a run or not be there, got a folder with other files, which a run would "
+            "remove; move it away, or choose another name for the trajectory"
+        )
+    for path in ours:
+        path.unlink()
+
+
+def _names(name: str) -> set[str]:
+    """What the first word of our files may be; those of locks and of parts begin with a point."""
+    word = name.partition(".")[0]
+    return {"", "whole", *_ARRAYS, *([word] if word.isdigit() else [])}
+
+
+def tidy(folder: Path, count: int) -> None:
+    """Remove what only the run needed: all but the trajectories."""
+    kept = {file_of(folder, k) for k in range(count)}
+    for path in folder.iterdir():
+        if path not in kept:
+            path.unlink(missing_ok=True)
+
+
+# --- What a worker reads and writes ---------------------------------------------------------------------
+
+
+def task_of(folder: Path, k: int) -> Task:
+    """The run of shard k."""
+    import cloudpickle
+
+    with open(folder / "whole.pickle", "rb") as file:
+        whole: Whole = cloudpickle.load(file)
+    first, last = whole.bounds[k : k + 2]
+    options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
+    files = {name: folder / f"{name}.npy" for name in _ARRAYS}
+    arrays = {name: np.load(file, mmap_mode="r") for name, file in files.items() if file.exists()}
+    common = whole.scene, whole.method, options
+    if whole.body is None:
+        mine = {name: array[..., first:last] for name, array in arrays.items()}
+        return Task(common[0], Particles(**mine), *common[1:], None, first, whole.start)
+    shape = 3, len(whole.body), -1
+    position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
+    bodies = Bodies.unchecked(whole.body, position, velocity)
+    return Task(common[0], bodies.particles(), *common[1:], bodies, first, whole.start)
+
+
+def write_end(path: Path, end: End) -> None:
+    """Write how a shard ended."""
+    arrays: dict[str, Any] = {"position": end.particles.position, "velocity": end.particles.velocity}
+    arrays |= {"impacts": end.impacts, "escape_time": end.escape_time}
+    if end.particles.image is not None:
+        arrays["image"] = end.particles.image
+    if end.multipliers is not None:
+        arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
+    for i, counts in enumerate(end.members or ()):
+        arrays[f"members.{i}"] = counts
+    _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
+
+
+# --- What the client reads ------------------------------------------------------------------------------
+
+
+def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
+    """How all shards ended; without observables and wall time."""
+    n = bounds[-1]
+    whole: dict[str, NDArray[Any]] = {}
+    members: list[NDArray[np.int64]] = []
+    for k, (first, last) in enumerate(itertools.pairwise(bounds)):
+        with open(end_of(folder, k), "rb") as file:
+            for name in np.load(file).tolist():
+                part = np.load(file)
+                if name.startswith("members."):
+                    i = int(name.partition(".")[2])
+                    members[i:] = [part + members[i] if i < len(members) else part, *members[i + 1 :]]
+                    continue
+                # Of bodies point p of copy i is particle p n + i.
+                points = part.shape[-1] // (last - first)
+                if name not in whole:
+                    whole[name] = np.empty((*part.shape[:-1], points, n), part.dtype)
+                whole[name][..., first:last] = part.reshape(*part.shape[:-1], points, last - first)
+    flat = {name: array.reshape(*array.shape[:-2], -1) for name, array in whole.items()}
+    particles = task.particles
+    particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
+    loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
+    return End(
+        particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
+        members or None,
+    )  # fmt: skip

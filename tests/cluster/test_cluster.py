@@ -1,0 +1,193 @@
+"""Runs on a real cluster of two worker processes on this machine."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.run.cluster import client as of_client
+from swarm.run.cluster import connection, local, shards
+
+N = 600
+SCENE = """
+surface = [{ kind = "sphere", radius = 0.5 }]
+particles = { count = 600, speed = 1.0, seed = 1 }
+method = { kind = "impact" }
+run = { until = UNTIL, every = 0.5, compile = "never" }
+"""
+
+
+@pytest.fixture(scope="module")
+def client():
+    from distributed import Client
+
+    with local.started(2) as address, Client(address, set_as_default=False) as made:
+        made.wait_for_workers(2)
+        yield made
+
+
+@pytest.fixture(autouse=True)
+def quick_looks(monkeypatch):
+    monkeypatch.setattr(of_client, "_FOLLOWS", 0.05)
+
+
+def cavity():
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    return scene, swarm.fill(scene, N, speed=1.0, seed=1), swarm.Impact()
+
+
+def require_same(one, other, paths):
+    assert one.observables.keys() == other.observables.keys()
+    for name, values in one.observables.items():
+        assert values.tobytes() == other.observables[name].tobytes(), name
+    assert one.particles.position.tobytes() == other.particles.position.tobytes()
+    with swarm.load(paths[0]) as a, swarm.load(paths[1]) as b:
+        assert a.start == b.start
+        assert a.times.tolist() == b.times.tolist()
+        for k in range(len(a)):
+            assert a.frame(k).position.tobytes() == b.frame(k).position.tobytes()
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    path = tmp_path_factory.mktemp("alone") / "run.h5"
+    return swarm.simulate(*cavity(), until=8.0, every=0.5, trajectory=path, compile="never"), path
+
+
+def test_a_worker_that_is_killed_changes_no_bit(client, alone, tmp_path):
+    killed = []
+
+    def kill(frame):
+        path = tmp_path / "run.shards" / "0001.h5.checkpoint"
+        if not killed and path.exists() and not shards.end_of(path.parent, 1).exists():
+            killed.extend(client.run(os.getpid).values())
+            for pid in killed:
+                os.kill(pid, signal.SIGKILL)
+
+    options = {"until": 8.0, "every": 0.5, "compile": "never", "checkpoint": 0.05, "trajectory": tmp_path / "run.h5"}
+    result = swarm.simulate(*cavity(), **options, cluster=client, progress=kill)
+    assert len(killed) == 2
+    require_same(alone[0], result, (alone[1], tmp_path / "run.h5"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.shards"]
+    assert sorted(path.name for path in (tmp_path / "run.shards").iterdir()) == ["0000.h5", "0001.h5"]
+
+
+def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(client, tmp_path):
+    import MDAnalysis
+
+    path = tmp_path / "run.h5"
+    result = swarm.simulate(*cavity(), until=0.2, every=0.1, compile="never", trajectory=path, cluster=client, shards=3)
+    there = tmp_path / "elsewhere"
+    there.mkdir()
+    path.rename(there / "moved.h5")
+    (tmp_path / "run.shards").rename(there / "run.shards")
+    universe = MDAnalysis.Universe.empty(N, trajectory=True)
+    universe.load_new(str(there / "moved.h5"), format="H5MD", convert_units=False)
+    assert len(universe.trajectory) == 3
+    last = universe.trajectory[-1]
+    assert np.allclose(last.positions, result.particles.position.T, rtol=1e-6, atol=1e-7)
+    with swarm.load(there / "moved.h5") as moved:
+        assert moved.frame(-1).position.tobytes() == result.particles.position.tobytes()
+        position, _velocity = moved.particle(N - 1)
+        assert position[:, -1].tolist() == result.particles.position[:, -1].tolist()
+    universe.trajectory.close()
+    (there / "run.shards" / "0001.h5").unlink()
+    with pytest.raises(swarm.SceneError, match=r"moved\.h5 needs .*run\.shards/0001\.h5"):
+        swarm.load(there / "moved.h5")
+
+
+def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, tmp_path):
+    address = client.scheduler.address
+    scene, output = tmp_path / "scene.toml", tmp_path / "run.h5"
+    scene.write_text(SCENE.replace("UNTIL", "8.0"))
+    command = [sys.executable, "-m", "swarm", "run", str(scene), "-o", str(output), "--cluster", address]
+    process = subprocess.Popen([*command, "--shards", "3"], stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "run.shards" / "0000.h5").exists():
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _out, said = process.communicate(timeout=100)
+    assert process.returncode == 130, said
+    assert "--resume" in said
+    again = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
+    assert again.returncode == 0, again.stderr
+    with swarm.load(output) as joined, swarm.load(alone[1]) as single:
+        for name, values in single.observables.items():
+            assert values.tobytes() == joined.observables[name].tobytes(), name
+        assert joined.frame(-1).position.tobytes() == single.frame(-1).position.tobytes()
+    assert len(list((tmp_path / "run.shards").iterdir())) == 3
+    complete = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
+    assert (complete.returncode, "is complete" in complete.stderr) == (0, True), complete.stderr
+
+
+def test_a_failure_names_the_particle_of_the_whole_run(client, tmp_path):
+    scene, start, method = cavity()
+    start.velocity[:, :590], start.velocity[:, 591:] = 0.0, 0.0
+    method = swarm.AugmentedLagrangian(dt=0.05, penalty=1.0, exponent=2.0, max_sweeps=1, tolerance=1e-30)
+    keywords = {"until": 2.0, "compile": "never"}
+    with pytest.raises(swarm.RunError) as alone:
+        swarm.simulate(scene, start, method, **keywords)
+    with pytest.raises(swarm.RunError) as far:
+        swarm.simulate(scene, start, method, **keywords, trajectory=tmp_path / "run.h5", cluster=client)
+    assert "failed at particle 590: " in str(far.value)
+    assert str(far.value) == str(alone.value)
+
+
+REFUSED = {
+    "no trajectory": ({"trajectory": None}, "trajectory must be given with a cluster"),
+    "a recording": ({"recording": "run.rrd"}, "recording and live must be left out with a cluster"),
+    "a log": ({"impacts": "log.h5"}, "impacts must be None with a cluster"),
+    "no cluster": ({"cluster": "local:0"}, "cluster must be"),
+    "another type": ({"cluster": 4}, "cluster must be"),
+    "no answer": ({"cluster": "tcp://127.0.0.1:9"}, "must answer within 0.3 s"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_is_refused_before_anything_is_written(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(connection, "SCHEDULER", 0.3)
+    changes, sentence = REFUSED[name]
+    keywords = {"until": 1.0, "trajectory": "run.h5", "cluster": "local:1"} | changes
+    with pytest.raises(swarm.SceneError, match=sentence):
+        swarm.simulate(*cavity(), **keywords)
+    assert not list(tmp_path.iterdir())
+
+
+def test_walls_that_react_are_refused(tmp_path):
+    scene = swarm.Scene([swarm.Sphere(0.5, mass=10.0)])
+    with pytest.raises(swarm.SceneError, match="must not react with a cluster"):
+        swarm.simulate(
+            scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), until=1.0, trajectory=tmp_path / "run.h5",
+            cluster="local:1",
+        )  # fmt: skip
+
+
+def test_another_version_on_a_worker_is_named():
+    class Two:
+        def get_versions(self, packages):
+            def of(numpy):
+                return {"host": {"python": "3.11.7.final.0"}, "packages": dict.fromkeys(packages, "1") | numpy}
+
+            return {"client": of({}), "workers": {"tcp://a:1": of({}), "tcp://b:2": of({"numba": "2"})}}
+
+    with pytest.raises(swarm.SceneError, match=r"must have numba 1, .* got the worker tcp://b:2, which has 2"):
+        connection.require_same_versions(Two())
+
+
+def test_storage_that_is_not_shared_is_named(client, tmp_path, monkeypatch):
+    monkeypatch.setattr(connection.worker, "APPEARS", 0.1)
+
+    class Elsewhere:
+        def run(self, function, folder, token):
+            return {"tcp://a:1": function(folder, token), "tcp://b:2": function(str(tmp_path / "other"), token)}
+
+    with pytest.raises(swarm.SceneError, match=r"share the folder .* got the worker tcp://b:2, which does not find it"):
+        connection.require_shared(Elsewhere(), tmp_path)
+    connection.require_shared(client, tmp_path)
+    assert not list(tmp_path.glob(".swarm-storage.*"))

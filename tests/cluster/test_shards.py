@@ -1,0 +1,173 @@
+"""Shards against the single run, bit for bit. They run here, one after the other, as they would on workers."""
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.run import machine
+from swarm.run.admission import task_of
+from swarm.run.cluster import Sharded, joined, shards, worker
+from swarm.run.options import RunOptions
+from swarm.run.session import Session
+
+N = 520  # three chunks, the last one not whole
+
+
+def sphere():
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    return scene, swarm.fill(scene, N, speed=1.0, seed=1), swarm.Impact()
+
+
+def thermal():
+    scene = swarm.Scene([swarm.Sphere(0.5, temperature=1.5, accommodation=0.7)])
+    return scene, swarm.fill(scene, N, temperature=1.0, seed=2), swarm.Impact()
+
+
+def sliding():
+    scene = swarm.Scene([swarm.Sphere(0.5, restitution=0.5)], gravity=(0.0, 0.0, -1.0))
+    start = swarm.fill(scene, N, speed=0.1, seed=3)
+    start.velocity[:] = 0.0
+    start.position[:, ::2] = np.array([[0.0], [0.0], [-0.49]])
+    return scene, start, swarm.Impact()
+
+
+def penalty():
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    return scene, swarm.fill(scene, N, speed=1.0, seed=4), swarm.Penalty(dt=0.05, penalty=1e4)
+
+
+def loops():
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    method = swarm.AugmentedLagrangian(dt=0.05, penalty=1e3, adaptive=True)
+    return scene, swarm.fill(scene, N, speed=1.0, seed=4), method
+
+
+def openings():
+    hole = swarm.Sphere(0.2, center=(0.0, 0.0, 0.5))
+    scene = swarm.Scene([swarm.Sphere(0.5, openings=[hole])])
+    return scene, swarm.fill(scene, N, speed=1.0, seed=5), swarm.Impact()
+
+
+def periodic():
+    scene = swarm.Scene([swarm.Sphere(0.3, side="outside")], period=(1.0, 1.0, 1.0))
+    return scene, swarm.fill(scene, N, speed=1.0, seed=6), swarm.Impact()
+
+
+def moving():
+    wall = swarm.Plane((0.0, 0.0, -1.0), 0.5, motion=swarm.Oscillation((0.0, 0.0, 0.01), 2.0))
+    scene = swarm.Scene([wall, swarm.Plane((0.0, 0.0, 1.0), 0.5)])
+    rng = np.random.default_rng(7)
+    start = swarm.Particles(rng.uniform(-0.4, 0.4, (3, N)), rng.standard_normal((3, N)))
+    return scene, start, swarm.Impact()
+
+
+def bodies():
+    scene = swarm.Scene([swarm.Box((2.7, 2.7, 2.7))], gravity=(0.0, 0.0, -1.0))
+    rod = swarm.dumbbell(length=0.2, mass=1.0)
+    n, rng = N, np.random.default_rng(8)
+    center, velocity = rng.uniform(-2.5, 2.5, (3, 1, n)), 4.0 * rng.standard_normal((3, 1, n))
+    start = swarm.Bodies(rod, center + rod.points.T[:, :, None], np.repeat(velocity, 2, axis=1))
+    return scene, start, swarm.Impact(dt=0.05)
+
+
+CASES = {
+    "sphere": (sphere, {}),
+    "every seventh in float32": (sphere, {"frames": 7, "precision": "float32", "compression": "gzip"}),
+    "few of them": (sphere, {"frames": 300}),
+    "no particles": (sphere, {"frames": "none"}),
+    "members": (periodic, {"member_impacts": True}),
+    "thermal": (thermal, {"seed": 2**64 - 3}),
+    "sliding": (sliding, {}),
+    "penalty": (penalty, {"until": 0.2, "every": 0.1}),
+    "loops": (loops, {"until": 0.1, "every": 0.05}),
+    "openings": (openings, {}),
+    "moving": (moving, {}),
+    "bodies": (bodies, {"until": 0.1, "every": 0.05}),
+}
+
+
+@pytest.fixture
+def on_a_cluster(monkeypatch):
+    """A function that runs so many shards of a run here."""
+
+    def carried(scene, start, method, count, **keywords):
+        options = RunOptions(cluster="local:1", shards=count, checkpoint=60.0, **keywords)
+        session = Sharded(options)
+        task = task_of(scene, start, method, options)
+        with session:
+            session.prepare_shards(task)
+            folder, bounds = session.begin(task, count)
+            for k in range(len(bounds) - 1):
+                assert worker.advance(folder, k) == ("complete", "")
+            joined.write(folder, task, bounds, session.identity)
+            end = shards.joined_end(folder, task, bounds)
+            session.finish()
+        return end._replace(observables=machine.read_back(options.trajectory))
+
+    return carried
+
+
+def the_same(one, other):
+    one, other = np.asarray(one), np.asarray(other)
+    return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """A function that gives how a case ends on this machine, and its trajectory; each is run once."""
+    known = {}
+
+    def carried(name):
+        if name not in known:
+            make, keywords = CASES[name]
+            path = tmp_path_factory.mktemp("alone") / "run.h5"
+            scene, start, method = make()
+            options = RunOptions(**{"until": 0.4, "every": 0.2, "compile": "never"} | keywords, trajectory=path)
+            task = task_of(scene, start, method, options)
+            known[name] = machine.carry_out(task, Session(options)), path
+        return known[name]
+
+    return carried
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [*((name, 3) for name in CASES), ("thermal", 1), ("thermal", 2), ("bodies", 2)]
+)
+def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_cluster, tmp_path):
+    make, keywords = CASES[name]
+    end, path = alone(name)
+    path_of_shards = tmp_path / "run.h5"
+    keywords = {"until": 0.4, "every": 0.2, "compile": "never"} | keywords
+    other = on_a_cluster(*make(), count, **keywords, trajectory=path_of_shards)
+    assert end.observables.keys() == other.observables.keys()
+    for key, values in end.observables.items():
+        assert the_same(values, other.observables[key]), key
+    for key in ("position", "velocity", "mass"):
+        assert the_same(getattr(end.particles, key), getattr(other.particles, key)), key
+    assert the_same(end.impacts, other.impacts)
+    assert the_same(end.escape_time, other.escape_time)
+    assert int(end.impacts.sum()) > 20
+    assert (end.multipliers is None) == (other.multipliers is None)
+    for mine, its in zip(end.multipliers or (), other.multipliers or (), strict=True):
+        assert the_same(mine, its)
+    for mine, its in zip(end.members or (), other.members or (), strict=True):
+        assert the_same(mine, its)
+    if end.particles.image is not None:
+        assert the_same(end.particles.image, other.particles.image)
+    require_same_file(path, path_of_shards)
+
+
+def require_same_file(one, other):
+    """Every dataset of two trajectories has the same type, shape and bits."""
+    import h5py
+
+    def datasets(file):
+        found = {}
+        file.visititems(lambda name, at: found.update({name: at[()]} if isinstance(at, h5py.Dataset) else {}))
+        return found
+
+    with h5py.File(one, "r", locking=False) as a, h5py.File(other, "r", locking=False) as b:
+        mine, its = datasets(a), datasets(b)
+    assert mine.keys() == its.keys()
+    for name, values in mine.items():
+        assert the_same(values, its[name]), name
