@@ -29,8 +29,9 @@ settings.register_profile(
 )
 settings.load_profile("swarm")
 
-# What plain Python does sooner than a kernel is compiled is not worth compiling.
-tiers._PATIENCE = 4.0
+# What plain Python does sooner than a kernel is compiled is not worth compiling, also where others use the processor: a
+# kind in which contact lasts takes 10 to 20 s, a particle that slides for ten crossings 2 s.
+tiers._PATIENCE = 10.0
 EPSILON = float(np.finfo(np.float64).eps)
 
 
