@@ -55,7 +55,7 @@ class AppendedFile:
         if mode == "r+":
             superblock.make_appendable(self._handle)
         # HDF5's locks would block readers.
-        self.file = driver.opened(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        self.file = driver.opened_to_write(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
         self._descriptor = _descriptor_of(self.file)
 
     def close(self, error: BaseException | None) -> None:

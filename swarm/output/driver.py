@@ -5,8 +5,7 @@ may have opened the file with another. The logging driver reads and writes like 
 default, and is rarely used: what others have opened by the default one does not matter to it.
 """
 
-import contextlib
-import os
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +23,22 @@ def _driver(plist: Any, **_options: Any) -> None:
 h5py.register_driver(NAME, _driver)
 
 
+# The files that this process has opened by it, and which they are. HDF5 is not asked: it crashes the process if it
+# could not close one, on a full disk.
+_opened: list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]] = []
+
+
 def opened(path: Path, mode: str, **options: Any) -> h5py.File:
+    """Open a file by this driver."""
+    file = h5py.File(path, mode, driver=NAME, **options)
+    _opened[:] = [*_open(), (weakref.ref(file), paths.identity(path))]
+    return file
+
+
+def opened_to_write(path: Path, mode: str, **options: Any) -> h5py.File:
     """Open a file to write it."""
     try:
-        return h5py.File(path, mode, driver=NAME, **options)
+        return opened(path, mode, **options)
     except OSError:
         # A reader of swarm has it open by this driver.
         return h5py.File(path, mode, **options)
@@ -35,12 +46,9 @@ def opened(path: Path, mode: str, **options: Any) -> h5py.File:
 
 def has_open(path: Path) -> bool:
     """Whether this process has the file open by this driver: by it, it could only be opened as it was then."""
-    wanted = paths.identity(path)
-    for file in h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE):
-        # Another thread may close it.
-        with contextlib.suppress(OSError, RuntimeError, ValueError):
-            if file.get_access_plist().get_driver() == h5py.h5fd.LOG:
-                status = os.fstat(file.get_vfd_handle())
-                if (status.st_dev, status.st_ino) == wanted:
-                    return True
-    return False
+    return paths.identity(path) in [identity for _file, identity in _open()]
+
+
+def _open() -> list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]]:
+    """Those that are open still."""
+    return [(found, identity) for found, identity in _opened if found()]

@@ -107,7 +107,7 @@ def opened(path: Path) -> h5py.File:
     try:
         try:
             if not driver.has_open(path):
-                return h5py.File(path, "r", driver=driver.NAME, **options)
+                return driver.opened(path, "r", **options)
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
@@ -117,7 +117,7 @@ def opened(path: Path) -> h5py.File:
             return file
         # The sources of virtual datasets are opened by the driver of the file that names them.
         file.close()
-        return h5py.File(path, "r", driver=driver.NAME, **options)
+        return driver.opened(path, "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
             raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
