@@ -21,14 +21,15 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..particles import Particles
 from . import layout
-from .stored import Stored, finite, times_of, whole
+from .presented import Presented
+from .stored import finite, times_of, whole
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
     from ..bodies.state import Bodies
 
 
-class Trajectory(Stored):
+class Trajectory(Presented):
     """A trajectory on disk, read on demand.
 
     Attributes:

@@ -1,0 +1,93 @@
+"""What becomes of a trajectory in Python: pictures, films, a viewer, tables and labelled arrays."""
+
+from typing import TYPE_CHECKING, Any
+
+from .. import notebook
+from ..columns import frame_of
+from ..errors import SceneError
+from ..extras import needed_by
+from . import facts
+from .stored import Stored
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+
+class Presented(Stored):
+    """The methods of a `Trajectory` that need other libraries, each of which is imported where it is used."""
+
+    def __repr__(self: Any) -> str:
+        try:
+            times = self.times
+            span = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""
+            bodies = f"{self.copies} bodies of " if self.copies else ""
+            told = f"{len(times)} frame{'s' * (len(times) != 1)}{span}, {bodies}{self.count} particles, {self.method!r}"
+        except SceneError as error:
+            told = str(error).removeprefix(f"{self.path} is ")
+        return f"Trajectory({str(self.path)!r}, {told})"
+
+    def _repr_html_(self: Any) -> str:
+        try:
+            rows = facts.of_trajectory(self)
+        except SceneError as error:
+            rows = {"problem": str(error)}
+        return notebook.table(f"Trajectory {self.path.name}", rows.items())
+
+    def has_particles(self) -> bool:
+        """Whether the file keeps particles."""
+        with self._reading("its particles") as file:
+            return "particles/all" in file
+
+    def table(self: Any) -> "pandas.DataFrame":
+        """The observables as a pandas frame: `time` first, a row for each frame.
+
+        Vectors have a column for each component, momentum_x, and what each surface has one for each surface, impulse_0
+        and wall_position_0_x.
+
+        Raises:
+            SceneError: the trajectory is damaged, or pandas is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         table = trajectory.table()
+        >>> table[["time", "impacts", "momentum_x"]]
+           time  impacts  momentum_x
+        0   0.0        0         1.0
+        1   1.0        1        -1.0
+        """
+        return frame_of(self.observables)
+
+    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
+        """Draw energies, errors, penetration, impacts, pressure, speeds and the particles or bodies at the end.
+
+        Args:
+            particles: the most particles that are drawn, evenly chosen, or points of bodies.
+            figsize: width and height [inches], at 100 pixels an inch.
+
+        Returns:
+            A figure of matplotlib, which a notebook shows where it is the last line of a cell, and which can be
+            changed and saved: `figure.axes`, `figure.savefig("run.pdf")`. It is none of pyplot's, so nothing keeps it
+            and no backend is chosen.
+
+        Raises:
+            SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or
+                scikit-image is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.fill(cavity, 10, speed=1.0)
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         figure = trajectory.plot(figsize=(10.0, 6.0))
+        >>> figure.axes[0].get_title()
+        '10 of 10 particles, t = 1 s'
+        """
+        with needed_by("a plot", "plot"):
+            from . import plots
+        return plots.figure_of(plots.content_of(self), figsize, particles)  # type: ignore[arg-type]
