@@ -11,6 +11,9 @@ _PACKAGES = {
     "bodies": "scipy",
     "mesh": "trimesh libigl",
     "table": "pandas",
+    "animation": "matplotlib scikit-image imageio-ffmpeg",
+    "xarray": "xarray",
+    "notebook": "rerun-sdk[notebook] scikit-image contourpy",
 }
 
 

@@ -1,6 +1,7 @@
 """Drawing with matplotlib for contact sheets and plots: particles among their walls, and time series."""
 
 import io
+import math
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,17 @@ LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MAP = ListedColormap(colours.table(), name="swarm")
 BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
+_FEW_WIRES = 300
 _DPI = 100
-# Matplotlib leaves room around 3-D axes: with this zoom they fill their cell.
-_ZOOM = 1.2
+# Matplotlib leaves room around 3-D axes: with this zoom a cube fills its cell, seen from where it is by default.
+_ZOOM, _AZIMUTH, _ELEVATION = 1.15, math.radians(-60.0), math.radians(30.0)
+# What a width, a depth and a height add to the width and to the height of the picture.
+_SEEN = np.abs(
+    [
+        [math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0],
+        [math.sin(_ELEVATION) * math.cos(_AZIMUTH), math.sin(_ELEVATION) * math.sin(_AZIMUTH), math.cos(_ELEVATION)],
+    ]
+)
 
 
 class Picture(Figure):
@@ -46,18 +55,18 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
     return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
 
 
-def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
     """The lines (S, 2, 3) of bodies, wider the fewer there are, and their colours (S,), 0xRRGGBBAA."""
     width = float(np.clip(300.0 / max(1, len(lines)), 0.9, 2.0))
     style = {"colors": red_green_blue(packed), "linewidths": width, "zorder": 2, "clip_on": False}
-    axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
+    return axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
 
 
-def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
     """The triangles (T, 3, 3) of bodies, shaded, each of the mean colour of its corners (T, 3), 0xRRGGBBAA."""
     colour = red_green_blue(packed.ravel()).reshape(-1, 3, 3).mean(axis=1)
     style = {"facecolors": colour, "shade": True, "zorder": 2, "clip_on": False}
-    axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
+    return axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
 
 
 def particles(
@@ -77,11 +86,15 @@ def particles(
     axes.computed_zorder = False  # the particles would hide the solids among them
     drawn = []
     for solid, curves in wires:
+        # Of thousands of solids no particle would be seen behind the wires.
+        few = min(1.0, (_FEW_WIRES / max(1, len(curves))) ** 0.35)
         style = (
-            {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
+            {"colors": _SOLID_WIRE, "linewidths": 0.9 * few, "alpha": 0.7 * few, "zorder": 3 if few == 1.0 else 1}
+            if solid
+            else {"colors": _WIRE, "linewidths": 0.5, "alpha": 0.7}
         )
         # Corners of a box reach beyond the cell at this zoom.
-        drawn.append(Line3DCollection(curves, alpha=0.7, clip_on=False, **style))
+        drawn.append(Line3DCollection(curves, clip_on=False, **style))
         axes.add_collection3d(drawn[-1], autolim=False)
     dot = size * float(np.clip(3e4 / len(points), 0.3, 1000.0)) ** 0.5
     dots = axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
@@ -98,7 +111,9 @@ def particles(
     axes.set_ylabel("y [m]", labelpad=-4, fontsize=8)
     # At the end of its axis: beside it, it would lie beyond the cell.
     axes.text(*high, "z [m]\n", fontsize=8, color=LIGHT, ha="center", va="bottom", linespacing=0.3)
-    axes.set_box_aspect(high - low, zoom=_ZOOM)
+    # Matplotlib draws boxes of one diagonal in one size.
+    relative = (high - low) / np.sqrt(((high - low) ** 2).mean())
+    axes.set_box_aspect(high - low, zoom=_ZOOM * (_SEEN.sum(axis=1) / (_SEEN @ relative)).min())
     axes.grid(False)
     axes.set_facecolor(BACKGROUND)
     return dots, drawn

@@ -21,8 +21,8 @@ from .trajectory import Trajectory
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
 _BINS = 60
-# [inches]: of a file, and of a cell of a notebook, in which letters of the larger one would be too small.
-_FILE, CELL = (17.0, 7.6), (12.0, 6.0)
+# [inches]: of a file, and the width of one time series; which part of the picture these have beside the particles.
+_FILE, _CELL, _SERIES = (17.0, 7.6), 2.5, 0.64
 
 
 @dataclass(frozen=True)
@@ -86,17 +86,18 @@ def figure_of(content: Content, figsize: Any, particles: int) -> drawing.Picture
     picture = drawing.picture(wide, high)
     right: Any = picture
     if end is not None:
-        left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.7], squeeze=False).ravel()
+        left, right = picture.subfigures(1, 2, width_ratios=[1.0 - _SERIES, _SERIES], squeeze=False).ravel()
+        wide *= _SERIES
         _places(left, content, end, shapes, most)
-    _series(right, content, shapes)
+    _series(right, content, shapes, wide)
     frames = "1 frame" if len(times) == 1 else f"{len(times)} frames"
     title = f"{content.name}{': ' * bool(content.name)}{frames}, {content.method!r}".replace("swarm.", "")
     picture.suptitle(title, fontsize=11)
     return picture
 
 
-def _series(figure: Any, content: Content, shapes: list[Shape]) -> None:
-    """The time series, and the speeds."""
+def _series(figure: Any, content: Content, shapes: list[Shape], width: float) -> None:
+    """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
     lines = series.lines_of(content.scene, content.method, shapes, content.body)
     before: series.Seen = None
@@ -105,18 +106,19 @@ def _series(figure: Any, content: Content, shapes: list[Shape]) -> None:
         now = {name: column[k] for name, column in seen.items()}
         rows.append(series.row_of(lines, moment, now, before))
         before = moment, now
-    columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
-    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or columns[line.path].any()]
+    values = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
+    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
     views = series.views_of(shown)
-    # One more is for the speeds.
-    cells = figure.subplots(2, max(3, 1 + len(views) // 2)).ravel()
+    count = len(views) + bool(content.frames)  # one more is for the speeds
+    columns = max(1, min(round(width / _CELL), -(-count // 2)))
+    cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for cell, (group, together) in zip(cells, views.items(), strict=False):
-        known = {line.name: ~np.isnan(columns[line.path]) for line in together}
-        curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}
+        known = {line.name: ~np.isnan(values[line.path]) for line in together}
+        curves = {line.name: (times[known[line.name]], values[line.path][known[line.name]]) for line in together}
         drawing.lines(cell, *series.VIEWS[group], curves)
     if content.frames:
         _speeds(cells[len(views)], content)
-    for cell in cells[len(views) + bool(content.frames) :]:
+    for cell in cells[count:]:
         cell.set_axis_off()
 
 
@@ -139,7 +141,7 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
     title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"
-    axes.set_title(title, fontsize=10, color=drawing.LIGHT)
+    figure.suptitle(title, fontsize=10, color=drawing.LIGHT)
 
 
 def _speeds(axes: Any, content: Content) -> None:

@@ -1,5 +1,6 @@
 """What becomes of a trajectory in Python: pictures, films, a viewer, tables and labelled arrays."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import notebook
@@ -85,9 +86,50 @@ class Presented(Stored):
         ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
         ...     with swarm.load(folder + "/run.h5") as trajectory:
         ...         figure = trajectory.plot(figsize=(10.0, 6.0))
-        >>> figure.axes[0].get_title()
-        '10 of 10 particles, t = 1 s'
+        >>> figure.get_suptitle()[:16]
+        'run.h5: 2 frames'
         """
         with needed_by("a plot", "plot"):
             from . import plots
         return plots.figure_of(plots.content_of(self), figsize, particles)  # type: ignore[arg-type]
+
+    def animate(
+        self: Any,
+        path: str | Path,
+        *,
+        frames: int = 200,
+        fps: float = 25.0,
+        size: tuple[int, int] = (960, 720),
+        particles: int = 10_000,
+        overwrite: bool = False,
+    ) -> Path:
+        """Write a film of the particles or bodies among their walls, coloured by speed.
+
+        Args:
+            path: `.mp4`, by ffmpeg, or `.gif`, which is some ten times as large.
+            frames: the most that are drawn, evenly chosen, with the first and the last.
+            fps: frames a second, above 0; of a GIF at most 50.
+            size: width and height in pixels, 64 to 8192 each; an odd one is made even.
+            particles: the most that are drawn, evenly chosen, or points of bodies.
+            overwrite: replace an existing file.
+
+        Returns:
+            The path. The file has this name when it is complete.
+
+        Raises:
+            SceneError: an argument is out of its range, the file exists, the trajectory is damaged or keeps no
+                particles, or matplotlib, scikit-image or ffmpeg is not installed.
+            FileError: the file cannot be written.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.fill(cavity, 10, speed=1.0)
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         trajectory.animate(folder + "/run.gif", size=(320, 240)).name
+        'run.gif'
+        """
+        with needed_by("a film", "animation"):
+            from . import film
+        return film.animate(self, path, frames, fps, size, particles, overwrite)

@@ -26,13 +26,11 @@ from .. import checks
 from ..bodies.body import Body
 from ..errors import FileError, SceneError
 from ..methods import Method
-from ..motion import pose
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.rotation import matrix
 from . import colours, paths, series, viewer
 from .drawn import Drawn
-from .shapes import Shape, shapes_of
+from .shapes import Shape, shapes_of, since_start
 from .trajectory import Trajectory
 from .writer import WriteFrames, Written, rows
 
@@ -240,12 +238,9 @@ class RecordingWriter:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
         for i, (shape, surface) in enumerate(zip(self._shapes, self._scene.surfaces, strict=True)):
             if surface.motion is not None or surface.reacts():
-                first = pose(surface.motion, 0.0)
-                # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
-                turns = [matrix(tuple(orientation[i])) @ first.turn.T for _position, orientation in walls]
-                places = [position[i] for position, _orientation in walls]
-                ways = [place - turn @ first.position() for place, turn in zip(places, turns, strict=True)]
-                columns = rr.Transform3D.columns(translation=np.array(ways), mat3x3=np.array(turns))
+                moves = [since_start(self._scene, i, position[i], turned[i]) for position, turned in walls]
+                turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
+                columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
                 self._send(_path(shape), numbers, times, columns)
 
     def sync(self) -> None:

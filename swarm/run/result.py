@@ -99,8 +99,8 @@ class Result:
         >>> import swarm
         >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
         >>> result = swarm.simulate(cavity, swarm.fill(cavity, 10, speed=1.0), swarm.Impact(), until=2.0, every=0.5)
-        >>> result.plot().axes[0].get_title()
-        '10 of 10 particles, t = 2 s'
+        >>> result.plot().get_suptitle()[:16]
+        '5 frames, Impact'
         """
         with needed_by("a plot", "plot"):
             from ..output import plots
