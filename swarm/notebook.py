@@ -1,6 +1,7 @@
 """How objects show in notebooks: small tables in HTML, in the colours of the notebook, without scripts."""
 
 import html
+import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -32,3 +33,11 @@ def shortened(items: Sequence[Any], most: int = 8) -> list[str]:
     """
     shown = len(items) if len(items) <= most else most - 1
     return [*map(str, items[:shown]), *[f"<{len(items) - shown} more>"] * (shown < len(items))]
+
+
+def is_running() -> bool:
+    """Whether this is the kernel of a notebook."""
+    shell = sys.modules.get("IPython")
+    running = shell.get_ipython() if shell is not None else None
+    # That of a terminal has none.
+    return getattr(running, "kernel", None) is not None

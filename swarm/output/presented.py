@@ -12,6 +12,7 @@ from .stored import Stored
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
     from matplotlib.figure import Figure
 
 
@@ -133,3 +134,50 @@ class Presented(Stored):
         with needed_by("a film", "animation"):
             from . import film
         return film.animate(self, path, frames, fps, size, particles, overwrite)
+
+    def to_xarray(self: Any) -> "xarray.Dataset":
+        """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.
+
+        What is kept of particles, `position`, `velocity`, `image`, `impacts_per_particle` and `escape_time`, is read
+        from the file when its values are used, and only the part that is: a file larger than the memory is no
+        problem, `dataset.position.sel(time=slice(2.0, 3.0)).mean("particle")` reads these frames. Nothing that is read
+        is kept; `dataset.load()` keeps all. As long as it is read, the trajectory must not be closed. Observables and
+        masses are read at once. Units are in `attrs`, and so are the tables of the scene and the method.
+
+        Raises:
+            SceneError: the trajectory is damaged, or xarray is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         dataset = trajectory.to_xarray()
+        ...         float(dataset.velocity.sel(axis="x", particle=0)[-1])
+        -1.0
+        >>> dict(dataset.position.sizes)
+        {'time': 2, 'particle': 1, 'axis': 3}
+        """
+        with needed_by("a Dataset", "xarray"):
+            from . import labelled
+        return labelled.dataset_of(self)
+
+    def show(self: Any, *, particles: int = 5000, color: str = "speed", megabytes: float = 100.0) -> None:
+        """Show the trajectory in a Rerun viewer: in a notebook below the cell, else in a window on this machine.
+
+        Args:
+            particles: the most particles that are shown, evenly chosen, or points of bodies.
+            color: what their colour shows, "speed" or "energy-error".
+            megabytes: the largest size of what the viewer gets, above 0; of too many frames every k-th is shown.
+
+        Raises:
+            SceneError: an argument is out of its range, the trajectory is damaged or keeps no particles, rerun-sdk
+                (in a notebook rerun-sdk[notebook]) is not installed, or there is no screen.
+        """
+        in_notebook = notebook.is_running()
+        with needed_by("a viewer", "notebook" if in_notebook else "record"):
+            if in_notebook:
+                import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
+            from . import recording
+        recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
