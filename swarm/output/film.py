@@ -136,7 +136,7 @@ class _Film:
         self._canvas: Any = FigureCanvasAgg(self.picture)
         self.picture.set_facecolor(drawing.BACKGROUND)
         self._axes = self.picture.add_subplot(projection="3d")
-        self._title = self.picture.suptitle("", fontsize=10, color=drawing.LIGHT)
+        self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
         at = drawn.points(start.position).T
         self._dots, self._wires = drawing.particles(
             self._axes, at, drawing.LIGHT, self._walls, 0.0 if len(drawn.triangles) else 1.0, self._box(numbers)
@@ -148,6 +148,7 @@ class _Film:
         scale = self._scale
         drawing.colour_bar(self.picture, self._axes, scale.quantity, scale.low, scale.high)
         self._canvas.draw()
+        self.picture.set_layout_engine("none")
         self._still = self._canvas.copy_from_bbox(self.picture.bbox)
 
     def _box(self, numbers: list[int]) -> tuple[Floats, Floats]:
