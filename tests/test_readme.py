@@ -107,7 +107,7 @@ def test_the_commands_run_in_their_order(tmp_path):
     shutil.copytree(ROOT / "examples" / "scenes", tmp_path / "examples" / "scenes")
     (tmp_path / "scene.toml").write_text(SCENE)
     found = list(commands())
-    assert {words[0] for words in found} == {"run", "record", "view", "plot", "info"}
+    assert {words[0] for words in found} == {"run", "record", "view", "plot", "animate", "info"}
     assert len(found) >= 12
     for words in found:
         outputs = [after for word, after in itertools.pairwise(words) if word in ("-o", "--record")]
