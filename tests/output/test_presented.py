@@ -30,8 +30,9 @@ def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("presented") / "<run>.h5"
     start = swarm.fill(SCENE, 20, speed=0.5, seed=1)
     result = swarm.simulate(
-        SCENE, start, swarm.Impact(), until=1.0, every=1.0 / (FRAMES - 1), trajectory=path, compile="never"
-    )
+        SCENE, start, swarm.Impact(), until=1.0, every=1.0 / (FRAMES - 1), compile="never",
+        trajectory=path, impacts=path.with_suffix(".log"),
+    )  # fmt: skip
     with swarm.load(path) as trajectory:
         yield result, trajectory
 
@@ -239,6 +240,10 @@ def test_a_scene_of_many_solids_is_a_line():
     assert repr(listed).endswith("<13 more>])")
     assert len(listed._repr_html_()) < 2000
     assert eval(repr(SCENE), vars(swarm)) == SCENE
+    times = np.arange(1000.0)
+    way = swarm.Path(times, np.outer(times, [1.0, 0.0, 0.0]))
+    assert len(repr(way)) < 500
+    assert eval(repr(short := swarm.Path(times[:3], np.eye(3))), vars(swarm)) == short
 
 
 def test_objects_tell_what_they_are(run):
@@ -255,6 +260,8 @@ def test_objects_tell_what_they_are(run):
         assert "<script" not in shown
         assert shown.startswith("<table>")
     assert "&lt;run&gt;.h5" in trajectory._repr_html_()
+    with swarm.load_impacts(trajectory.path.with_suffix(".log")) as log:
+        assert "&lt;run&gt;.log" in log._repr_html_()
 
 
 def test_a_closed_or_damaged_file_shows(run, tmp_path):
