@@ -19,7 +19,6 @@ from ..particles import Floats
 from . import colours, drawing, paths
 from .drawn import Drawn
 from .shapes import shapes_of, since_start
-from .trajectory import Trajectory
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -51,9 +50,7 @@ class _Gif(PillowWriter):
         )
 
 
-def animate(
-    trajectory: Trajectory, path: Any, frames: int, fps: float, size: Any, particles: int, overwrite: bool
-) -> Path:
+def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, particles: int, overwrite: bool) -> Path:
     """Write the film of a trajectory; see `Trajectory.animate`."""
     target = paths.target_of("animate", path)
     if target.suffix.lower() not in _SUFFIXES:
@@ -123,7 +120,7 @@ def _reason(error: Exception) -> str:
 class _Film:
     """The picture, whose artists change from frame to frame."""
 
-    def __init__(self, trajectory: Trajectory, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
+    def __init__(self, trajectory: Any, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
         self._trajectory, self._scene = trajectory, trajectory.scene
         self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
         self._drawn = drawn = Drawn(len(start), trajectory.body, most)

@@ -9,7 +9,6 @@ from xarray.core import indexing
 
 from ..columns import COMPONENTS
 from . import layout
-from .trajectory import Trajectory
 
 # Of what the file keeps of each particle: its name in the Dataset and its unit. "impacts" are those of all.
 _PARTICLES = {
@@ -30,7 +29,7 @@ _AXES = ("x", "y", "z")
 class _Column(BackendArray):  # type: ignore[misc]
     """A dataset of the file as an array that reads what is asked for: complete frames only."""
 
-    def __init__(self, trajectory: Trajectory, name: str) -> None:
+    def __init__(self, trajectory: Any, name: str) -> None:
         self._trajectory, self._name = trajectory, name
         frames = len(trajectory)
         with trajectory._reading(name) as file:
@@ -49,7 +48,7 @@ class _Column(BackendArray):  # type: ignore[misc]
             return np.asarray(file[self._name][(first, *key[1:])])
 
 
-def dataset_of(trajectory: Trajectory) -> xr.Dataset:
+def dataset_of(trajectory: Any) -> xr.Dataset:
     """The Dataset of a trajectory; see `Trajectory.to_xarray`."""
     surfaces = [f"{i}_{type(surface).__name__.lower()}" for i, surface in enumerate(trajectory.scene.surfaces)]
     data: dict[str, Any] = {}

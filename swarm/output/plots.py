@@ -16,7 +16,6 @@ from ..scene import Scene
 from . import colours, drawing, series
 from .drawn import Drawn
 from .shapes import Shape, shapes_of
-from .trajectory import Trajectory
 
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
@@ -45,7 +44,7 @@ class Content:
     frames: dict[str, Particles]
 
 
-def draw(trajectory: Trajectory, target: Path) -> None:
+def draw(trajectory: Any, target: Path) -> None:
     """Draw the time series of a trajectory, its speeds, and its particles at the end.
 
     Raises:
@@ -54,8 +53,8 @@ def draw(trajectory: Trajectory, target: Path) -> None:
     figure_of(content_of(trajectory), _FILE, SHOWN).savefig(target)
 
 
-def content_of(trajectory: Trajectory) -> Content:
-    """What a picture shows of a trajectory."""
+def content_of(trajectory: Any) -> Content:
+    """What a picture shows of a `Trajectory`."""
     trajectory.require_frames()
     last = len(trajectory) - 1
     numbers = {"start": 0, "end": last} if last else {"start": 0}

@@ -31,7 +31,6 @@ from ..scene import Scene
 from . import colours, paths, series, viewer
 from .drawn import Drawn
 from .shapes import Shape, shapes_of, since_start
-from .trajectory import Trajectory
 from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -304,7 +303,7 @@ def _blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
 # --- From a trajectory -----------------------------------------------------------------------------------
 
 
-def show(trajectory: Trajectory, settings: Settings) -> None:
+def show(trajectory: Any, settings: Settings) -> None:
     """Show a trajectory in the viewer that is `live`, or else in the notebook that is running."""
     stream = record(trajectory, None, settings)
     if not settings.live:
@@ -313,8 +312,8 @@ def show(trajectory: Trajectory, settings: Settings) -> None:
         Viewer(width="auto", height="auto", recording=stream).display()
 
 
-def record(trajectory: Trajectory, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:
-    """Make the recording of a trajectory; returns its stream.
+def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:
+    """Make the recording of a `Trajectory`; returns its stream.
 
     Raises:
         SceneError: the target exists, or the trajectory is damaged, or holds no frame.
