@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from .output.impact_log import ImpactLog, load_impacts
     from .output.trajectory import Trajectory, load
     from .particles import Particles
-    from .run.simulation import Result, simulate
+    from .run.result import Result
+    from .run.simulation import simulate
     from .scene import Scene
     from .surfaces import (
         Box,
@@ -71,7 +72,8 @@ _HOMES = {
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
-    "run.simulation": ("Result", "simulate"),
+    "run.result": ("Result",),
+    "run.simulation": ("simulate",),
     "surfaces.data.mesh": ("from_mesh",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",

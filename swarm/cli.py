@@ -8,7 +8,7 @@ import typer
 from . import interrupt
 from .commands.export import export
 from .commands.info import info
-from .commands.pictures import plot, record, view
+from .commands.pictures import animate, plot, record, view
 from .commands.run import run
 from .commands.sweep import sweep
 from .errors import SceneError, SwarmError
@@ -48,6 +48,7 @@ app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavit
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
 app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
 app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")(plot)
+app.command(epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100")(animate)
 app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10")(export)
 
 

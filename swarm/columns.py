@@ -1,18 +1,53 @@
-"""Numbers from a CSV file, by the names of its columns."""
+"""Columns of numbers, by their names: from a CSV file, and of observables."""
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import SceneError
+from .extras import needed_by
+
+if TYPE_CHECKING:
+    import pandas
 
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 # Columns of numbers above 0.
 _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b", "c"}
+
+# What the last axis of an observable is where it is neither a surface nor a cavity.
+COMPONENTS = dict.fromkeys(
+    ("momentum", "angular_momentum", "wall_position", "wall_velocity", "wall_spin"), ("x", "y", "z")
+) | {"wall_orientation": ("w", "x", "y", "z")}
+
+
+def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """A column for each number of observables, which have one entry a frame; "time" first.
+
+    >>> list(flattened({"momentum": np.zeros((2, 3)), "impulse": np.zeros((2, 2)), "time": np.arange(2)}))
+    ['time', 'momentum_x', 'momentum_y', 'momentum_z', 'impulse_0', 'impulse_1']
+    """
+    columns = {}
+    for name in sorted(observables, key=lambda name: name != "time"):
+        values = np.asarray(observables[name])
+        for place in np.ndindex(values.shape[1:]):
+            parts = [str(i) for i in place]
+            if name in COMPONENTS:
+                parts[-1] = COMPONENTS[name][place[-1]]
+            columns["_".join([name, *parts])] = values[:, *place]
+    return columns
+
+
+def frame_of(observables: Mapping[str, Any]) -> "pandas.DataFrame":
+    """The observables as a pandas frame, a row for each frame."""
+    with needed_by("a table", "table"):
+        import pandas
+
+    return pandas.DataFrame(flattened(observables))
 
 
 def read_columns(

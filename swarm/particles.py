@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import checks
+from . import checks, notebook
 from .columns import read_columns
 from .errors import SceneError
 from .kernel.jit import by_type
@@ -55,6 +55,13 @@ class Particles:
 
     def __repr__(self) -> str:
         return f"Particles({len(self)})"
+
+    def _repr_html_(self) -> str:
+        speeds = np.sqrt((self.velocity**2).sum(axis=0))
+        held = dict(zip("xyz", self.position, strict=True)) | {"speed": speeds, "mass": self.mass}
+        units = {"speed": "m/s", "mass": "kg"}
+        rows = [(name, f"{row.min():.4g} to {row.max():.4g} {units.get(name, 'm')}") for name, row in held.items()]
+        return notebook.table(f"{len(self)} particles", rows)
 
     def fastest(self) -> float:
         """The largest speed [m/s]."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import checks
+from . import checks, notebook
 from . import motion as motions
 from .contact.laws import Laws, Moves, Span, Thermal
 from .errors import SceneError
@@ -41,7 +41,7 @@ _BATCH = 4096
 _NO_HEAT = Thermal(0.0, 0.0)
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Scene:
     """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
 
@@ -106,6 +106,19 @@ class Scene:
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
                 "have no point in common; check their `side`, and that solids are smaller than their cavity"
             )
+
+    def __repr__(self) -> str:
+        """The call that makes it, omitting defaults, with the first of many surfaces."""
+        given = {"gravity": self.gravity, "period": self.period}
+        rest = "".join(f", {name}={value}" for name, value in given.items() if value is not None)
+        return f"Scene([{', '.join(notebook.shortened(self.surfaces))}]{rest})"
+
+    def _repr_html_(self) -> str:
+        texts = notebook.shortened(self.surfaces)
+        rows = [("" if text.startswith("<") else f"surfaces[{i}]", text) for i, text in enumerate(texts)]
+        rows += [("gravity", "none" if self.gravity is None else f"{self.gravity} m/s^2")]
+        rows += [] if self.period is None else [("period", f"{self.period} m")]
+        return notebook.table("Scene", rows)
 
     def _require_few_walls(self, why: str) -> None:
         """Raise a `SceneError` where there are more walls than kernels can be compiled for."""

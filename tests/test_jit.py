@@ -533,7 +533,8 @@ LAYERS = [
     ["contact"],
     ["surfaces"],
     ["frames", "kernel", "motion", "rows"],
-    ["checks", "columns", "extras"],
+    ["checks", "columns", "notebook"],
+    ["extras"],
     ["status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}

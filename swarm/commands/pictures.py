@@ -1,4 +1,4 @@
-"""`swarm record`, `swarm view` and `swarm plot`: recordings and pictures."""
+"""`swarm record`, `swarm view`, `swarm plot` and `swarm animate`: recordings, pictures and films."""
 
 from pathlib import Path
 from typing import Annotated
@@ -80,6 +80,25 @@ def plot(
     with load(file) as trajectory:
         plots.draw(trajectory, target)
     print(f"written to {target}")
+
+
+def animate(
+    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.mp4", help="Film, .mp4 or .gif [default: FILE.mp4].")
+    ] = None,
+    frames: Annotated[int, typer.Option(help="Most frames drawn, evenly chosen.")] = 200,
+    fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
+    particles: Annotated[int, typer.Option(help="Most particles, or points of bodies, drawn.")] = 10_000,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing film.")] = False,
+) -> None:
+    """Make a film of the particles or bodies of a trajectory among their walls."""
+    from ..output.trajectory import load
+
+    target = output or file.with_suffix(".mp4")
+    with load(file) as trajectory:
+        written = trajectory.animate(target, frames=frames, fps=fps, particles=particles, overwrite=overwrite)
+    print(f"written to {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
 def _check_picture(target: Path, source: Path) -> None:

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..checks import Vector
 from ..errors import SceneError
+from ..notebook import shortened
 from .given import Floats, Given, Led, Oscillation, Rotation, Sum, Translation, axis_of, parts_of, point_of, vector_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Path(Given):
     """Displacement along a cubic spline, which is C^2: of a wall, not of a point.
 
@@ -53,6 +54,10 @@ class Path(Given):
                 f"times must be so far apart that the coefficients of the spline are at most {checks.LARGEST:g}, got "
                 f"{times[k]:g} s at {places[k]} and {times[k + 1]:g} s at {places[k + 1]}"
             )
+
+    def __repr__(self) -> str:
+        times, positions = (", ".join(shortened(values)) for values in (self.times, self.positions))
+        return f"Path(times=({times}), positions=({positions}))"
 
     def cubics(self) -> Floats:
         """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""

@@ -1,15 +1,14 @@
 """Drawing with matplotlib for contact sheets and plots: particles among their walls, and time series."""
 
-from pathlib import Path
+import io
+import math
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-
 import numpy as np
-from matplotlib import pyplot
-from matplotlib.colors import ListedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike, NDArray
 
@@ -21,9 +20,34 @@ LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MAP = ListedColormap(colours.table(), name="swarm")
 BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
+_FEW_WIRES = 300
 _DPI = 100
-# Matplotlib leaves room around 3-D axes: with this zoom they fill their cell.
-_ZOOM = 1.3
+# Matplotlib leaves room around 3-D axes: with this zoom a cube fills its cell, seen from where it is by default.
+_ZOOM, _AZIMUTH, _ELEVATION = 1.15, math.radians(-60.0), math.radians(30.0)
+# What a width, a depth and a height add to the width and to the height of the picture.
+_SEEN = np.abs(
+    [
+        [math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0],
+        [math.sin(_ELEVATION) * math.cos(_AZIMUTH), math.sin(_ELEVATION) * math.sin(_AZIMUTH), math.cos(_ELEVATION)],
+    ]
+)
+
+
+class Picture(Figure):
+    """A figure without pyplot, which would choose a backend, keep the figure, and show it twice in a notebook.
+
+    A notebook shows it where it is the last line of a cell, whether or not the cell has chosen a backend.
+    """
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+def picture(width: float, height: float) -> Picture:
+    """An empty picture of this size [inches]."""
+    return Picture(figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
 def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
@@ -31,59 +55,80 @@ def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
     return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
 
 
-def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
     """The lines (S, 2, 3) of bodies, wider the fewer there are, and their colours (S,), 0xRRGGBBAA."""
     width = float(np.clip(300.0 / max(1, len(lines)), 0.9, 2.0))
     style = {"colors": red_green_blue(packed), "linewidths": width, "zorder": 2, "clip_on": False}
-    axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
+    return axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
 
 
-def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> None:
+def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
     """The triangles (T, 3, 3) of bodies, shaded, each of the mean colour of its corners (T, 3), 0xRRGGBBAA."""
     colour = red_green_blue(packed.ravel()).reshape(-1, 3, 3).mean(axis=1)
     style = {"facecolors": colour, "shade": True, "zorder": 2, "clip_on": False}
-    axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
+    return axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
 
 
 def particles(
-    axes: Any, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]], size: float = 1.0
-) -> None:
+    axes: Any,
+    positions: ArrayLike,
+    colour: Any,
+    wires: list[tuple[bool, list[Floats]]],
+    size: float = 1.0,
+    box: tuple[Floats, Floats] | None = None,
+) -> tuple[Any, list[Any]]:
     """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale.
 
-    The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none.
+    The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none. The axes end at the
+    corners of the box; None: around all that is drawn. Returns what draws the dots, and the wires of each wall.
     """
     points = np.asarray(positions)
     axes.computed_zorder = False  # the particles would hide the solids among them
+    drawn = []
     for solid, curves in wires:
+        # Of thousands of solids no particle would be seen behind the wires.
+        few = min(1.0, (_FEW_WIRES / max(1, len(curves))) ** 0.35)
         style = (
-            {"colors": _SOLID_WIRE, "linewidths": 0.9, "zorder": 3} if solid else {"colors": _WIRE, "linewidths": 0.5}
+            {"colors": _SOLID_WIRE, "linewidths": 0.9 * few, "alpha": 0.7 * few, "zorder": 3 if few == 1.0 else 1}
+            if solid
+            else {"colors": _WIRE, "linewidths": 0.5, "alpha": 0.7}
         )
         # Corners of a box reach beyond the cell at this zoom.
-        axes.add_collection3d(Line3DCollection(curves, alpha=0.7, clip_on=False, **style), autolim=False)
-    dot = size * float(np.clip(3e4 / len(points), 0.3, 30.0)) ** 0.5
-    axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
-    corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+        drawn.append(Line3DCollection(curves, clip_on=False, **style))
+        axes.add_collection3d(drawn[-1], autolim=False)
+    dot = size * float(np.clip(3e4 / len(points), 0.3, 1000.0)) ** 0.5
+    dots = axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
+    low, high = around(points, wires) if box is None else box
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
         axis.set_pane_color((0.0, 0.0, 0.0, 0.0))
         axis.line.set_color(LIGHT)
         axis.set_tick_params(colors=LIGHT, labelsize=7, pad=-1)
         axis.label.set_color(LIGHT)
-        axis.set_major_locator(matplotlib.ticker.MaxNLocator(3))
+        axis.set_major_locator(MaxNLocator(3))
         axis.set_view_interval(a, b)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_xlabel("x [m]", labelpad=-4, fontsize=8)
     axes.set_ylabel("y [m]", labelpad=-4, fontsize=8)
-    axes.set_zlabel("z [m]", labelpad=-4, fontsize=8)
-    axes.set_box_aspect(high - low, zoom=_ZOOM)
+    # At the end of its axis: beside it, it would lie beyond the cell.
+    axes.text(*high, "z [m]\n", fontsize=8, color=LIGHT, ha="center", va="bottom", linespacing=0.3)
+    # Matplotlib draws boxes of one diagonal in one size.
+    relative = (high - low) / np.sqrt(((high - low) ** 2).mean())
+    axes.set_box_aspect(high - low, zoom=_ZOOM * (_SEEN.sum(axis=1) / (_SEEN @ relative)).min())
     axes.grid(False)
     axes.set_facecolor(BACKGROUND)
+    return dots, drawn
 
 
-def colour_bar(picture: Any, axes: Any, quantity: str, low: float, high: float) -> None:
+def around(points: Floats, wires: list[tuple[bool, list[Floats]]]) -> tuple[Floats, Floats]:
+    """The corners of the box around points (N, 3) and wires."""
+    corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def colour_bar(figure: Any, axes: Any, quantity: str, low: float, high: float) -> None:
     """A colour bar for the particles, below these axes."""
-    meaning = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(low, high), MAP)
-    bar = picture.colorbar(meaning, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02)
+    meaning = ScalarMappable(Normalize(low, high), MAP)
+    bar = figure.colorbar(meaning, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02)
     bar.set_label(f"colour: {quantity}", color=LIGHT, fontsize=9)
     bar.ax.tick_params(colors=LIGHT, labelsize=8)
 
@@ -124,11 +169,3 @@ def _steady(axes: Any, drawn: dict[str, tuple[Floats, Floats]]) -> None:
     if half <= 1e-6 * abs(middle):
         axes.set_ylim(middle - 0.1 * abs(middle or 1.0), middle + 0.1 * abs(middle or 1.0))
     axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-3, 6))
-
-
-def save(picture: Any, path: Path) -> None:
-    """Write a picture and close it."""
-    try:
-        picture.savefig(path, dpi=_DPI)
-    finally:
-        pyplot.close(picture)

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
+from .. import checks, notebook
 from ..errors import SceneError
 from ..extras import needed_by
 from . import layout
@@ -92,6 +92,11 @@ class ImpactLog(Stored):
 
     def __repr__(self) -> str:
         return f"ImpactLog({str(self.path)!r}, {len(self)} impacts)"
+
+    def _repr_html_(self) -> str:
+        rows = {"impacts": f"{len(self)}", "frames": f"{len(self.times)}", "walls": f"{len(self._surface)}"}
+        rows |= {"time": f"{self.times[0]:g} s to {self.times[-1]:g} s"} if len(self.times) else {}
+        return notebook.table(f"ImpactLog {self.path.name}", rows.items())
 
     @property
     def kept(self) -> int | list[int]:

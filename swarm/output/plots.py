@@ -1,69 +1,135 @@
-"""A trajectory in one picture: time series that show whether the run went well, speeds, and the particles."""
+"""A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import pyplot
+from numpy.typing import NDArray
 
+from .. import checks
+from ..bodies.body import Body
+from ..errors import SceneError
+from ..methods import Method
+from ..particles import Particles
+from ..scene import Scene
 from . import colours, drawing, series
 from .drawn import Drawn
 from .shapes import Shape, shapes_of
-from .trajectory import Trajectory
 
 # Most particles drawn, or points of bodies.
-_SHOWN = 5000
+SHOWN = 5000
 _BINS = 60
-_WIDE, _HIGH = 17.0, 7.6
+# [inches]: of a file, and the width of one time series; which part of the picture these have beside the particles.
+_FILE, _CELL, _SERIES = (17.0, 7.6), 2.5, 0.64
 
 
-def draw(trajectory: Trajectory, target: Path) -> None:
+@dataclass(frozen=True)
+class Content:
+    """What a picture shows of a run.
+
+    Attributes:
+        name: of the file, or "".
+        count: number of particles, or of points of bodies, that were run.
+        seen: the observables, one entry a frame.
+        frames: the particles at the "start" and at the "end", as far as they are known.
+    """
+
+    name: str
+    scene: Scene
+    method: Method
+    body: Body | None
+    count: int
+    seen: dict[str, NDArray[Any]]
+    frames: dict[str, Particles]
+
+
+def draw(trajectory: Any, target: Path) -> None:
     """Draw the time series of a trajectory, its speeds, and its particles at the end.
 
     Raises:
         SceneError: the trajectory is damaged, or holds no frame.
     """
-    trajectory.require_frames()
-    scene, method, times, seen = trajectory.scene, trajectory.method, trajectory.times, trajectory.observed()
-    end = trajectory.frame(-1)
-    still = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1]) if scene.reacts() else scene
-    shapes = shapes_of(still, end.position, float(times[-1]))
-    picture = pyplot.figure(figsize=(_WIDE, _HIGH), layout="constrained")
-    left, right = picture.subfigures(1, 2, width_ratios=[1.0, 1.9], squeeze=False).ravel()
+    figure_of(content_of(trajectory), _FILE, SHOWN).savefig(target)
 
-    _places(left, trajectory, shapes)
-    lines = series.lines_of(scene, method, shapes, trajectory.body)
+
+def content_of(trajectory: Any) -> Content:
+    """What a picture shows of a `Trajectory`."""
+    trajectory.require_frames()
+    last = len(trajectory) - 1
+    numbers = {"start": 0, "end": last} if last else {"start": 0}
+    return Content(
+        trajectory.path.name,
+        trajectory.scene,
+        trajectory.method,
+        trajectory.body,
+        trajectory.count,
+        trajectory.observed(),
+        {name: trajectory.frame(k) for name, k in numbers.items()} if trajectory.has_particles() else {},
+    )
+
+
+def figure_of(content: Content, figsize: Any, particles: int) -> drawing.Picture:
+    """The picture, in which at most so many particles are drawn."""
+    most = checks.count("particles", particles)
+    try:
+        wide, high = (checks.positive("figsize", side) for side in figsize)
+    except (TypeError, ValueError):
+        raise SceneError(f"figsize must be width and height in inches, got {figsize!r}") from None
+    scene, times = content.scene, content.seen["time"]
+    end = content.frames.get("end", content.frames.get("start"))
+    still = scene
+    if scene.reacts():
+        still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
+    shapes = shapes_of(still, np.zeros((3, 1)) if end is None else end.position, float(times[-1]))
+    picture = drawing.picture(wide, high)
+    right: Any = picture
+    if end is not None:
+        left, right = picture.subfigures(1, 2, width_ratios=[1.0 - _SERIES, _SERIES], squeeze=False).ravel()
+        wide *= _SERIES
+        _places(left, content, end, shapes, most)
+    _series(right, content, shapes, wide)
+    frames = "1 frame" if len(times) == 1 else f"{len(times)} frames"
+    title = f"{content.name}{': ' * bool(content.name)}{frames}, {content.method!r}".replace("swarm.", "")
+    picture.suptitle(title, fontsize=11)
+    return picture
+
+
+def _series(figure: Any, content: Content, shapes: list[Shape], width: float) -> None:
+    """The time series, and the speeds, in a figure of this width [inches]."""
+    times, seen = content.seen["time"], content.seen
+    lines = series.lines_of(content.scene, content.method, shapes, content.body)
     before: series.Seen = None
     rows = []
     for k, moment in enumerate(times):
         now = {name: column[k] for name, column in seen.items()}
         rows.append(series.row_of(lines, moment, now, before))
         before = moment, now
-    columns = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
-    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or columns[line.path].any()]
+    values = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
+    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
     views = series.views_of(shown)
-    # One more is for the speeds.
-    cells = right.subplots(2, max(3, 1 + len(views) // 2)).ravel()
+    count = len(views) + bool(content.frames)  # one more is for the speeds
+    columns = max(1, min(round(width / _CELL), -(-count // 2)))
+    cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for cell, (group, together) in zip(cells, views.items(), strict=False):
-        known = {line.name: ~np.isnan(columns[line.path]) for line in together}
-        curves = {line.name: (times[known[line.name]], columns[line.path][known[line.name]]) for line in together}
+        known = {line.name: ~np.isnan(values[line.path]) for line in together}
+        curves = {line.name: (times[known[line.name]], values[line.path][known[line.name]]) for line in together}
         drawing.lines(cell, *series.VIEWS[group], curves)
-    _speeds(cells[len(views)], trajectory)
-    for cell in cells[len(views) + 1 :]:
+    if content.frames:
+        _speeds(cells[len(views)], content)
+    for cell in cells[count:]:
         cell.set_axis_off()
-    frames = "frame" if len(times) == 1 else "frames"
-    picture.suptitle(f"{trajectory.path.name}: {len(times)} {frames}, {method!r}".replace("swarm.", ""), fontsize=11)
-    drawing.save(picture, target)
 
 
-def _places(picture: Any, trajectory: Trajectory, shapes: list[Shape]) -> None:
+def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], most: int) -> None:
     """The particles, or the bodies, at the end."""
-    end, drawn = trajectory.frame(-1), Drawn(trajectory.count, trajectory.body, _SHOWN)
-    scale, values = colours.colouring("speed", trajectory.scene, trajectory.method, trajectory.frame(0))
+    drawn = Drawn(len(end), content.body, most)
+    start = content.frames.get("start", end)
+    scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, velocity = drawn.points(end.position), drawn.points(end.velocity)
     points, packed = position.T, scale.colours(values(position, velocity))
-    axes, has_faces = picture.add_subplot(projection="3d"), len(drawn.triangles) > 0
-    picture.set_facecolor(drawing.BACKGROUND)
+    axes, has_faces = figure.add_subplot(projection="3d"), len(drawn.triangles) > 0
+    figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
     drawing.particles(axes, points, drawing.red_green_blue(packed), wires, 0.0 if has_faces else 1.0)
     if has_faces:
@@ -71,24 +137,23 @@ def _places(picture: Any, trajectory: Trajectory, shapes: list[Shape]) -> None:
     else:
         middles = scale.colours(values(drawn.middles(position), drawn.middles(velocity)))
         drawing.bonds(axes, points[drawn.lines], middles)
-    drawing.colour_bar(picture, axes, scale.quantity, scale.low, scale.high)
-    title = f"{drawn.shown} of {drawn.count} {drawn.noun}, t = {trajectory.times[-1]:.6g} s"
-    axes.set_title(title, fontsize=10, color=drawing.LIGHT)
+    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
+    count = content.count // (1 if content.body is None else len(content.body))
+    title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"
+    figure.suptitle(title, fontsize=10, color=drawing.LIGHT)
 
 
-def _speeds(axes: Any, trajectory: Trajectory) -> None:
+def _speeds(axes: Any, content: Content) -> None:
     """How many particles have which speed, at the start and at the end."""
-    ends = {"start": trajectory.frame(0), "end": trajectory.frame(-1)}
-    if len(trajectory) == 1:
-        del ends["end"]
-    top = 1.05 * max(frame.fastest() for frame in ends.values()) or 1.0
-    for colour, (name, frame) in zip(drawing.LINES, ends.items(), strict=False):
+    top = 1.05 * max(frame.fastest() for frame in content.frames.values()) or 1.0
+    for name, frame in content.frames.items():
         speeds = np.sqrt((frame.velocity**2).sum(axis=0))
         counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
+        colour = drawing.LINES[name == "end"]
         axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
     axes.set_yscale("log")  # at the start all may be in one bin
-    whose = "speeds" if trajectory.body is None else "speeds of points"
+    whose = "speeds" if content.body is None else "speeds of points"
     axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)
     axes.set_xlabel("speed [m/s]", fontsize=9)
     axes.tick_params(labelsize=8)

@@ -26,14 +26,11 @@ from .. import checks
 from ..bodies.body import Body
 from ..errors import FileError, SceneError
 from ..methods import Method
-from ..motion import pose
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.rotation import matrix
 from . import colours, paths, series, viewer
 from .drawn import Drawn
-from .shapes import Shape, shapes_of
-from .trajectory import Trajectory
+from .shapes import Shape, shapes_of, since_start
 from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -81,7 +78,8 @@ class Settings:
 class RecordingWriter:
     """A context that creates the recording and gives the function that appends frames.
 
-    `start` holds particles, or the points of copies of `body`; `frames` is the number of frames of the run.
+    `start` holds particles, or the points of copies of `body`; `frames` is the number of frames of the run. Without a
+    path and a viewer the recording stays in memory, in `stream`.
     """
 
     def __init__(
@@ -124,14 +122,18 @@ class RecordingWriter:
         fixed += 12 * triangles
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
-        self._stream = rr.RecordingStream("swarm")
-        sinks = [rr.GrpcSink(self._url)] if self._url else []
+        self.stream = rr.RecordingStream("swarm")
+        sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
         try:
-            files = [rr.FileSink(self._path)] if self._path else []
-            self._stream.set_sinks(*sinks, *files, default_blueprint=_blueprint(self._series, self._drawn.noun))
+            sinks += [rr.FileSink(self._path)] if self._path else []
+            looks = _blueprint(self._series, self._drawn.noun)
+            if sinks:
+                self.stream.set_sinks(*sinks, default_blueprint=looks)
+            else:
+                self.stream.send_blueprint(looks)
         except RuntimeError as error:
             raise FileError(f"cannot write the recording {self._path}: {error}") from error
-        self._stream.set_log_time_enabled(False)
+        self.stream.set_log_time_enabled(False)
         self._begin()
         return self._write
 
@@ -142,15 +144,16 @@ class RecordingWriter:
             return  # another flush never returns
         try:
             self._send_rows()
-            self._stream.flush(timeout_sec=_LONGEST)
-            self._stream.disconnect()
+            self.stream.flush(timeout_sec=_LONGEST)
+            if self._url or self._path:
+                self.stream.disconnect()
         except (RuntimeError, ValueError) as problem:
             if error is None:
                 raise FileError(f"cannot close the recording {self._path}: {problem}") from problem
 
     def _begin(self) -> None:
         """Log what does not change."""
-        log = self._stream.log
+        log = self.stream.log
         log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
         drawn, width = self._drawn, rr.Radius.ui_points(1.0)
@@ -214,11 +217,11 @@ class RecordingWriter:
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
                 self._send_rows()
             # Without a flush a full disk is not noticed, and the next `send` to the thread that it ended never returns.
-            self._stream.flush(timeout_sec=_LONGEST)
+            self.stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             self._failed = True
             # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._stream))
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
 
@@ -240,12 +243,9 @@ class RecordingWriter:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
         for i, (shape, surface) in enumerate(zip(self._shapes, self._scene.surfaces, strict=True)):
             if surface.motion is not None or surface.reacts():
-                first = pose(surface.motion, 0.0)
-                # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
-                turns = [matrix(tuple(orientation[i])) @ first.turn.T for _position, orientation in walls]
-                places = [position[i] for position, _orientation in walls]
-                ways = [place - turn @ first.position() for place, turn in zip(places, turns, strict=True)]
-                columns = rr.Transform3D.columns(translation=np.array(ways), mat3x3=np.array(turns))
+                moves = [since_start(self._scene, i, position[i], turned[i]) for position, turned in walls]
+                turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
+                columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
                 self._send(_path(shape), numbers, times, columns)
 
     def sync(self) -> None:
@@ -264,7 +264,7 @@ class RecordingWriter:
 
     def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
         indexes = [rr.TimeColumn("frame", sequence=numbers), rr.TimeColumn("sim_time", duration=times)]
-        self._stream.send_columns(path, indexes, columns)
+        self.stream.send_columns(path, indexes, columns)
 
 
 def _path(shape: Shape) -> str:
@@ -303,8 +303,17 @@ def _blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
 # --- From a trajectory -----------------------------------------------------------------------------------
 
 
-def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bool = False) -> None:
-    """Make the recording of a trajectory.
+def show(trajectory: Any, settings: Settings) -> None:
+    """Show a trajectory in the viewer that is `live`, or else in the notebook that is running."""
+    stream = record(trajectory, None, settings)
+    if not settings.live:
+        from rerun.notebook import Viewer  # which imports half of Jupyter
+
+        Viewer(width="auto", height="auto", recording=stream).display()
+
+
+def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:
+    """Make the recording of a `Trajectory`; returns its stream.
 
     Raises:
         SceneError: the target exists, or the trajectory is damaged, or holds no frame.
@@ -326,5 +335,7 @@ def record(trajectory: Trajectory, path: Path, settings: Settings, overwrite: bo
                 )
     except SceneError:
         # A part of the recording of a damaged trajectory would look like a complete one.
-        path.unlink(missing_ok=True)
+        if path is not None:
+            path.unlink(missing_ok=True)
         raise
+    return writer.stream

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from ..motion import Pose
+from ..motion import Pose, pose
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
+from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
@@ -97,6 +98,17 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         wires = _wires(still, i, vertices, box) if len(vertices) else []
         shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
     return shapes
+
+
+def since_start(scene: Scene, i: int, position: Floats, orientation: Floats) -> tuple[Floats, Floats]:
+    """How surface i has turned and moved since the start: what was at x0 is at turn x0 + way.
+
+    `position` and `orientation` are its observables at a frame, `wall_position` and `wall_orientation`.
+    """
+    # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
+    first = pose(scene.surfaces[i].motion, 0.0)
+    turn = matrix(tuple(orientation)) @ first.turn.T
+    return turn, position - turn @ first.position()
 
 
 def _placed(shape: Shape, pose: Pose) -> Shape:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import pyplot
+from matplotlib.image import imread
 
 from ..errors import RunError, SceneError
 from . import drawing, series, viewer
@@ -31,7 +31,7 @@ def draw(playback: Playback, target: Path, times: list[float] | None, with_viewe
     with tempfile.TemporaryDirectory() as folder:
         found, by = _pictures(playback, numbers, Path(folder), with_viewer)
         picture = _sheet(playback, numbers, found, by)
-    drawing.save(picture, target)
+    picture.savefig(target)
     return by
 
 
@@ -56,7 +56,7 @@ def _pictures(
     if reason is None:
         try:
             files = viewer.pictures(playback.path, [playback.numbers[k] for k in frames], folder)
-            return [pyplot.imread(file) for file in files], "the Rerun viewer"
+            return [imread(file) for file in files], "the Rerun viewer"
         except RunError as error:
             reason = str(error)
     if with_viewer:
@@ -71,7 +71,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
         if group not in series.RARE or values[1].any():
             groups.setdefault(group, {})[playback.names[path]] = values
     above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
-    picture = pyplot.figure(figsize=(5.4 * _COLUMNS, 5.0 * above + 2.7 * below), layout="constrained")
+    picture = drawing.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
     top.set_facecolor(drawing.BACKGROUND)
     cells = []

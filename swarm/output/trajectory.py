@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..particles import Particles
 from . import layout
-from .stored import Stored, finite, opened, times_of, whole
+from .presented import Presented
+from .stored import finite, opened, times_of, whole
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from .exported import Progress
 
 
-class Trajectory(Stored):
+class Trajectory(Presented):
     """A trajectory on disk, read on demand.
 
     Attributes:

@@ -2,57 +2,18 @@
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..bodies.state import Bodies
 from ..frames import Frame
 from ..methods.base import Method
-from ..particles import Multipliers, Particles
+from ..particles import Particles
 from ..scene import Scene
 from . import machine
 from .admission import task_of
 from .options import RunOptions
+from .result import Result
 from .session import Session
-
-
-@dataclass(frozen=True)
-class Result:
-    """The end of a run.
-
-    Attributes:
-        particles: the particles at `until`.
-        observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
-            and "wall_heat" (frames, surfaces). Where walls move also "wall_work" (frames, surfaces) [J] and
-            "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions (w, x,
-            y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy" (frames,
-            surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames,
-            surfaces, 3). Of bodies also "link_error", the "work" of led
-            anchors [J], and "cavity_impulse" (frames, cavities) of what points carry [N s].
-        wall_time: seconds the run took in all its sessions, compilation included.
-        trajectory: the file that was written, or None.
-        multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
-        impacts_per_particle: (N,) how many impacts each has had.
-        escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
-        member_impacts: with member_impacts=True how many impacts each surface has had since 0 s, in all sessions: a
-            list with an array for each, (members,) of a field such as `Spheres` and (1,) of any other; in a cell that
-            repeats all images of a body are one. Else None. No file holds it.
-        bodies: the bodies at `until`, or None; then `particles` are all their points.
-    """
-
-    particles: Particles
-    observables: dict[str, NDArray[Any]]
-    wall_time: float
-    trajectory: Path | None
-    multipliers: Multipliers | None
-    impacts_per_particle: NDArray[np.int64]
-    escape_time: NDArray[np.float64]
-    member_impacts: list[NDArray[np.int64]] | None = None
-    bodies: Bodies | None = None
 
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
@@ -180,4 +141,6 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
         end.escape_time,
         end.members,
         None if task.bodies is None else task.bodies.moved(end.particles),
+        scene,
+        method,
     )

@@ -1,0 +1,111 @@
+"""What a trajectory or a log of impacts holds, and whether its run went well: texts by their names."""
+
+from typing import Any
+
+import numpy as np
+
+from ..notebook import shortened
+from ..observables import drift
+
+
+def of_trajectory(trajectory: Any) -> dict[str, str]:
+    """What a `Trajectory` holds, and whether the run went well."""
+    times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
+    last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
+    rows = {
+        "frames": f"{len(times)}{last}",
+        **_what(trajectory),
+        **of_scene(trajectory.scene),
+        "method": _call(trajectory.method),
+        "observables": ", ".join(seen) or "none",
+        "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
+    }
+    if len(times):
+        rows |= of_run(seen)
+    return rows
+
+
+def of_log(log: Any) -> dict[str, str]:
+    """What an `ImpactLog` holds."""
+    times, scene = log.times, log.scene
+    which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
+    return {
+        "impacts": f"{len(log):,}".replace(",", " "),
+        "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+        "particles": f"{which} of {log.count}",
+        "surfaces": "\n".join(
+            f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, log.counts(), strict=True)
+        ),
+        **_period(scene.period),
+        "method": _call(log.method),
+        "columns": ", ".join(log.dtype.names or ()),
+        "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
+    }
+
+
+def of_scene(scene: Any) -> dict[str, str]:
+    """The surfaces of a `Scene`, gravity, and its period."""
+    return {
+        "surfaces": _call(", ".join(shortened(scene.surfaces))),
+        "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
+        **_period(scene.period),
+    }
+
+
+def of_run(seen: dict[str, Any]) -> dict[str, str]:
+    """The figures that show whether a run went well."""
+    escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
+    lost = seen.get("dissipated_energy", [0.0])[-1]
+    dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
+    slid = seen.get("sliding_time", [0.0])[-1]
+    sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
+    heats, works = (
+        [f"{given:.4g} J from surfaces[{i}]" for i, given in enumerate(seen.get(name, [[]])[-1]) if given]
+        for name in ("wall_heat", "wall_work")
+    )
+    tied = (
+        {"link error": f"{seen['link_error'].max():.1e} of its length"} if np.any(seen.get("link_error", 0.0)) else {}
+    )
+    if np.any(seen.get("work", 0.0)):
+        tied["work"] = f"{seen['work'][-1]:.4g} J of led anchors"
+    return {
+        "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
+        **sliding,
+        "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
+        "largest penetration": f"{seen['max_penetration'].max():.1e} m",
+        **tied,
+        **dissipated,
+        **({"wall heat": ", ".join(heats)} if heats else {}),
+        **({"wall work": ", ".join(works)} if works else {}),
+        **escaped,
+    }
+
+
+def _what(trajectory: Any) -> dict[str, str]:
+    """The row that says what was run: particles, or bodies and what they are made of."""
+    body = trajectory.body
+    if body is None:
+        return {"particles": f"{trajectory.count}"}
+    parts = {
+        "point": len(body),
+        "link": len(body.links),
+        "spring": len(body.springs),
+        "elastic edge": 0 if body.strain is None else len(body.strain.edges),
+        "anchor": len(body.anchors),
+        "guide": len(body.guides),
+    }
+    told = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in parts.items() if count]
+    return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
+
+
+def _period(period: Any) -> dict[str, str]:
+    """The row of a scene that repeats."""
+    if period is None:
+        return {}
+    lengths = ", ".join("none" if length is None else f"{length:g}" for length in period)
+    return {"period": f"({lengths}) m"}
+
+
+def _call(described: Any) -> str:
+    """A surface or method as Python code writes it."""
+    return str(described).replace("swarm.", "")

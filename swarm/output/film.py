@@ -1,0 +1,195 @@
+"""A trajectory as a film: particles among their walls, frame by frame, by the writers of matplotlib."""
+
+import contextlib
+import os
+import shutil
+from pathlib import Path
+from subprocess import CalledProcessError
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
+from .. import checks
+from ..errors import FileError, SceneError
+from ..particles import Floats
+from . import colours, drawing, paths
+from .drawn import Drawn
+from .shapes import shapes_of, since_start
+
+_SUFFIXES = (".mp4", ".gif")
+# Pixels of a side of the film.
+_LEAST, _MOST = 64, 8192
+# Pixels an inch, in which letters have the size of those of a plot.
+_DPI = 120
+# Hundredths of a second, in which a GIF counts; viewers take less than 2 for 10.
+_HUNDREDTHS, _FASTEST = 100.0, 50.0
+
+
+# Matplotlib's writers draw every frame anew, twice; these take what `_Film` has drawn.
+
+
+class _Video(FFMpegWriter):
+    def grab_frame(self, **_options: Any) -> None:
+        self._proc.stdin.write(self.fig.canvas.buffer_rgba())  # type: ignore[attr-defined]
+
+
+class _Gif(PillowWriter):
+    """Keeps frames in the colours of the first, a byte a pixel: four bytes would fill the memory."""
+
+    _frames: list[Any]
+
+    def grab_frame(self, **_options: Any) -> None:
+        image = Image.fromarray(np.asarray(self.fig.canvas.buffer_rgba())[:, :, :3])  # type: ignore[attr-defined]
+        first = self._frames[0] if self._frames else None
+        self._frames.append(
+            image.quantize() if first is None else image.quantize(palette=first, dither=Image.Dither.NONE)
+        )
+
+
+def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, particles: int, overwrite: bool) -> Path:
+    """Write the film of a trajectory; see `Trajectory.animate`."""
+    target = paths.target_of("animate", path)
+    if target.suffix.lower() not in _SUFFIXES:
+        raise SceneError(f"animate: expected a file name that ends in {' or '.join(_SUFFIXES)}, got {path}")
+    paths.check_target(target, overwrite, "film")
+    paths.check_distinct({"film": target}, {"trajectory": trajectory.path})
+    most, rate = checks.count("frames", frames), checks.positive("fps", fps)
+    pixels = _pixels(size)
+    shown = checks.count("particles", particles)
+    is_gif = target.suffix.lower() == ".gif"
+    if is_gif and rate > _FASTEST:
+        raise SceneError(f"fps must be at most {_FASTEST:g} for a GIF, got {rate:g}")
+    made: Any = _Gif if is_gif else _Video  # which take any number, and are annotated with an int
+    writer = made(rate)
+    ffmpeg: Any = {} if is_gif else {"animation.ffmpeg_path": _ffmpeg()}
+    trajectory.require_frames()
+    last = len(trajectory) - 1
+    numbers = np.unique(np.linspace(0, last, min(most, last + 1)).round().astype(int)).tolist()
+    film = _Film(trajectory, numbers, pixels, shown)
+    part = paths.part_of(target)
+    try:
+        with matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), _DPI):
+            for k in numbers:
+                film.show(k)
+                writer.grab_frame()
+        os.replace(part, target)
+    except (OSError, CalledProcessError) as error:
+        raise FileError(f"cannot write the film {target}: {_reason(error)}") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def _pixels(size: Any) -> tuple[int, int]:
+    """The width and the height of a film, both even, as videos have them."""
+    with contextlib.suppress(TypeError, ValueError):
+        wide, high = size
+        sides = checks.count("size", wide, _LEAST), checks.count("size", high, _LEAST)
+        if max(sides) <= _MOST:
+            return sides[0] // 2 * 2, sides[1] // 2 * 2
+    raise SceneError(f"size must be width and height in pixels, {_LEAST} to {_MOST} each, got {size!r}")
+
+
+def _ffmpeg() -> str:
+    """The program that writes videos."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        with contextlib.suppress(ImportError, RuntimeError):
+            import imageio_ffmpeg
+
+            found = imageio_ffmpeg.get_ffmpeg_exe()
+    if found is None:
+        raise SceneError(
+            "an .mp4 needs the program ffmpeg, which is not installed: pip install imageio-ffmpeg, or write a .gif"
+        )
+    return str(found)
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong, of ffmpeg the last line that it has written."""
+    if isinstance(error, CalledProcessError):
+        said = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
+        return (said or "").strip().rpartition("\n")[2] or str(error)
+    return str(error)
+
+
+class _Film:
+    """The picture, whose artists change from frame to frame."""
+
+    def __init__(self, trajectory: Any, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
+        self._trajectory, self._scene = trajectory, trajectory.scene
+        self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
+        self._drawn = drawn = Drawn(len(start), trajectory.body, most)
+        self._shapes = shapes_of(self._scene, start.position)
+        self._walls = [(shape.solid, shape.wires) for shape in self._shapes]
+        self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, start)
+        # With half a pixel round-off takes none away.
+        self.picture = drawing.picture((pixels[0] + 0.5) / _DPI, (pixels[1] + 0.5) / _DPI)
+        self.picture.set_dpi(_DPI)
+        self._canvas: Any = FigureCanvasAgg(self.picture)
+        self.picture.set_facecolor(drawing.BACKGROUND)
+        self._axes = self.picture.add_subplot(projection="3d")
+        self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
+        at = drawn.points(start.position).T
+        self._dots, self._wires = drawing.particles(
+            self._axes, at, drawing.LIGHT, self._walls, 0.0 if len(drawn.triangles) else 1.0, self._box(numbers)
+        )
+        # What lies in front of the dots, or moves, is drawn in every frame, and all else once.
+        self._wires = [one for one in self._wires if self._scene.moves() or one.get_zorder() > self._dots.get_zorder()]
+        for artist in (*self._wires, self._dots, self._title):
+            artist.set_animated(True)
+        scale = self._scale
+        drawing.colour_bar(self.picture, self._axes, scale.quantity, scale.low, scale.high)
+        self._canvas.draw()
+        self.picture.set_layout_engine("none")
+        self._still = self._canvas.copy_from_bbox(self.picture.bbox)
+
+    def _box(self, numbers: list[int]) -> tuple[Floats, Floats]:
+        """The box of all frames."""
+        boxes = []
+        for k in numbers:
+            points = self._drawn.points(self._trajectory.frame(k).position).T
+            boxes.append(drawing.around(points, self._walls_at(k)))
+        return np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
+
+    def _walls_at(self, k: int) -> list[tuple[bool, list[Floats]]]:
+        """The curves of every wall at frame k, which are those of the start, moved."""
+        if not self._scene.moves():
+            return self._walls
+        moved = []
+        for i, (solid, curves) in enumerate(self._walls):
+            places = (self._seen[name][k, i] for name in ("wall_position", "wall_orientation"))
+            turn, way = since_start(self._scene, i, *places)
+            moved.append((solid, [curve @ turn.T + way for curve in curves]))
+        return moved
+
+    def show(self, k: int) -> None:
+        """Draw frame k on the canvas."""
+        drawn, frame = self._drawn, self._trajectory.frame(k)
+        position, velocity = drawn.points(frame.position), drawn.points(frame.velocity)
+        packed = self._scale.colours(self._values(position, velocity))
+        self._dots.set_offsets(position[:2].T)
+        self._dots.set_3d_properties(position[2], "z")
+        self._dots.set_facecolor(drawing.red_green_blue(packed))
+        if self._scene.moves():
+            for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
+                artist.set_segments(curves)
+        ties, points = [], position.T
+        if len(drawn.triangles):
+            ties = [drawing.faces(self._axes, points[drawn.triangles], packed[drawn.triangles])]
+        elif len(drawn.lines):
+            middles = self._scale.colours(self._values(drawn.middles(position), drawn.middles(velocity)))
+            ties = [drawing.bonds(self._axes, points[drawn.lines], middles)]
+        of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
+        self._title.set_text(f"{drawn.shown}{of} {drawn.noun}, t = {self._seen['time'][k]:.4g} s")
+        self._canvas.restore_region(self._still)
+        for artist in sorted((*self._wires, self._dots, *ties), key=lambda artist: artist.get_zorder()):
+            artist.do_3d_projection()
+            self._axes.draw_artist(artist)
+        self.picture.draw_artist(self._title)
+        for tie in ties:
+            tie.remove()

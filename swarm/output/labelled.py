@@ -1,0 +1,85 @@
+"""A trajectory as a Dataset of xarray, whose particles are read from the file when they are used."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from ..columns import COMPONENTS
+from . import layout
+
+# Of what the file keeps of each particle: its name in the Dataset and its unit. "impacts" are those of all.
+_PARTICLES = {
+    "position": ("position", "m"),
+    "velocity": ("velocity", "m s-1"),
+    layout.IMAGES: (layout.IMAGES, "1"),
+    layout.COUNTS: ("impacts_per_particle", "1"),
+    layout.ESCAPES: (layout.ESCAPES, "s"),
+}
+# Of observables by the end of their name, in this order; of all others "1".
+_UNITS = {
+    "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
+    "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
+}  # fmt: skip
+_AXES = ("x", "y", "z")
+
+
+class _Column(BackendArray):  # type: ignore[misc]
+    """A dataset of the file as an array that reads what is asked for: complete frames only."""
+
+    def __init__(self, trajectory: Any, name: str) -> None:
+        self._trajectory, self._name = trajectory, name
+        frames = len(trajectory)
+        with trajectory._reading(name) as file:
+            found = file[name]
+            self.shape, self.dtype = (frames, *found.shape[1:]), found.dtype
+
+    def __getitem__(self, key: Any) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER_1VECTOR, self._read)
+
+    def _read(self, key: Any) -> Any:
+        # A slice without an end would reach frames that are not complete.
+        first = key[0]
+        if isinstance(first, slice):
+            first = slice(*first.indices(self.shape[0]))
+        with self._trajectory._reading(self._name) as file:
+            return np.asarray(file[self._name][(first, *key[1:])])
+
+
+def dataset_of(trajectory: Any) -> xr.Dataset:
+    """The Dataset of a trajectory; see `Trajectory.to_xarray`."""
+    surfaces = [f"{i}_{type(surface).__name__.lower()}" for i, surface in enumerate(trajectory.scene.surfaces)]
+    data: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {
+        "time": ("time", trajectory.times, {"units": "s"}),
+        "axis": list(_AXES),
+        "surface": surfaces,
+    }
+    for name, values in trajectory.observables.items():
+        if name != "time":
+            unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "1")
+            data[name] = (("time", *_dimensions(name, values.ndim)), values, {"units": unit})
+    if any("quaternion" in dimensions for dimensions, *_rest in data.values()):
+        coordinates["quaternion"] = list("wxyz")
+    if trajectory.has_particles():
+        with trajectory._reading("its particles") as file:
+            everything = file["particles/all"]
+            coordinates["particle"] = everything["id"][()]
+            data["mass"] = ("particle", everything["mass"][()], {"units": "kg"})
+            kept = [name for name in _PARTICLES if name in everything]
+        for name in kept:
+            column = _Column(trajectory, f"particles/all/{name}/value")
+            label, unit = _PARTICLES[name]
+            dimensions = ("time", "particle", "axis")[: len(column.shape)]
+            data[label] = (dimensions, indexing.LazilyIndexedArray(column), {"units": unit})
+    about = {"source": str(trajectory.path), **{name: trajectory.descriptions[name] for name in ("scene", "method")}}
+    return xr.Dataset(data, coordinates, about)
+
+
+def _dimensions(name: str, dimensions: int) -> list[str]:
+    """The dimensions of an observable besides the time."""
+    last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
+    first = "cavity" if name.startswith("cavity") else "surface"
+    return [first] * (dimensions - 1 - len(last)) + last

@@ -1,0 +1,186 @@
+"""What becomes of a trajectory in Python: pictures, films, a viewer, tables and labelled arrays."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import notebook
+from ..columns import frame_of
+from ..errors import SceneError
+from ..extras import needed_by
+from . import facts
+from .stored import Stored
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+
+class Presented(Stored):
+    """The methods of a `Trajectory` that need other libraries, each of which is imported where it is used."""
+
+    def __repr__(self: Any) -> str:
+        try:
+            times = self.times
+            span = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""
+            bodies = f"{self.copies} bodies of " if self.copies else ""
+            told = f"{len(times)} frame{'s' * (len(times) != 1)}{span}, {bodies}{self.count} particles, {self.method!r}"
+        except SceneError as error:
+            told = str(error).removeprefix(f"{self.path} is ")
+        return f"Trajectory({str(self.path)!r}, {told})"
+
+    def _repr_html_(self: Any) -> str:
+        try:
+            rows = facts.of_trajectory(self)
+        except SceneError as error:
+            rows = {"problem": str(error)}
+        return notebook.table(f"Trajectory {self.path.name}", rows.items())
+
+    def has_particles(self) -> bool:
+        """Whether the file keeps particles."""
+        with self._reading("its particles") as file:
+            return "particles/all" in file
+
+    def table(self: Any) -> "pandas.DataFrame":
+        """The observables as a pandas frame: `time` first, a row for each frame.
+
+        Vectors have a column for each component, momentum_x, and what each surface has one for each surface, impulse_0
+        and wall_position_0_x.
+
+        Raises:
+            SceneError: the trajectory is damaged, or pandas is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         table = trajectory.table()
+        >>> table[["time", "impacts", "momentum_x"]]
+           time  impacts  momentum_x
+        0   0.0        0         1.0
+        1   1.0        1        -1.0
+        """
+        return frame_of(self.observables)
+
+    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
+        """Draw energies, errors, penetration, impacts, pressure, speeds and the particles or bodies at the end.
+
+        Args:
+            particles: the most particles that are drawn, evenly chosen, or points of bodies.
+            figsize: width and height [inches], at 100 pixels an inch.
+
+        Returns:
+            A figure of matplotlib, which a notebook shows where it is the last line of a cell, and which can be
+            changed and saved: `figure.axes`, `figure.savefig("run.pdf")`. It is none of pyplot's, so nothing keeps it
+            and no backend is chosen.
+
+        Raises:
+            SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or
+                scikit-image is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.fill(cavity, 10, speed=1.0)
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         figure = trajectory.plot(figsize=(10.0, 6.0))
+        >>> figure.get_suptitle()[:16]
+        'run.h5: 2 frames'
+        """
+        with needed_by("a plot", "plot"):
+            from . import plots
+        return plots.figure_of(plots.content_of(self), figsize, particles)  # type: ignore[arg-type]
+
+    def animate(
+        self: Any,
+        path: str | Path,
+        *,
+        frames: int = 200,
+        fps: float = 25.0,
+        size: tuple[int, int] = (960, 720),
+        particles: int = 10_000,
+        overwrite: bool = False,
+    ) -> Path:
+        """Write a film of the particles or bodies among their walls, coloured by speed.
+
+        200 frames of 10 000 particles take 17 s of one core, more than half of it by ffmpeg. Walls are drawn as they
+        bound the volume at the start, and moved where they move.
+
+        Args:
+            path: `.mp4`, by ffmpeg, or `.gif`, which is some ten times as large.
+            frames: the most that are drawn, evenly chosen, with the first and the last.
+            fps: frames a second, above 0; of a GIF at most 50.
+            size: width and height in pixels, 64 to 8192 each; an odd one is made even.
+            particles: the most that are drawn, evenly chosen, or points of bodies.
+            overwrite: replace an existing file.
+
+        Returns:
+            The path. The file has this name when it is complete.
+
+        Raises:
+            SceneError: an argument is out of its range, the file exists, the trajectory is damaged or keeps no
+                particles, or matplotlib, scikit-image or ffmpeg is not installed.
+            FileError: the file cannot be written.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.fill(cavity, 10, speed=1.0)
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         trajectory.animate(folder + "/run.gif", size=(320, 240)).name
+        'run.gif'
+        """
+        with needed_by("a film", "animation"):
+            from . import film
+        return film.animate(self, path, frames, fps, size, particles, overwrite)
+
+    def to_xarray(self: Any) -> "xarray.Dataset":
+        """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.
+
+        What is kept of particles, `position`, `velocity`, `image`, `impacts_per_particle` and `escape_time`, is read
+        from the file when its values are used, and only the part that is: a file larger than the memory is no
+        problem, `dataset.position.sel(time=slice(2.0, 3.0)).mean("particle")` reads these frames. Nothing that is read
+        is kept; `dataset.load()` keeps all. As long as it is read, the trajectory must not be closed. Observables and
+        masses are read at once. Units are in `attrs`, and so are the tables of the scene and the method.
+
+        Raises:
+            SceneError: the trajectory is damaged, or xarray is not installed.
+
+        >>> import swarm, tempfile
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+        ...     with swarm.load(folder + "/run.h5") as trajectory:
+        ...         dataset = trajectory.to_xarray()
+        ...         float(dataset.velocity.sel(axis="x", particle=0)[-1])
+        -1.0
+        >>> dict(dataset.position.sizes)
+        {'time': 2, 'particle': 1, 'axis': 3}
+        """
+        with needed_by("a Dataset", "xarray"):
+            from . import labelled
+        return labelled.dataset_of(self)
+
+    def show(self: Any, *, particles: int = 5000, color: str = "speed", megabytes: float = 100.0) -> None:
+        """Show the trajectory in a Rerun viewer: in a notebook below the cell, else in a window on this machine.
+
+        Args:
+            particles: the most particles that are shown, evenly chosen, or points of bodies.
+            color: what their colour shows, "speed" or "energy-error".
+            megabytes: the largest size of what the viewer gets, above 0; of too many frames every k-th is shown.
+
+        Raises:
+            SceneError: an argument is out of its range, the trajectory is damaged or keeps no particles, rerun-sdk
+                (in a notebook rerun-sdk[notebook]) is not installed, or there is no screen.
+        """
+        in_notebook = notebook.is_running()
+        with needed_by("a viewer", "notebook" if in_notebook else "record"):
+            if in_notebook:
+                import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
+            from . import recording
+        recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))

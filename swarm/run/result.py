@@ -1,0 +1,119 @@
+"""The end of a run, and what can be made of it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import notebook
+from ..bodies.state import Bodies
+from ..columns import frame_of
+from ..errors import SceneError
+from ..extras import needed_by
+from ..methods.base import Method
+from ..output import facts
+from ..particles import Multipliers, Particles
+from ..scene import Scene
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class Result:
+    """The end of a run.
+
+    Attributes:
+        particles: the particles at `until`.
+        observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
+            and "wall_heat" (frames, surfaces). Where walls move also "wall_work" (frames, surfaces) [J] and
+            "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions (w, x,
+            y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy" (frames,
+            surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames,
+            surfaces, 3). Of bodies also "link_error", the "work" of led
+            anchors [J], and "cavity_impulse" (frames, cavities) of what points carry [N s].
+        wall_time: seconds the run took in all its sessions, compilation included.
+        trajectory: the file that was written, or None.
+        multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
+        impacts_per_particle: (N,) how many impacts each has had.
+        escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
+        member_impacts: with member_impacts=True how many impacts each surface has had since 0 s, in all sessions: a
+            list with an array for each, (members,) of a field such as `Spheres` and (1,) of any other; in a cell that
+            repeats all images of a body are one. Else None. No file holds it.
+        bodies: the bodies at `until`, or None; then `particles` are all their points.
+        scene, method: as they were run.
+    """
+
+    particles: Particles
+    observables: dict[str, NDArray[Any]]
+    wall_time: float
+    trajectory: Path | None
+    multipliers: Multipliers | None
+    impacts_per_particle: NDArray[np.int64]
+    escape_time: NDArray[np.float64]
+    member_impacts: list[NDArray[np.int64]] | None = None
+    bodies: Bodies | None = None
+    scene: Scene | None = None
+    method: Method | None = None
+
+    def __repr__(self) -> str:
+        seen, frames = self.observables, len(self.observables["time"])
+        parts = [
+            f"{len(self.particles)} particles" if self.bodies is None else repr(self.bodies),
+            f"{frames} frame{'s' * (frames != 1)} to {seen['time'][-1]:g} s",
+            f"{int(seen['impacts'][-1])} impacts",
+            f"energy error {seen['energy_error'].max():.1e}",
+            f"penetration {seen['max_penetration'].max():.1e} m",
+            f"{self.wall_time:.2f} s",
+            *([] if self.trajectory is None else [repr(str(self.trajectory))]),
+        ]
+        return f"Result({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        what = {"particles": f"{len(self.particles)}"} if self.bodies is None else {"bodies": repr(self.bodies)}
+        times = self.observables["time"]
+        rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s", **facts.of_run(self.observables)}
+        rows |= {"wall time": f"{self.wall_time:.2f} s", "trajectory": str(self.trajectory or "none")}
+        return notebook.table("Result", rows.items())
+
+    def table(self) -> "pandas.DataFrame":
+        """The observables as a pandas frame: `time` first, a row for each frame; see `Trajectory.table`.
+
+        Raises:
+            SceneError: pandas is not installed.
+        """
+        return frame_of(self.observables)
+
+    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
+        """Draw the run in one picture; see `Trajectory.plot`.
+
+        Without a trajectory, or where that keeps no particles, the speeds at the start are left out, and colours are
+        relative to the particles at the end.
+
+        Raises:
+            SceneError: an argument is out of its range, or matplotlib or scikit-image is not installed.
+
+        >>> import swarm
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> result = swarm.simulate(cavity, swarm.fill(cavity, 10, speed=1.0), swarm.Impact(), until=2.0, every=0.5)
+        >>> result.plot().get_suptitle()[:16]
+        '5 frames, Impact'
+        """
+        with needed_by("a plot", "plot"):
+            from ..output import plots
+        if self.scene is None or self.method is None:
+            raise SceneError("plot needs a Result that knows its scene and its method, got one without them")
+        body = None if self.bodies is None else self.bodies.body
+        name, frames = "", {}
+        if self.trajectory is not None and self.trajectory.is_file():
+            from ..output.trajectory import load
+
+            name = self.trajectory.name
+            with load(self.trajectory) as written:
+                frames = {"start": written.frame(0)} if written.has_particles() else {}
+        frames["end"] = self.particles
+        content = plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)
+        return plots.figure_of(content, figsize, particles)
