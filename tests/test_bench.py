@@ -170,3 +170,10 @@ def test_fields_quick():
     told = printed("fields")
     for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
         assert row in told
+
+
+@pytest.mark.long
+def test_sweep_quick():
+    told = printed("sweep")
+    for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):
+        assert row in told

@@ -116,9 +116,11 @@ def test_a_worker_that_dies_fails_its_run_alone(tmp_path):
     frames = []
     sweeping = threading.Thread(target=lambda: frames.append(swarm.sweep(path, tmp_path / "out", processes=1)))
     sweeping.start()
-    until_there_is(lambda: len(list((tmp_path / "out").glob("*.h5"))) == 2)
+    # The first has ended, and the second has begun.
+    until_there_is(lambda: list((tmp_path / "out").glob("[!.]*.json")))
+    until_there_is(lambda: len(list((tmp_path / "out").glob("[!.]*.h5"))) == 2)
     for worker in psutil.Process().children():
-        if "swarm.ensemble.worker" in worker.cmdline():
+        if "swarm.ensemble.worker" in " ".join(worker.cmdline()):
             worker.kill()
     sweeping.join(RUNNING)
     (frame,) = frames
