@@ -227,17 +227,27 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
     order, so those of a part of the particles, of whole chunks, are a part of those of all.
     """
     contacts = state.contacts if lasts else None
-    added = state.dissipated, None if contacts is None else contacts.sliding, state.impulse, state.heat
-    return np.vstack([partial.T[:_ENERGY_ERROR], *(_of_chunks(values, state.mass.size) for values in added)])
+    n, heat = state.mass.size, state.heat
+    booked, more = _ENERGY_ERROR + 2 + len(state.impulse), 1 if heat is None else len(heat)
+    sums = np.zeros((booked + more, len(partial)))
+    sums[:_ENERGY_ERROR] = partial.T[:_ENERGY_ERROR]
+    if state.dissipated.size:
+        _add_up(state.dissipated[None], n, sums[_ENERGY_ERROR, None])
+    if contacts is not None:
+        _add_up(contacts.sliding[None], n, sums[_ENERGY_ERROR + 1, None])
+    _add_up(state.impulse, n, sums[_ENERGY_ERROR + 2 : booked])
+    if heat is not None:
+        _add_up(heat, n, sums[booked:])
+    return sums
 
 
-def _of_chunks(values: Floats | None, n: int) -> Floats:
-    """Sums of values (n,) or (rows, n) over chunks; one row of zeros if there are none."""
-    if values is None or values.size == 0:
-        return np.zeros((1, -(-n // CHUNK)))
-    rows, whole = np.atleast_2d(values), n - n % CHUNK
-    sums = rows[:, :whole].reshape(len(rows), -1, CHUNK).sum(axis=2)
-    return sums if whole == n else np.hstack([sums, rows[:, whole:].sum(axis=1)[:, None]])
+def _add_up(values: Floats, n: int, sums: Floats) -> None:
+    """Sums of values (rows, n) over chunks into sums (rows, chunks)."""
+    whole = n // CHUNK
+    if whole:
+        np.add.reduce(values[:, : whole * CHUNK].reshape(-1, whole, CHUNK), axis=2, out=sums[:, :whole])
+    if whole * CHUNK < n:
+        np.add.reduce(values[:, whole * CHUNK :], axis=1, out=sums[:, whole])
 
 
 def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict[str, Any]:
@@ -246,8 +256,10 @@ def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict
     `owners` says which surface each wall belongs to, `booked` how many rows of impulse and work there are.
     """
     # NumPy adds rows in an order that depends on how they lie in memory.
-    kinetic, fall, stored, *_rest = totals = np.ascontiguousarray(sums).sum(axis=1).tolist()
-    walls = np.array(totals[_ENERGY_ERROR + 2 :])
+    totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
+    kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
+    lost, lasted = totals[_ENERGY_ERROR : _ENERGY_ERROR + 2].tolist()
+    walls = totals[_ENERGY_ERROR + 2 :]
     pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.
     moves = {} if booked == len(owners) else {"wall_work": np.bincount(owners, weights=pushed[len(owners) :])}
@@ -257,11 +269,11 @@ def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict
         "potential_energy": fall,
         "contact_energy": stored,
         "total_energy": kinetic + fall + stored,
-        "dissipated_energy": totals[_ENERGY_ERROR],
-        "momentum": np.array(totals[_PX : _PZ + 1]),
-        "angular_momentum": np.array(totals[_LX : _LZ + 1]),
+        "dissipated_energy": lost,
+        "momentum": totals[_PX : _PZ + 1],
+        "angular_momentum": totals[_LX : _LZ + 1],
         "impulse": impulse,
-        "sliding_time": totals[_ENERGY_ERROR + 1],
+        "sliding_time": lasted,
         "wall_heat": np.bincount(owners, weights=heat) if has_heat else np.zeros_like(impulse),
         **moves,
     }
@@ -285,4 +297,4 @@ def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
 def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); `lasts`: a contact has lasted in this run."""
     sums = chunk_sums(partial, state, lasts)
-    return summed(sums, owners, len(state.impulse), state.heat is not None) | counted(partial, state, lasts)
+    return {**summed(sums, owners, len(state.impulse), state.heat is not None), **counted(partial, state, lasts)}

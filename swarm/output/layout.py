@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from .sources import DamagedError
 
 PARTS = ("position", "velocity")
 # The impacts of each particle, beside these; files of older versions have none.
@@ -84,11 +84,13 @@ def require_shards(file: Any, n: int, path: Path, open_file: Callable[[Path], An
     for shard_name, needed in held.items():
         shard = path.parent / shard_name
         if not shard.is_file():
-            raise SceneError(f"{path} needs {shard}, which holds a part of its particles, got none; move both together")
+            raise DamagedError(
+                f"{path} needs {shard}, which holds a part of its particles, got none; move both together"
+            )
         with open_file(shard) as part:
             for source, entries in needed.items():
                 if part[source].shape[0] < n or part[source].shape[1] < entries:
-                    raise SceneError(
+                    raise DamagedError(
                         f"{shard} must hold {n} frames of {entries} particles of {path}, got {source} of the shape "
                         f"{part[source].shape}: it is of another run, or was changed"
                     )

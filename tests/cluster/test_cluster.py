@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -97,7 +98,7 @@ def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(cl
         assert position[:, -1].tolist() == result.particles.position[:, -1].tolist()
     universe.trajectory.close()
     (there / "run.shards" / "0001.h5").unlink()
-    with pytest.raises(swarm.SceneError, match=r"moved\.h5 needs .*run\.shards/0001\.h5"):
+    with pytest.raises(swarm.SceneError, match=r"^\S*moved\.h5 needs .*run\.shards/0001\.h5"):
         swarm.load(there / "moved.h5")
 
 
@@ -123,6 +124,36 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, tmp_path):
     assert len(list((tmp_path / "run.shards").iterdir())) == 3
     complete = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
     assert (complete.returncode, "is complete" in complete.stderr) == (0, True), complete.stderr
+
+
+class Semi(NamedTuple):
+    a: float
+    b: float
+
+
+def own_phi(p, x, y, z):
+    return (x / p.a) ** 2 + (y / p.b) ** 2 + z * z - 1.0
+
+
+def own_gradient(p, x, y, z):
+    return 2.0 * x / p.a**2, 2.0 * y / p.b**2, 2.0 * z
+
+
+@pytest.mark.parametrize("kind", ["formula", "own"])
+def test_functions_of_surfaces_reach_the_workers(kind, client, tmp_path):
+    box = ((-1.1,) * 3, (1.1,) * 3)
+    surface = {
+        "formula": lambda: swarm.Formula("x**2/0.16 + y**2/0.25 + z**4 - 1"),
+        "own": lambda: swarm.OwnSurface(Semi(0.5, 0.6), own_phi, own_gradient, size=1.0, bounds=box),
+    }[kind]()
+    scene = swarm.Scene([surface])
+    start = swarm.fill(scene, 300, speed=1.0, seed=1)
+    both = [
+        swarm.simulate(scene, start, swarm.Impact(), until=0.3, compile="never", **where)
+        for where in ({}, {"cluster": client, "trajectory": tmp_path / "run.h5"})
+    ]
+    assert both[0].observables["impacts"][-1] > 50
+    assert both[0].particles.position.tobytes() == both[1].particles.position.tobytes()
 
 
 def test_a_failure_names_the_particle_of_the_whole_run(client, tmp_path):

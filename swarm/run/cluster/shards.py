@@ -134,8 +134,8 @@ def tidy(folder: Path, count: int) -> None:
 # --- What a worker reads and writes ---------------------------------------------------------------------
 
 
-def task_of(folder: Path, k: int) -> Task:
-    """The run of shard k."""
+def task_of(folder: Path, k: int) -> tuple[Task, int]:
+    """The run of shard k, and how many shards there are."""
     import cloudpickle
 
     with open(folder / "whole.pickle", "rb") as file:
@@ -147,11 +147,11 @@ def task_of(folder: Path, k: int) -> Task:
     common = whole.scene, whole.method, options
     if whole.body is None:
         mine = {name: array[..., first:last] for name, array in arrays.items()}
-        return Task(common[0], Particles(**mine), *common[1:], None, first, whole.start)
+        return Task(common[0], Particles(**mine), *common[1:], None, first, whole.start), len(whole.bounds) - 1
     shape = 3, len(whole.body), -1
     position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
     bodies = Bodies.unchecked(whole.body, position, velocity)
-    return Task(common[0], bodies.particles(), *common[1:], bodies, first, whole.start)
+    return Task(common[0], bodies.particles(), *common[1:], bodies, first, whole.start), len(whole.bounds) - 1
 
 
 def write_end(path: Path, end: End) -> None:

@@ -16,6 +16,8 @@ from ..progress import Display
 from ..session import Session
 from . import shards
 
+# Reports of all shards in a second, so that the scheduler has little to do.
+_MOST_REPORTS = 100
 # Seconds from one report to the next; until a lock is given up and a file, which network file systems release and show
 # after a while; and from one look at them to the next.
 _REPORTS, _PATIENCE, APPEARS, _GLANCE = 1.0, 30.0, 10.0, 0.1
@@ -45,11 +47,11 @@ def advance(folder: Path, k: int, token: str = "", report: Report = lambda momen
         return "complete", ""
     if token in _stopped:
         return "stopped", ""
-    task = shards.task_of(folder, k)
+    task, count = shards.task_of(folder, k)
     target = task.options.trajectory
     resumes = paths.checkpoint_of(target).exists()
     options = dataclasses.replace(
-        task.options, progress=_reporting(report), resume=resumes, overwrite=not resumes, threads=1
+        task.options, progress=_reporting(report, count), resume=resumes, overwrite=not resumes, threads=1
     )
     session = Session(options)
     _sessions.setdefault(token, set()).add(session)
@@ -66,14 +68,15 @@ def advance(folder: Path, k: int, token: str = "", report: Report = lambda momen
     return "complete", ""
 
 
-def _reporting(report: Report) -> Display:
+def _reporting(report: Report, shards_at_once: int) -> Display:
     """A display that reports now and then."""
-    last = -_REPORTS
+    every = max(_REPORTS, shards_at_once / _MOST_REPORTS)
+    last = -every
 
     def within(moment: float, until: float) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last >= _REPORTS:
+        if now - last >= every:
             last = now
             report(moment, until)
 

@@ -69,6 +69,14 @@ class FormSurface(Surface):
     def _made(self) -> "Form":
         raise NotImplementedError
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: the functions of a form are known to the process that has made it, so each makes its own."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        object.__setattr__(self, "_form", self._made())
+
     def numbers(self) -> Any:
         return self._form.numbers(self.own_center())
 
