@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from ..columns import flattened
 from ..errors import SceneError
 from ..extras import needed_by
 from ..output import paths
@@ -15,23 +14,12 @@ from ..output.replaced import replaced
 from .plan import STEM, Plan, Variant
 
 TABLES = ("csv", "parquet")
-# What observables of three or four components are, (x, y, z) and quaternions; the others have an entry a surface.
-_AXES = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
-_VECTORS = ("momentum", "angular_momentum")
 Status = dict[str, Any]
 
 
 def final(observables: dict[str, Any]) -> dict[str, int | float]:
     """The observables of the last frame, numbers by name: momentum_x, impulse_0, wall_position_0_x."""
-    last: dict[str, int | float] = {}
-    for name, values in observables.items():
-        end = np.asarray(values)[-1]
-        for at in np.ndindex(end.shape):
-            parts = [str(i) for i in at]
-            if parts and (name in _VECTORS or len(parts) > 1):
-                parts[-1] = _AXES[end.shape[-1]][at[-1]]
-            last["_".join([name, *parts])] = end[at].item()
-    return last
+    return {name: column[-1].item() for name, column in flattened(observables).items()}
 
 
 def of_trajectory(path: Path, until: float) -> dict[str, int | float] | None:
