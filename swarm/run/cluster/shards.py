@@ -157,7 +157,9 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
 def write_end(path: Path, end: End) -> None:
     """Write how a shard ended."""
     arrays: dict[str, Any] = {"position": end.particles.position, "velocity": end.particles.velocity}
-    arrays |= {"impacts": end.impacts, "escape_time": end.escape_time}
+    arrays["impacts"] = end.impacts
+    if not np.isnan(end.escape_time).all():
+        arrays["escape_time"] = end.escape_time
     if end.particles.image is not None:
         arrays["image"] = end.particles.image
     if end.multipliers is not None:
@@ -173,7 +175,7 @@ def write_end(path: Path, end: End) -> None:
 def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     """How all shards ended; without observables and wall time."""
     n = bounds[-1]
-    whole: dict[str, NDArray[Any]] = {}
+    whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
     members: list[NDArray[np.int64]] = []
     for k, (first, last) in enumerate(itertools.pairwise(bounds)):
         with open(end_of(folder, k), "rb") as file:
