@@ -107,8 +107,8 @@ def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
         (["plot", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
         (["record", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
         (["run", "scene.toml", "-o", "damaged.h5", "--resume"], "damaged.h5 is damaged: its structure: "),
-        (["info", "absent.h5"], "there is no file absent.h5; expected a trajectory (.h5)"),
-        (["info", "."], ". is a folder; expected a trajectory (.h5)"),
+        (["info", "absent.h5"], "there is no file absent.h5; expected a trajectory or a log of impacts (.h5)"),
+        (["info", "."], ". is a folder; expected a trajectory or a log of impacts (.h5)"),
         (["plot", "scene.toml"], "scene.toml is not an HDF5 file"),
         (["record", "absent.h5"], "there is no file absent.h5; expected a trajectory (.h5)"),
         (["view", "absent.rrd"], "there is no file absent.rrd; expected a recording (.rrd)"),
@@ -231,12 +231,12 @@ def test_json_of_a_run_that_is_interrupted(folder, options):
     code = """
 import signal, sys
 from swarm import cli
-from swarm.run import simulation
-def frame(number, *more, real=simulation.Frame):
+from swarm.run import machine
+def frame(number, *more, real=machine.Frame):
     if number == {at}:
         signal.raise_signal(signal.SIGINT)
     return real(number, *more)
-simulation.Frame = frame
+machine.Frame = frame
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.argv[0] = "swarm"
 cli.main()
@@ -262,11 +262,11 @@ def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, option
     code = """
 import signal, sys
 from swarm import cli
-from swarm.run import simulation
+from swarm.run import machine
 def interrupted(*about):
     signal.raise_signal(signal.SIGINT)
     raise KeyboardInterrupt
-simulation.run_of = interrupted
+machine.run_of = interrupted
 signal.signal(signal.SIGINT, signal.default_int_handler)
 cli.main()
 """
@@ -308,12 +308,12 @@ def test_a_second_interrupt_ends_at_once_without_a_traceback(folder):
     code = INTERRUPTED.format(name="nothing").replace(
         "from swarm.__main__",
         """
-from swarm.run import simulation
-real = simulation.Frame
+from swarm.run import machine
+real = machine.Frame
 def frame(*about):
     signal.raise_signal(signal.SIGINT)
     return real(*about)
-simulation.Frame = frame
+machine.Frame = frame
 from swarm.commands import run
 run._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
 from swarm.__main__""",

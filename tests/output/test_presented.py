@@ -288,7 +288,7 @@ def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
     shown = []
     monkeypatch.setattr(notebook, "is_running", lambda: True)
     monkeypatch.setitem(sys.modules, "rerun_notebook", None)
-    with pytest.raises(SceneError, match=r"pip install rerun-sdk\[notebook\]"):
+    with pytest.raises(SceneError, match=r"pip install 'rerun-sdk\[notebook\]"):
         run[1].show()
     monkeypatch.setitem(sys.modules, "rerun_notebook", types.ModuleType("rerun_notebook"))
     monkeypatch.setattr(
