@@ -181,6 +181,8 @@ class _Run:
 
     def _follow(self) -> None:
         """Show the frames that all shards have by now."""
+        if not self._task.options.progress:
+            return  # to read them takes time from workers of this machine
         until = self._task.options.times.until
         for count, seen in joined.seen_of(self.folder, self._task, self.bounds, self._seen):
             self._show.frame(Frame(self._seen, seen["time"], until, seen, count))
