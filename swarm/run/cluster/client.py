@@ -2,12 +2,12 @@
 
 What a thousand workers do, from what 200 shards on two workers take (`python -m bench cluster`). Particles do not pass
 through the scheduler: a task is a name, a number and a folder, its answer two words, a report some 100 bytes, of which
-all shards together send 100 a second at most. A shard takes 8 ms of the scheduler's processor, reports included: a
-thousand take 8 s of a run of any length. In a frame a particle takes 56 bytes (position, velocity, impacts; 32 in
+all shards together send 100 a second at most. A shard takes 4 ms of the scheduler's processor, reports included: a
+thousand take 4 s of a run of any length. In a frame a particle takes 56 bytes (position, velocity, impacts; 32 in
 float32) and 0.5 byte of sums, which each worker writes to a file of its own: 10^9 particles are 56 GB a frame, and the
 storage is the slowest part; `frames = k` keeps fewer. Next is the client, which makes, checks and writes the start (56
 bytes a particle), reads the end (64 bytes), and opens the file of each shard to join it. A shard begins and ends with
-about 0.1 s of its own, a worker with some seconds of imports.
+about 0.05 s of its own, a worker with some seconds of imports.
 """
 
 import dataclasses
