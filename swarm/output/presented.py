@@ -106,8 +106,8 @@ class Presented(Stored):
     ) -> Path:
         """Write a film of the particles or bodies among their walls, coloured by speed.
 
-        200 frames of 10 000 particles take 17 s of one core, more than half of it by ffmpeg. Walls are drawn as they
-        bound the volume at the start, and moved where they move.
+        200 frames of 10 000 particles take 17 s of one core. Walls are drawn as they bound the volume at the start, and
+        moved where they move.
 
         Args:
             path: `.mp4`, by ffmpeg, or `.gif`, which is some ten times as large.
