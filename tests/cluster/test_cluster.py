@@ -102,7 +102,33 @@ def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(cl
         swarm.load(there / "moved.h5")
 
 
-def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, tmp_path):
+@pytest.fixture
+def held(client):
+    """The shards of the workers stay at their first frame until they are told to stop."""
+
+    def hold():
+        import time
+
+        from swarm.run.session import Session
+
+        def look(session, *about, real=Session.look):
+            while not session._stops:
+                time.sleep(0.01)
+            real(session, *about)
+
+        Session.free, Session.look = Session.look, look
+
+    def let_go():
+        from swarm.run.session import Session
+
+        Session.look = Session.free
+
+    client.run(hold)
+    yield lambda: client.run(let_go)
+    client.run(let_go)
+
+
+def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_path):
     address = client.scheduler.address
     scene, output = tmp_path / "scene.toml", tmp_path / "run.h5"
     scene.write_text(SCENE.replace("UNTIL", "8.0"))
@@ -115,6 +141,7 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, tmp_path):
     _out, said = process.communicate(timeout=100)
     assert process.returncode == 130, said
     assert "--resume" in said
+    held()
     again = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
     assert again.returncode == 0, again.stderr
     with swarm.load(output) as joined, swarm.load(alone[1]) as single:
