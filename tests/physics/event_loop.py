@@ -1,0 +1,180 @@
+"""A plain event loop, one particle at a time: sampled gaps, bisection, and the law of an impact as it is written.
+
+It shares with the engine only phi and its gradient of each surface at rest. What moves a wall is written anew here.
+"""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+import swarm
+from swarm.motion.given import parts_of
+
+# Between two samples of the gap [s], and how many at once.
+STEP, WINDOW = 5e-4, 400
+# A flight that is shorter [s] is the beginning of a contact that lasts.
+SHORTEST = 3e-3
+# A gap that comes so near to 0 and falls again [m]: whether it is an impact is round-off.
+GRAZES = 1e-9
+
+
+class Wall(NamedTuple):
+    """A surface as it is at rest, and its motion."""
+
+    rest: object
+    parts: tuple
+    sign: float
+    e: float
+    mu: float
+
+    @staticmethod
+    def of(surface):
+        sign = -1.0 if getattr(surface, "side", "inside") == "outside" else 1.0
+        rest = dataclasses.replace(surface, motion=None)
+        return Wall(rest, parts_of(surface.motion), sign, surface.restitution, surface.friction)
+
+    def shift(self, t):
+        """Displacements (3, T) and their rates at times (T,)."""
+        d, u = np.zeros((3, t.size)), np.zeros((3, t.size))
+        for part in self.parts:
+            if isinstance(part, swarm.Translation):
+                way, rate = t, np.ones_like(t)
+                ahead = np.array(part.velocity)
+            elif isinstance(part, swarm.Oscillation):
+                omega, ahead = 2.0 * math.pi * part.frequency, np.array(part.amplitude)
+                way = np.sin(omega * t + part.phase) - math.sin(part.phase)
+                rate = omega * np.cos(omega * t + part.phase)
+            else:
+                continue
+            d, u = d + ahead[:, None] * way, u + ahead[:, None] * rate
+        return d, u
+
+    def turning(self):
+        """(unit axis, rate, center) of its rotation."""
+        for part in self.parts:
+            if isinstance(part, swarm.Rotation):
+                axis = np.array(part.axis, dtype=float)
+                return axis / np.linalg.norm(axis), part.rate, np.array(part.center, dtype=float)
+        return np.array([0.0, 0.0, 1.0]), 0.0, np.zeros(3)
+
+    def as_given(self, r, t):
+        """Points (3, T) at times (T,) in the frame in which the wall is given."""
+        k, rate, center = self.turning()
+        arm = r - self.shift(t)[0] - center[:, None]
+        return center[:, None] + turned(k, -rate * t, arm)
+
+    def gap(self, r, t):
+        return self.sign * self.rest.phi(self.as_given(r, t))
+
+    def normal(self, r, t):
+        """The outward unit normal at a point (3,)."""
+        t = np.array([t])
+        k, rate, _center = self.turning()
+        n = self.sign * turned(k, rate * t, self.rest.gradient(self.as_given(r[:, None], t)))[:, 0]
+        return n / np.linalg.norm(n)
+
+    def velocity(self, r, t):
+        """Of the wall's material at a point (3,)."""
+        t = np.array([t])
+        k, rate, center = self.turning()
+        d, u = self.shift(t)
+        return u[:, 0] + rate * np.cross(k, r - d[:, 0] - center)
+
+
+def turned(k, angles, vectors):
+    """Vectors (3, T), each turned about the unit axis k by its angle: Rodrigues' formula."""
+    c, s = np.cos(angles), np.sin(angles)
+    along = (k[:, None] * vectors).sum(axis=0)
+    return c * vectors + s * np.cross(k, vectors.T).T + (1.0 - c) * along * k[:, None]
+
+
+class Followed(NamedTuple):
+    """States at the times that are before the end, how many impacts came before each, and that end."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    impacts: list
+    end: float
+
+
+def follow(scene, r, v, times):
+    """One particle from time 0; it ends where a contact begins to last, or an impact is a matter of round-off."""
+    walls = [Wall.of(surface) for surface in scene.surfaces]
+    pull = np.array(scene.gravity if scene.gravity is not None else (0.0, 0.0, 0.0))
+    start, count, seen = 0.0, 0, []
+    until = times[-1]
+    while True:
+        def place(t, r=r, v=v, start=start):
+            s = t - start
+            return r[:, None] + v[:, None] * s + 0.5 * pull[:, None] * s * s
+
+        hit, wall, clear = first_impact(walls, place, start, until)
+        end = min(hit, until)
+        for time in times[len(seen) :]:
+            if time > end or (time == end and hit <= until):
+                break
+            seen.append((place(np.array([time]))[:, 0], v + pull * (time - start), count))
+        if hit > until or not clear or hit - start < SHORTEST:
+            break
+        r, v = place(np.array([hit]))[:, 0], v + pull * (hit - start)
+        n, u = wall.normal(r, hit), wall.velocity(r, hit)
+        w = v - u
+        b = w @ n
+        if b <= 1e-6:
+            break
+        slip = w - b * n
+        speed = np.linalg.norm(slip)
+        share = min(wall.mu * (1.0 + wall.e) * b / speed, 1.0) if speed > 0.0 else 0.0
+        v = u + (1.0 - share) * slip - wall.e * b * n
+        start, count = hit, count + 1
+    position, velocity, impacts = ([one[k] for one in seen] for k in range(3))
+    return Followed(np.array(position).reshape(-1, 3), np.array(velocity).reshape(-1, 3), impacts, end)
+
+
+def first_impact(walls, place, start, until):
+    """(time, wall, whether it is clear) of the first rise of a gap through 0; later than `until` if there is none."""
+    # The wall that was left is still within round-off: it counts once it has been left.
+    begin, left = start, start + 0.1 * SHORTEST
+    while begin < until:
+        t = np.minimum(begin + STEP * np.arange(WINDOW + 2), until + STEP)
+        found = (math.inf, None, True)
+        r = place(t)
+        for wall in walls:
+            g = wall.gap(r, t)
+            # A rise, or a top between samples.
+            rises = (g[:-1] <= 0.0) & (g[1:] > 0.0)
+            tops = np.zeros_like(rises)
+            tops[1:] = (g[1:-1] >= g[:-2]) & (g[1:-1] >= g[2:]) & (g[1:-1] <= 0.0)
+            for i in np.flatnonzero(rises | tops):
+                if t[i] >= found[0]:
+                    break
+                low, high, clear = t[i], t[i + 1], True
+
+                def gap(s, wall=wall):
+                    return wall.gap(place(np.array([s])), np.array([s]))[0]
+
+                if not rises[i]:
+                    low = t[max(i - 1, 0)]
+                    top = minimize_scalar(lambda s: -gap(s), bounds=(low, high), method="bounded", options={"xatol": 1e-12})
+                    if -top.fun <= -GRAZES:
+                        continue
+                    clear, high = -top.fun > GRAZES, top.x
+                    if not clear:
+                        hit = top.x
+                if clear:
+                    low = max(low, left)
+                    if low >= high or gap(low) > 0.0:
+                        # Back within the first samples after the impact.
+                        hit, clear = t[i], False
+                    else:
+                        hit = brentq(gap, low, high, xtol=1e-15, rtol=9e-16)
+                if hit < found[0]:
+                    found = (hit, wall, clear)
+                break
+        if found[0] <= until:
+            return found
+        begin = t[WINDOW]
+    return math.inf, None, True

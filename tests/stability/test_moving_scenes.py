@@ -1,0 +1,147 @@
+"""Random shapes x motions x laws x gravity: every run ends, nothing is outside, every joule is booked, and as long as
+no contact lasts each particle is where a plain event loop has it.
+"""
+
+import contextlib
+import math
+import signal
+
+import numpy as np
+import pytest
+from physics.event_loop import follow
+
+import swarm
+
+UNTIL, FRAMES, NUMBER = 1.2, 8, 4
+# Against a hang only: a run takes some seconds.
+PATIENCE = 60
+# What 1e-9 m at the start grows to by a time, an error of round-off grows to in proportion.
+NUDGE, SPARE, LEAST = 1e-9, 1e-3, 1e-11
+# [m], and of the largest energy.
+OUTSIDE, UNBOOKED = 1e-12, 1e-11
+BOOKS = ("wall_work", "wall_heat")
+
+VESSELS = {
+    "box": lambda **wall: [swarm.Box((0.5, 0.4, 0.35), **wall)],
+    "askew box": lambda **wall: [swarm.Box((0.5, 0.4, 0.35), rotation=(0.9, 0.1, 0.3, 0.2), **wall)],
+    "slabs": lambda **wall: [
+        swarm.Slab((1.0, 0.2, 0.0), 0.5, **wall),
+        swarm.Slab((0.0, 1.0, 0.3), 0.4, **wall),
+        swarm.Slab((-0.2, 0.0, 1.0), 0.35, **wall),
+    ],
+    "sphere": lambda **wall: [swarm.Sphere(0.5, **wall)],
+    "ellipsoid": lambda **wall: [swarm.Ellipsoid((0.5, 0.4, 0.6), **wall)],
+    "can": lambda **wall: [swarm.Cylinder(0.4, (1.0, 0.5, 0.3), 0.9, **wall)],
+    "drum": lambda **wall: [swarm.Cylinder(0.4, (0.0, 1.0, 0.0), 0.5, **wall)],
+    "capsule": lambda **wall: [swarm.Capsule(0.35, 0.5, **wall)],
+    "torus": lambda **wall: [swarm.Torus(0.6, 0.3, **wall)],
+    "cone and lid": lambda **wall: [
+        swarm.Cone(0.7, center=(0.0, 0.0, -0.5), **wall),
+        swarm.Plane((0.0, 0.0, 1.0), 0.3, **wall),
+    ],
+    "bowl and lid": lambda **wall: [
+        swarm.Paraboloid(0.2, center=(0.0, 0.0, -0.5), **wall),
+        swarm.Plane((0.0, 0.0, 1.0), 0.2, **wall),
+    ],
+}
+SOLIDS = {
+    "nothing": lambda **wall: [],
+    "ball": lambda **wall: [swarm.Sphere(0.12, (0.05, 0.0, 0.02), side="outside", **wall)],
+    "block": lambda **wall: [swarm.Box((0.1, 0.12, 0.08), side="outside", **wall)],
+    "rod": lambda **wall: [swarm.Cylinder(0.08, (0.0, 1.0, 0.5), 0.2, side="outside", **wall)],
+}
+
+
+def a_motion(random):
+    """A motion, or none; displacements of some centimetres."""
+    spot = tuple(random.uniform(-0.1, 0.1, 3).tolist())
+    parts = {
+        "translation": swarm.Translation(tuple(random.uniform(-0.05, 0.05, 3).tolist())),
+        "oscillation": swarm.Oscillation(
+            tuple((random.uniform(-0.05, 0.05, 3) * random.integers(0, 2, 3)).tolist()),
+            float(random.uniform(0.5, 3.0)),
+            float(random.choice([0.0, 1.0])),
+        ),
+        "rotation": swarm.Rotation(
+            [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0)][random.integers(3)],
+            float(random.choice([0.0, -0.7, 1.0, 3.0])),
+            [(0.0, 0.0, 0.0), spot][random.integers(2)],
+        ),
+    }
+    chosen = [[], ["translation"], ["oscillation"], ["rotation"], ["oscillation", "rotation"], list(parts)]
+    motions = [parts[name] for name in chosen[random.integers(len(chosen))]]
+    return sum(motions[1:], start=motions[0]) if motions else None
+
+
+def a_scene(seed):
+    """(scene, particles): kinds, motions, laws and gravity, all drawn."""
+    random = np.random.default_rng([39, seed])
+    vessel, solid = (str(random.choice(sorted(kinds))) for kinds in (VESSELS, SOLIDS))
+    if vessel == "torus":
+        solid = "nothing"
+    surfaces = []
+    for make in (VESSELS[vessel], SOLIDS[solid]):
+        law = {"restitution": float(random.choice([1.0, 0.9, 0.5])), "friction": float(random.choice([0.0, 0.3, 1.0]))}
+        surfaces += make(motion=a_motion(random), **law)
+    gravity = [None, (0.0, 0.0, -9.81), (-1.0, 2.0, -3.0)][random.integers(3)]
+    scene = swarm.Scene(surfaces, gravity)
+    return scene, swarm.fill(scene, NUMBER, speed=float(random.choice([0.0, 1.0, 2.0])), seed=seed)
+
+
+@contextlib.contextmanager
+def guarded(seconds):
+    """A hang is an error instead of no end."""
+
+    def stop(*_):
+        raise AssertionError(f"no end after {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def compared(scene, start, frames, result):
+    """Hold every particle against the event loop, as long as that can say; returns how many states were compared."""
+    states = 0
+    times = [time for time, _ in frames]
+    for i in range(NUMBER):
+        r, v = start.position[:, i], start.velocity[:, i]
+        exact = follow(scene, r, v, times)
+        near = [follow(scene, r + nudge, v, times) for nudge in NUDGE * np.eye(3)]
+        certain = min(len(one.position) for one in (exact, *near))
+        for k in range(certain):
+            grown = max(np.abs(one.position[k] - exact.position[k]).max() for one in near)
+            if grown > 1e4 * NUDGE or any(one.impacts[k] != exact.impacts[k] for one in near):
+                certain = k
+                break
+            bar = LEAST + SPARE * grown
+            assert frames[k][1].position[:, i] == pytest.approx(exact.position[k], abs=bar), f"particle {i}, frame {k}"
+            assert frames[k][1].velocity[:, i] == pytest.approx(exact.velocity[k], abs=1e2 * bar), f"particle {i}, frame {k}"
+        states += certain
+        if certain == len(times):
+            assert result.impacts_per_particle[i] == exact.impacts[-1], f"particle {i}"
+    return states
+
+
+def holds(seed, folder, compile="never"):
+    """Run the scene of a seed and look at everything; returns how many states were compared with the event loop."""
+    scene, start = a_scene(seed)
+    path = folder / f"{seed}.h5"
+    with guarded(PATIENCE):
+        result = swarm.simulate(
+            scene, start, swarm.Impact(), until=UNTIL, every=UNTIL / FRAMES, trajectory=path, threads=1, compile=compile
+        )
+    seen = result.observables
+    assert seen["max_penetration"].max() <= OUTSIDE
+    booked = seen["dissipated_energy"] - sum(seen[name].sum(axis=1) for name in BOOKS if name in seen)
+    kept = seen["total_energy"] + booked
+    scale = max(np.abs(seen[name]).max() for name in ("kinetic_energy", "potential_energy"))
+    assert np.abs(kept - kept[0]).max() <= UNBOOKED * scale
+    assert (np.diff(seen["impacts"]) >= 0).all()
+    with swarm.load(path) as trajectory:
+        frames = [(float(time), trajectory.frame(k)) for k, time in enumerate(trajectory.times)]
+    return compared(scene, start, frames, result)
