@@ -107,6 +107,7 @@ def follow(scene, r, v, times):
     start, count, seen = 0.0, 0, []
     until = times[-1]
     while True:
+
         def place(t, r=r, v=v, start=start):
             s = t - start
             return r[:, None] + v[:, None] * s + 0.5 * pull[:, None] * s * s
@@ -147,7 +148,9 @@ def first_impact(walls, place, start, until):
             # A rise, or a top between samples.
             rises = (g[:-1] <= 0.0) & (g[1:] > 0.0)
             tops = np.zeros_like(rises)
-            tops[1:] = (g[1:-1] >= g[:-2]) & (g[1:-1] >= g[2:]) & (g[1:-1] <= 0.0)
+            # A parabola through three samples rises above the middle one by an eighth of its fall to them.
+            fall = g[1:-1] - np.minimum(g[:-2], g[2:])
+            tops[1:] = (g[1:-1] >= g[:-2]) & (g[1:-1] >= g[2:]) & (g[1:-1] <= 0.0) & (g[1:-1] + fall > -GRAZES)
             for i in np.flatnonzero(rises | tops):
                 if t[i] >= found[0]:
                     break
@@ -158,7 +161,9 @@ def first_impact(walls, place, start, until):
 
                 if not rises[i]:
                     low = t[max(i - 1, 0)]
-                    top = minimize_scalar(lambda s: -gap(s), bounds=(low, high), method="bounded", options={"xatol": 1e-12})
+                    top = minimize_scalar(
+                        lambda s: -gap(s), bounds=(low, high), method="bounded", options={"xatol": 1e-12}
+                    )
                     if -top.fun <= -GRAZES:
                         continue
                     clear, high = -top.fun > GRAZES, top.x

@@ -104,6 +104,23 @@ def test_a_ball_in_uniform_motion_after_fifty_impacts():
     assert np.abs(moved - here.particles.position[:, 0]).max() <= 1e-12
 
 
+@pytest.mark.parametrize(
+    "motion",
+    [swarm.Oscillation((0.0, 0.0, 0.0), 1.3), swarm.Rotation((0.0, 1.0, 0.0), 0.0, (0.1, 0.0, 0.0))],
+    ids=["oscillation", "rotation"],
+)
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "sphere"])
+def test_a_motion_that_moves_nothing_is_rest(name, gravity, motion):
+    """Also from frames in mid-air, and for flights along planes of symmetry: the walls that are met are those at rest."""
+    rest, moving = (swarm.Scene([CAVITIES[name](one)], gravity) for one in (None, motion))
+    start = swarm.fill(rest, 4, speed=1.0, seed=3)
+    start.position[0, 0] = start.velocity[1, 0] = start.velocity[0, 1] = start.velocity[2, 2] = 0.0
+    here, there = (run(scene, start, 1.0, frames=7) for scene in (rest, moving))
+    assert here.observables["impacts"].tolist() == there.observables["impacts"].tolist()
+    assert np.abs(there.particles.position - here.particles.position).max() <= 1e-11
+
+
 # --- Hits: none is skipped, to round-off of the time -----------------------------------------------------
 
 
