@@ -112,7 +112,7 @@ def test_a_ball_in_uniform_motion_after_fifty_impacts():
 @pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -1.0)], ids=["straight", "falling"])
 @pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "sphere"])
 def test_a_motion_that_moves_nothing_is_rest(name, gravity, motion):
-    """Also from frames in mid-air, and for flights along planes of symmetry: the walls that are met are those at rest."""
+    """Also from frames in mid-air, and along planes of symmetry: the same walls are met."""
     rest, moving = (swarm.Scene([CAVITIES[name](one)], gravity) for one in (None, motion))
     start = swarm.fill(rest, 4, speed=1.0, seed=3)
     start.position[0, 0] = start.velocity[1, 0] = start.velocity[0, 1] = start.velocity[2, 2] = 0.0
