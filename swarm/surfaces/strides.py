@@ -23,8 +23,6 @@ _EPSILON = 2.220446049250313e-16
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
 # the walls that have a closed form.
 _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
-# A level of so many times the round-off of a place below 0 is that of a particle on the wall.
-_ROUND_OFF = 8.0
 # The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
 _AHEAD = 32.0
 
@@ -172,10 +170,9 @@ def _sooner(known, number, within, is_first, rest):
 def _(known, number, within, is_first, rest):
     drive, seen = known.framed.drive, known.framed.seen
     sixth = third_of(known.level, bounds_on(known.body, drive, seen, within), within) * (1.0 / 6.0)
-    room = _EPSILON * seen.coordinates * _steepness(known.level)
-    time, is_level = _rise(known.level, sixth, within, is_first, _ROUND_OFF * room)
+    time = _rise(known.level, sixth, within, is_first)
     # The parabola is above f by no more than this.
-    meets = is_level & (2.0 * sixth * within * time * time <= room)
+    meets = 2.0 * sixth * within * time * time <= _EPSILON * seen.coordinates * _steepness(known.level)
     mine = time < rest.time
     return Stride(
         select(mine, time, rest.time), select(mine, number, rest.wall), (mine & meets) | ((not mine) & rest.meets)
@@ -192,12 +189,8 @@ def _own_rise(level):
 
 
 @by_type
-def _rise(level, sixth, within, is_first, room):
-    """When it rises at the soonest, if a sixth of f''' is bounded within that time, and whether f itself does.
-
-    At the start of a flight f is taken to be 0 at the walls that are left, which makes f of a flight that starts
-    farther from them than the room rise too soon: a bound, and no hit.
-    """
+def _rise(level, sixth, within, is_first):
+    """When it rises at the soonest, if a sixth of f''' is bounded within that time."""
     raise NotImplementedError
 
 
@@ -211,16 +204,14 @@ _steepness.register(Level, lambda level: level.steepness)
 
 
 @_rise.register(Level)
-def _(level, sixth, within, is_first, room):
+def _(level, sixth, within, is_first):
     c, b, a = level.level, level.half, level.bend + sixth * within
-    is_level = True
     if is_first:
         # From the wall inwards f is t (f' + f''/2 t + ...): one power of t nearer to it than the parabola.
         leaves = level.half <= 0.0
         c, b = select(leaves, 2.0 * level.half, c), select(leaves, 0.5 * level.bend, b)
         a = select(leaves, sixth, a)
-        is_level = (not leaves) | (level.level >= -room)
-    return rise_time(c, b, a), is_level
+    return rise_time(c, b, a)
 
 
 _steepness.register(Between, lambda level: 1.0)
@@ -239,7 +230,7 @@ def _(level):
 
 
 @_rise.register(Between)
-def _(level, sixth, within, is_first, room):
+def _(level, sixth, within, is_first):
     b, k = level.half, sixth * within
     c, a = level.place - level.radius, level.bend + k
     discriminant = b * b - a * c
@@ -248,12 +239,10 @@ def _(level, sixth, within, is_first, room):
     ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
     # The one behind: the particle moves away from it.
     c, a = -level.place - level.radius, k - level.bend
-    is_level = True
     if is_first:
         behind = rise_time(-2.0 * b, -0.5 * level.bend, sixth)
-        is_level = (c >= -room) | (ahead <= behind)
     else:
         discriminant = b * b - a * c
         root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
         behind = select(a > 0.0, (b + root) / a, math.inf)
-    return select(behind < ahead, behind, ahead), is_level
+    return select(behind < ahead, behind, ahead)
