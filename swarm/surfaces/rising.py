@@ -100,8 +100,9 @@ def _(body, seen):
 def _(body, seen):
     # Of the two planes: a bound of f''' of the square would be ten times as far from it.
     half = 0.5 * along(body.normal, seen.v)
-    sign = math.copysign(1.0, half)
     x, bend = along(body.normal, seen.r) - body.offset, 0.5 * along(body.normal, seen.a)
+    # Without a speed the plane behind is the near one, from which it leaves.
+    sign = math.copysign(1.0, select(half == 0.0, -x, half))
     return Between(sign * x, abs(half), sign * bend, body.radius)
 
 
