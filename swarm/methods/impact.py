@@ -10,7 +10,7 @@ from ..contact import sliding, touching
 from ..contact.reflection import CHORD_NEEDS, Energy, exact, loses_energy
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, select
+from ..kernel.jit import by_type, kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
@@ -176,14 +176,13 @@ class ImpactOwn(NamedTuple):
 
 @contract.constants.register(Reflection)
 @contract.constants.register(Chord)
-def _(method, mass, energy, v):
-    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow
+def _(method, mass, energy, scale2):
+    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
+    # its velocity at the start of the frame, on whose ends no contact may depend
     twice_energy = 2.0 * energy
     moving = twice_energy > 0.0
     half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
-    speed2 = square(v) + method.fall2
-    # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; this is twice that speed.
-    slow = (method.shortest_flight * speed2 + method.shortest_length * math.sqrt(speed2)) / method.size
+    slow = (method.shortest_flight * scale2 + method.shortest_length * math.sqrt(scale2)) / method.size
     return twice_energy, half_inverse, slow
 
 
@@ -219,6 +218,24 @@ def _(method, chain, gravity, lane, hit):
     )
 
 
+# A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
+
+
+@by_type
+def _is_slow(laws, method, lane, twice_away):
+    """Whether a particle leaves its wall so slowly that the contact may last."""
+    return twice_away <= lane.own.slow
+
+
+@_is_slow.register(wall_laws.Laws)
+def _(laws, method, lane, twice_away):
+    # Of the velocity with which it comes: walls change that.
+    speed2 = square(lane.v) + method.fall2
+    by_time, by_length = method.shortest_flight * speed2, method.shortest_length
+    # One of both is 0.
+    return method.size * method.size * twice_away * twice_away <= by_time * by_time + by_length * by_length * speed2
+
+
 @contract.contact.register(Reflection)
 def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
@@ -232,6 +249,6 @@ def _(method, chain, gravity, lane, wall, solution):
         impulse,
         select(impulse > 0.0, 1.0, 0.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
-        hit & (bounce.twice_away <= lane.own.slow),
+        hit & _is_slow(method.laws, method, lane, bounce.twice_away),
     )
     return contract.worked(wall_laws.moving(method.laws), contact, select(hit, 0.5 * bounce.work, 0.0))
