@@ -75,7 +75,7 @@ def _decide(method, chain, gravity, share, i):
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
     state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
-    if found.impulse > 0.0:
+    if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
         struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
         impact_log.add_row(share.log, method, carried, state, i, struck)
