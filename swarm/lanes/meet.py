@@ -245,7 +245,7 @@ def _step(method, chain, gravity, share, i):
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
     if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
-        _rest(method, chain, gravity, share, i, p, held)
+        _rest(method, now, gravity, share, i, p, held)
         return
     contacts.short_steps[i] += 1.0
     p = _looked_at(state.openings, method, p)
