@@ -20,6 +20,7 @@ from ..surfaces.openings import Openings
 from . import log as impact_log
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
+from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of
 from .wrap import return_particle
 
@@ -64,8 +65,10 @@ def _decide(method, chain, gravity, share, i):
     if first >= 0.0 and _exchange_heat(methods.thermal(method), method, carried, gravity, share, i):
         return True
     held = scratch((2, walls.length(chain)), np.float64)
-    # Where walls move, several of them carry nobody for longer than a step.
-    settles = not wall_laws.moves(method.laws) and events.settles(method, chain, gravity, p, held)
+    if wall_laws.moves(method.laws):
+        settles = is_carried(wall_laws.moving(method.laws), method, carried, gravity, p)
+    else:
+        settles = events.settles(method, chain, gravity, p, held)
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -246,6 +249,13 @@ def _step(method, chain, gravity, share, i):
     held = scratch((2, walls.length(chain)), np.float64)
     if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
+        return
+    phase = carry(state.openings, method, chain, gravity, state, i, p)
+    if phase != NOT_CARRIED:
+        contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
+        contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+        share.phase[i] = phase
+        share.pending[phase] += 1
         return
     contacts.short_steps[i] += 1.0
     p = _looked_at(state.openings, method, p)
