@@ -241,6 +241,8 @@ def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     impulses = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    # What is carried begins the frame so.
+    left = left if left > 0.0 else share.span
     now = at(chain, left)
     if let_out_at(state.openings, method, now, share, i, r, left):
         _leave(share, i)
@@ -252,7 +254,8 @@ def _step(method, chain, gravity, share, i):
         return
     phase = carry(state.openings, method, chain, gravity, state, i, p)
     if phase != NOT_CARRIED:
-        contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
+        contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
+        contacts.step[i], contacts.keep[i] = 0.0, 0.0
         contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
         share.phase[i] = phase
         share.pending[phase] += 1
