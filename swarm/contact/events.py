@@ -20,6 +20,8 @@ PHASES = 6
 FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
 # A particle leaves a wall slower than this part of its own speed: its hops are 1e-4 of a crossing long.
 GRAZING = 5e-5
+# Of a speed, the impulse that is no impact: round-off of a particle at its wall.
+NO_IMPACT = 1e-12
 # Of a velocity, the part across the walls that is none: its square is round-off of the energy.
 _NO_HOP = 1e-7
 # Parts of an acceleration and of a time that are none.

@@ -24,6 +24,14 @@ class Two(NamedTuple):
     second: float
 
 
+class Three(NamedTuple):
+    """A particle in the corner of three walls."""
+
+    first: float
+    second: float
+    third: float
+
+
 class Held(NamedTuple):
     """A vector as a part that the walls allow and multiples of their normals: P + b n + c m."""
 
@@ -64,6 +72,11 @@ def is_held_by(held, wall):
 @is_held_by.register(Two)
 def _(held, wall):
     return (wall == held.first) | (wall == held.second)
+
+
+@is_held_by.register(Three)
+def _(held, wall):
+    return (wall == held.first) | (wall == held.second) | (wall == held.third)
 
 
 @by_type

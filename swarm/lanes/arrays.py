@@ -172,10 +172,9 @@ def load(method, chain, lanes, lane, share, i):
     if halted.particle.size > 0 and not left > 0.0 and _pick_up(lanes, lane, halted, i):
         return
     i = index(i)
-    v = column(state.velocity, 0, i)
     put(rows, R, lane, column(state.position, 0, i))
-    put(rows, V, lane, v)
-    own = methods.constants(method, state.mass[i], state.energy[i], v)
+    put(rows, V, lane, column(state.velocity, 0, i))
+    own = methods.constants(method, state.mass[i], state.energy[i], speed2_scale(state, i))
     rows[OWN, lane], rows[OWN + 1, lane], rows[OWN + 2, lane] = own
     rows[LEFT, lane], rows[HITS, lane] = select(left > 0.0, left, share.span), 0.0
     for s in range(booked(chain)):

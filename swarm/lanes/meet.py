@@ -20,6 +20,7 @@ from ..surfaces.openings import Openings
 from . import log as impact_log
 from .arrays import following_particle, speed2_scale
 from .arrays import heat as book_heat
+from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of
 from .wrap import return_particle
 
@@ -64,8 +65,10 @@ def _decide(method, chain, gravity, share, i):
     if first >= 0.0 and _exchange_heat(methods.thermal(method), method, carried, gravity, share, i):
         return True
     held = scratch((2, walls.length(chain)), np.float64)
-    # Where walls move, several of them carry nobody for longer than a step.
-    settles = not wall_laws.moves(method.laws) and events.settles(method, chain, gravity, p, held)
+    if wall_laws.moves(method.laws):
+        settles = is_carried(wall_laws.moving(method.laws), method, carried, gravity, p)
+    else:
+        settles = events.settles(method, chain, gravity, p, held)
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -75,7 +78,7 @@ def _decide(method, chain, gravity, share, i):
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
     state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
-    if found.impulse > 0.0:
+    if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
         struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
         impact_log.add_row(share.log, method, carried, state, i, struck)
@@ -238,6 +241,8 @@ def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     impulses = scratch((walls.length(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    # What is carried begins the frame so.
+    left = left if left > 0.0 else share.span
     now = at(chain, left)
     if let_out_at(state.openings, method, now, share, i, r, left):
         _leave(share, i)
@@ -245,7 +250,15 @@ def _step(method, chain, gravity, share, i):
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
     if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
-        _rest(method, chain, gravity, share, i, p, held)
+        _rest(method, now, gravity, share, i, p, held)
+        return
+    phase = carry(state.openings, method, chain, gravity, state, i, p)
+    if phase != NOT_CARRIED:
+        contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
+        contacts.step[i], contacts.keep[i] = 0.0, 0.0
+        contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+        share.phase[i] = phase
+        share.pending[phase] += 1
         return
     contacts.short_steps[i] += 1.0
     p = _looked_at(state.openings, method, p)

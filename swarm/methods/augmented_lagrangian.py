@@ -181,7 +181,7 @@ class AugmentedLagrangian(base.Method):
 
 
 @contract.constants.register(steps.Numbers)
-def _(method, mass, energy, v):
+def _(method, mass, energy, scale2):
     return 2.0 * energy, 0.5 / mass, 0.0
 
 

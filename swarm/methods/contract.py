@@ -133,8 +133,11 @@ def _(moving, chain, wall, force):
 
 
 @by_type
-def constants(method, mass, energy, v):
-    """Three numbers of one particle that hold for the whole frame; `own` gives them names."""
+def constants(method, mass, energy, scale2):
+    """Three numbers of one particle that hold for the whole run but for what walls do; `own` gives them names.
+
+    `scale2` is the square of the speed that its energy scale is that of.
+    """
     raise NotImplementedError
 
 

@@ -177,7 +177,7 @@ class Own(NamedTuple):
 
 
 @contract.constants.register(Numbers)
-def _(method, mass, energy, v):
+def _(method, mass, energy, scale2):
     return 2.0 * energy, method.factor / mass, 0.0
 
 

@@ -10,7 +10,7 @@ from ..contact import sliding, touching
 from ..contact.reflection import CHORD_NEEDS, Energy, exact, loses_energy
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, select
+from ..kernel.jit import by_type, kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
@@ -20,6 +20,9 @@ from .chord import Chord
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
+# Of what is slow, the impulse that is round-off of a particle at its wall: to count it would count by chance. Those of
+# particles that a wall lets go are 1e-16 to 1e-14 of the speed, what is slow 1e-4.
+_NO_IMPACT = 1e-8
 
 
 @dataclass(frozen=True)
@@ -176,14 +179,13 @@ class ImpactOwn(NamedTuple):
 
 @contract.constants.register(Reflection)
 @contract.constants.register(Chord)
-def _(method, mass, energy, v):
-    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow
+def _(method, mass, energy, scale2):
+    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
+    # its velocity at the start of the frame, on whose ends no contact may depend
     twice_energy = 2.0 * energy
     moving = twice_energy > 0.0
     half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
-    speed2 = square(v) + method.fall2
-    # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; this is twice that speed.
-    slow = (method.shortest_flight * speed2 + method.shortest_length * math.sqrt(speed2)) / method.size
+    slow = (method.shortest_flight * scale2 + method.shortest_length * math.sqrt(scale2)) / method.size
     return twice_energy, half_inverse, slow
 
 
@@ -219,19 +221,36 @@ def _(method, chain, gravity, lane, hit):
     )
 
 
+# A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
+
+
+@by_type
+def _slow2(laws, method, lane):
+    """The square of twice the speed away from a wall below which a contact may last."""
+    return lane.own.slow * lane.own.slow
+
+
+@_slow2.register(wall_laws.Laws)
+def _(laws, method, lane):
+    # By the velocity with which it comes: such walls change that. One of both is 0.
+    speed2 = (square(lane.v) + method.fall2) / (method.size * method.size)
+    by_time, by_length = method.shortest_flight * method.size * speed2, method.shortest_length
+    return by_time * by_time + by_length * by_length * speed2
+
+
 @contract.contact.register(Reflection)
 def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
-    impulse = select(hit, bounce.impulse, 0.0)
+    impulse, slow2 = select(hit, bounce.impulse, 0.0), _slow2(method.laws, method, lane)
     contact = contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
         wall,
         impulse,
-        select(impulse > 0.0, 1.0, 0.0),
+        select(impulse * impulse > (_NO_IMPACT * _NO_IMPACT) * slow2, 1.0, 0.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
-        hit & (bounce.twice_away <= lane.own.slow),
+        hit & (bounce.twice_away * bounce.twice_away <= slow2),
     )
     return contract.worked(wall_laws.moving(method.laws), contact, select(hit, 0.5 * bounce.work, 0.0))

@@ -72,7 +72,7 @@ class Falling(Posed):
     """A wall at one instant of a free motion with a constant acceleration, or none."""
 
 
-_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0)
+_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 @contract.first_hit.register(Falling)
@@ -142,15 +142,15 @@ def _(freedom, walls, t):
     away, speed = found.shift - freedom.pull / (rate * rate), found.velocity / rate
     most = math.sqrt(square(away) + square(speed))
     bounds = rate * most, rate * rate * most, rate * rate * rate * most
-    swings = Chain(Swing(away, speed, rate), None)
-    return Drive(found.shift, ZERO, swings, None, None, None, ZERO, bounds[0], bounds[1], bounds[2], math.inf, 0.0)
+    swings, jerks = Chain(Swing(away, speed, rate), None), Vec(bounds[2], bounds[2], bounds[2])
+    return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
 
 
 @drive_of.register(Hinged)
 def _(freedom, walls, t):
     rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, t).turn
     turning = Turn(turn.x, turn.y, turn.z, freedom.axis, rate)
-    return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0)
+    return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 @by_type

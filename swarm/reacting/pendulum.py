@@ -94,7 +94,7 @@ def _(freedom, walls, t):
 @drive_of.register(Pendulum)
 def _(freedom, walls, t):
     spin = angle_at(freedom, walls, t).rate * freedom.axis
-    return Drive(ZERO, ZERO, None, None, None, spin, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0)
+    return Drive(ZERO, ZERO, None, None, None, spin, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 @posed.register(Pendulum)
@@ -161,8 +161,8 @@ def swaying(freedom, body, walls, flight, longest):
     arm = norm(arm_of(freedom, flight.r)) + longest * speed
     # Of A^T x: theta'' x, and theta''' x + 3 theta'' (x' + theta' x)
     hard, jerk = stiffness * arm, stiffness * (4.0 * fastest * arm + 3.0 * speed)
-    turn = Turn(ZERO, ZERO, ZERO, freedom.axis, fastest)
-    bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, freedom.center, 0.0, hard, jerk, math.inf, 0.0)
+    turn, jerks = Turn(ZERO, ZERO, ZERO, freedom.axis, fastest), Vec(jerk, jerk, jerk)
+    bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, freedom.center, 0.0, hard, jerk, math.inf, 0.0, jerks)
     return Swaying(body, bounds, freedom, walls, flight.time)
 
 

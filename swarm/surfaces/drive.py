@@ -62,6 +62,7 @@ class Drive(NamedTuple):
     jerk: float  # bound of |d'''| [m/s^3]
     pace: float  # a time in which it changes little [s]
     late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
+    jerks: Vec  # bounds of the components of d''' [m/s^3]
 
 
 class Pose(NamedTuple):
@@ -90,7 +91,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
     parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
     velocity, swings, track, turn, spin, center = np.zeros(3), None, None, None, None, ZERO
     fastest = hardest = jerk = 0.0
-    pace = math.inf
+    pace, jerks = math.inf, np.zeros(3)
     for one in parts:
         if isinstance(one, motions.Translation):
             velocity = velocity + np.array(one.velocity)
@@ -105,6 +106,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             fastest += amplitude * led.rate
             hardest += amplitude * led.rate**2
             jerk += amplitude * led.rate**3
+            jerks += np.abs(one.amplitude) * led.rate**3
         elif isinstance(one, motions.Path):
             cubics = one.cubics()
             track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
@@ -114,6 +116,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             ends = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
             bends = 2.0 * cubics[2], 2.0 * cubics[2] + 6.0 * h * cubics[3]
             jerk += float(6.0 * np.sqrt((cubics[3] ** 2).sum(axis=0)).max())
+            jerks += 6.0 * np.abs(cubics[3]).max(axis=1)
             hardest += float(max(np.sqrt((bend**2).sum(axis=0)).max() for bend in bends))
             fastest += float(max(np.sqrt((end**2).sum(axis=0)).max() for end in ends)) + float(h.max()) * hardest
         else:
@@ -126,7 +129,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
                 turn = Turn(x, y, z, _vector(axis), one.rate)
     shift = motions.pose(surface.motion, moment).shift
     fastest += math.hypot(*velocity)
-    bounds = fastest, hardest, jerk, pace, fastest * moment
+    bounds = fastest, hardest, jerk, pace, fastest * moment, _vector(jerks)
     return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
 
 

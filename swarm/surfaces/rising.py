@@ -12,16 +12,18 @@ import math
 from typing import Any, NamedTuple
 
 from ..kernel.jit import by_type, inlined, select
-from ..kernel.vector import absolute, dot, norm, square
+from ..kernel.vector import Vec, absolute, dot, norm, square, times, total
 from . import contract
 from .course import rise_time
+from .drive import Turn
 from .fold import Chain
 from .relative import Bounds, Seen, bounds_of, turning
 from .rotation import Rotated
 from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
 from .shapes.rotated import own as rotated_own
-from .shapes.slab import SlabNumbers, along
+from .shapes.rotated import scene as rotated_scene
+from .shapes.slab import SlabNumbers, along, scaled
 from .shapes.solid import SolidNumbers, noise
 from .shapes.sphere import SphereNumbers
 
@@ -100,8 +102,9 @@ def _(body, seen):
 def _(body, seen):
     # Of the two planes: a bound of f''' of the square would be ten times as far from it.
     half = 0.5 * along(body.normal, seen.v)
-    sign = math.copysign(1.0, half)
     x, bend = along(body.normal, seen.r) - body.offset, 0.5 * along(body.normal, seen.a)
+    # Without a speed the plane behind is the near one, from which it leaves.
+    sign = math.copysign(1.0, select(half == 0.0, -x, half))
     return Between(sign * x, abs(half), sign * bend, body.radius)
 
 
@@ -124,7 +127,53 @@ def _(body, seen):
 @by_type
 def bounds_on(body, drive, seen, within):
     """`Bounds` in the frame of a wall, or in any other in which its level is the same function of place."""
-    return bounds_of(drive, seen, within)
+    return _along_normal(flat_normal(body), drive, bounds_of(drive, seen, within))
+
+
+@by_type
+def flat_normal(body):
+    """The normal of a flat wall, or None."""
+    return
+
+
+flat_normal.register(PlaneNumbers, lambda body: body.normal)
+flat_normal.register(SlabNumbers, lambda body: scaled(body.normal, 1.0))
+flat_normal.register(Rotated, lambda body: _in_wall(flat_normal(body.body), body))
+
+
+@by_type
+def _in_wall(n, body):
+    """A normal of its own frame in that of the wall."""
+    return
+
+
+_in_wall.register(Vec, lambda n, body: rotated_scene(body, n))
+
+
+@by_type
+def _along_normal(n, drive, bounds):
+    """Bounds of a flat wall, to which only the jerk along its normal counts: where a motion has none of it, a particle
+    that leaves the wall at no speed stays at it without end."""
+    return bounds
+
+
+@_along_normal.register(Vec)
+def _(n, drive, bounds):
+    jerk = _jerk_along(drive.turn, n, drive, bounds.jerk)
+    return Bounds(bounds.speed, bounds.acceleration, select(jerk < bounds.jerk, jerk, bounds.jerk))
+
+
+@by_type
+def _jerk_along(turn, n, drive, jerk):
+    return total(absolute(times(n, drive.jerks)))
+
+
+@_jerk_along.register(Turn)
+def _(turn, n, drive, jerk):
+    # Along its axis a rotation leaves a place as it is.
+    along_axis = dot(n, turn.axis)
+    across = norm(n - along_axis * turn.axis)
+    return abs(along_axis) * total(absolute(times(turn.axis, drive.jerks))) + across * jerk
 
 
 @bounds_on.register(SphereNumbers)

@@ -1,0 +1,301 @@
+"""What rests in a corner of three walls of which some move: it goes with them as long as all three press on it.
+
+Where it is and how fast follow from the three walls alone, so a step of it may be as long as their motion changes
+little; the forces follow from its acceleration. Until one lets go another wall may come, and strike it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..contact import crossing, events
+from ..contact import laws as wall_laws
+from ..contact.events import ARRIVED, CAREFUL, EVENT
+from ..contact.hold import Three
+from ..kernel.gravity import accelerated, potential
+from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, scratch, select
+from ..kernel.vector import ZERO, Vec, absolute, column, cross, dot, norm, put, square, total
+from ..methods import contract as methods
+from ..surfaces import fold as walls
+from ..surfaces.moving import at
+from ..surfaces.near import count_near, list_near
+from ..surfaces.openings import Openings
+from ..surfaces.period import Period
+
+# The phase of a particle that these walls do not carry.
+NOT_CARRIED = -1
+# The volume that three unit normals span, below which they hold no point.
+_FLATTEST = 1e-6
+# Of a speed, what is none where no wall loses energy.
+_NO_SPEED = 1e-13
+# Sweeps until a point is on three walls: one where they are flat.
+_SWEEPS = 20
+_EPSILON = 2.220446049250313e-16
+# A step at whose end a wall does not press is tried again so much shorter.
+_RETRY = 0.25
+
+
+class Corner(NamedTuple):
+    """What three walls do to a particle that goes with them, at one instant."""
+
+    holds: bool  # whether all press
+    u: Vec  # its velocity
+    load: Vec  # how they press, per mass
+    power: Vec  # what they give by their motion, per mass
+    heat: float  # what friction takes, per mass
+
+
+_NONE = Corner(False, ZERO, ZERO, ZERO, 0.0)
+_NOBODY = Three(-1.0, -1.0, -1.0)
+
+
+# --- One corner ------------------------------------------------------------------------------------------
+
+
+@inlined
+def _solved(a, b, c, x, y, z):
+    """The vector whose products with a, b and c are x, y and z; infinite or no number where they are in a plane."""
+    bc = cross(b, c)
+    return (x * bc + y * cross(c, a) + z * cross(a, b)) / dot(a, bc)
+
+
+@inlined
+def _parts(a, b, c, w):
+    """The numbers with w = x a + y b + z c."""
+    bc = cross(b, c)
+    return Vec(dot(w, bc), dot(w, cross(c, a)), dot(w, cross(a, b))) / dot(a, bc)
+
+
+@outlined
+def _normals(chain, held, r):
+    return (
+        walls.unit_normal(chain, held.first, r),
+        walls.unit_normal(chain, held.second, r),
+        walls.unit_normal(chain, held.third, r),
+    )
+
+
+@outlined
+def _rubbed(friction, wall, n, slip):
+    """The direction of the force of a wall, -(n + mu s/|s|), without its sign."""
+    speed = norm(slip)
+    return n + (wall_laws.number_of(friction, wall) / select(speed > 0.0, speed, 1.0)) * slip
+
+
+@by_type
+def _force(friction, wall, n, slip):
+    return n
+
+
+@_force.register(wall_laws.Given)
+def _(friction, wall, n, slip):
+    return _rubbed(friction, wall, n, slip)
+
+
+@outlined
+def _corner(laws, chain, gravity, held, r, least):
+    """`Corner` of three walls at a point on them; they hold if each presses by more than `least`."""
+    a, b, c = _normals(chain, held, r)
+    if not abs(dot(a, cross(b, c))) > _FLATTEST:
+        return _NONE
+    v, w, x = (
+        walls.velocity(chain, held.first, r),
+        walls.velocity(chain, held.second, r),
+        walls.velocity(chain, held.third, r),
+    )
+    u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
+    # What is left of the pull in the frame of the particle
+    rest = _solved(
+        a, b, c,
+        walls.outward_acceleration(chain, held.first, r, u, pull),
+        walls.outward_acceleration(chain, held.second, r, u, pull),
+        walls.outward_acceleration(chain, held.third, r, u, pull),
+    )  # fmt: skip
+    friction = wall_laws.friction(laws)
+    p, q, s = (
+        _force(friction, held.first, a, u - v),
+        _force(friction, held.second, b, u - w),
+        _force(friction, held.third, c, u - x),
+    )
+    load = _parts(p, q, s, rest)
+    holds = (load.x > least) & (load.y > least) & (load.z > least)
+    power = Vec(-load.x * dot(p, v), -load.y * dot(q, w), -load.z * dot(s, x))
+    heat = load.x * dot(p, u - v) + load.y * dot(q, u - w) + load.z * dot(s, u - x)
+    return Corner(holds, u, load, power, heat)
+
+
+@outlined
+def _find(laws, chain, gravity, r, near, least):
+    """Three walls at a point that hold a particle there, and none of whose neighbours comes: `Three`."""
+    number = scratch(count_near(chain, r), np.float64)
+    list_near(chain, 0, 0.0, r, number)
+    count = 0
+    for i in range(number.size):
+        if walls.distance(chain, number[i], r) >= -near:
+            number[count] = number[i]
+            count += 1
+    for i in range(count):
+        for j in range(i):
+            for k in range(j):
+                held = Three(number[i], number[j], number[k])
+                corner = _corner(laws, chain, gravity, held, r, least)
+                if corner.holds:
+                    return held
+    return _NOBODY
+
+
+@outlined
+def _settled(chain, held, r):
+    """A point near three walls, moved onto them; whether it is there."""
+    least = 4.0 * _EPSILON * total(absolute(r))
+    for _sweep in range(_SWEEPS):
+        d, e, f = (
+            walls.distance(chain, held.first, r),
+            walls.distance(chain, held.second, r),
+            walls.distance(chain, held.third, r),
+        )
+        if max(abs(d), abs(e), abs(f)) <= least:
+            return r, True
+        a, b, c = _normals(chain, held, r)
+        r = r - _solved(a, b, c, d, e, f)
+    return r, False
+
+
+# --- While it is carried ---------------------------------------------------------------------------------
+
+
+@by_type_outlined
+def is_carried(moving, method, chain, gravity, p):
+    """Whether three walls, some of which move, carry a particle that is slow in their corner."""
+    return False
+
+
+@is_carried.register(wall_laws.Moves)
+def _(moving, method, chain, gravity, p):
+    now = at(chain, p.left)
+    held = _find(method.laws, now, gravity, p.r, events.TOUCH * method.size, events.weightless(method, gravity, p))
+    if held.first < 0.0:
+        return False
+    u = _corner(method.laws, now, gravity, held, p.r, 0.0).u
+    part = events.GRAZING if wall_laws.loses(method.laws) else _NO_SPEED
+    return square(p.v - u) <= part * part * events.own_speed2(p)
+
+
+@by_type
+def carry(openings, method, chain, gravity, state, i, p):
+    """Carry a particle: what it does next, or `NOT_CARRIED`."""
+    return _carry_in(state.period, method, chain, gravity, state, i, p)
+
+
+# Step by step, where places on its way are looked at.
+carry.register(Openings, lambda openings, method, chain, gravity, state, i, p: NOT_CARRIED)
+
+
+@by_type
+def _carry_in(period, method, chain, gravity, state, i, p):
+    return _carry(wall_laws.moving(methods.laws(method)), method, chain, gravity, state, i, p)
+
+
+_carry_in.register(Period, lambda period, method, chain, gravity, state, i, p: NOT_CARRIED)
+
+
+@by_type_outlined
+def _carry(moving, method, chain, gravity, state, i, p):
+    return NOT_CARRIED
+
+
+@_carry.register(wall_laws.Moves)
+def _(moving, method, chain, gravity, state, i, p):
+    if not is_carried(moving, method, chain, gravity, p):
+        return NOT_CARRIED
+    laws, near, least = method.laws, events.TOUCH * method.size, events.weightless(method, gravity, p)
+    shortest = 2.0 * events.GRAZING * method.size / math.sqrt(events.own_speed2(p))
+    r, left, now = p.r, p.left, at(chain, p.left)
+    held = _find(laws, now, gravity, r, near, least)
+    start, h, phase, used = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0
+    while left > 0.0:
+        h = min(h, left, walls.shortest_pace(now))
+        met = -1.0
+        middle, _there = _settled(at(chain, left - 0.5 * h), held, r + (0.5 * h) * start.u)
+        r1, there = _settled(at(chain, left - h), held, r + h * start.u)
+        half = _corner(laws, at(chain, left - 0.5 * h), gravity, held, middle, 0.0)
+        end = _corner(laws, at(chain, left - h), gravity, held, r1, 0.0)
+        if not (there and half.holds and end.holds):
+            h *= _RETRY
+            if h < shortest:
+                break
+            continue
+        path = crossing.Path(r, start.u, r1, end.u, h)
+        none = crossing.near(method, r)
+        if crossing.meets(now, at(chain, left - h), 0.0, held, path, none):
+            found = crossing.arrival(chain, 0.0, held, path, none, left)
+            if found.time == 0.0:
+                met = found.wall if used > 0.0 else -1.0
+                phase = EVENT if used > 0.0 else phase
+                state.contacts.met[i] = found.wall
+                break
+            if found.time < 1.0:
+                # To there, and then it is met at once.
+                h *= found.time
+                continue
+        if used == 0.0:
+            _stop(laws, now, gravity, state, i, p, held, start.u)
+        _book(chain, gravity, state, i, held, (start, half, end), (r1, h, left == h))
+        used += h
+        left = 0.0 if left == h else left - h
+        r, now, start, h = r1, at(chain, left), end, h / _RETRY
+    if used == 0.0:
+        return NOT_CARRIED
+    put(state.position, 0, i, r)
+    put(state.velocity, 0, i, start.u)
+    state.contacts.sliding[i] += used
+    state.contacts.left[i] = left
+    return phase if left > 0.0 else ARRIVED
+
+
+@outlined
+def _stop(laws, now, gravity, state, i, p, held, u):
+    """Book what the walls take of a velocity that is not theirs."""
+    a, b, c = _normals(now, held, p.r)
+    taken, mass = _parts(a, b, c, p.v - u), state.mass[i]
+    given = _push(now, state, i, held, taken, Vec(
+        -taken.x * dot(a, u), -taken.y * dot(b, u), -taken.z * dot(c, u)
+    ))  # fmt: skip
+    after = 0.5 * square(u) + potential(gravity, p.r)
+    state.dissipated[i] += (0.5 * p.twice - after + given) * mass
+    state.energy[i] = after
+
+
+@outlined
+def _book(chain, gravity, state, i, held, corners, end):
+    """Book a step, by Simpson's rule; `end` is (where it ends, how long it is, whether the frame ends with it)."""
+    start, half, last = corners
+    r1, h, _ends = end
+    sixth = h * (1.0 / 6.0)
+    load = sixth * (start.load + 4.0 * half.load + last.load)
+    work = sixth * (start.power + 4.0 * half.power + last.power)
+    heat = sixth * (start.heat + 4.0 * half.heat + last.heat)
+    after = 0.5 * square(last.u) + potential(gravity, r1)
+    # The energy is known to more digits than what the walls give of it: the one that gives most has the rest.
+    rest = after - state.energy[i] + heat - (work.x + work.y + work.z)
+    x, y, z = abs(work.x), abs(work.y), abs(work.z)
+    first, second = (x >= y) & (x >= z), (y > x) & (y >= z)
+    work = work + Vec(
+        select(first, rest, 0.0), select(second, rest, 0.0), select(first | second, 0.0, rest)
+    )
+    _push(chain, state, i, held, load, work)
+    state.dissipated[i] += heat * state.mass[i]
+    state.energy[i] = after
+
+
+@outlined
+def _push(chain, state, i, held, load, work):
+    """Book impulses and works per mass of three walls; the sum of the works."""
+    behind, mass = walls.length(chain), state.mass[i]
+    for k in range(3):
+        wall = held.first if k == 0 else (held.second if k == 1 else held.third)
+        row = walls.row(chain, wall)
+        state.impulse[row, i] += (load.x if k == 0 else (load.y if k == 1 else load.z)) * mass
+        state.impulse[behind + row, i] += (work.x if k == 0 else (work.y if k == 1 else work.z)) * mass
+    return work.x + work.y + work.z
