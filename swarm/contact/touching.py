@@ -12,7 +12,7 @@ import numpy as np
 
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
-from ..kernel.vector import ZERO, Vec, absolute, dot, largest, moves, norm, put, square, total
+from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
@@ -74,18 +74,20 @@ class Touch(NamedTuple):
 
 @outlined
 def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
-    """One impact of one particle on `wall` after a short flight. Adds to impulse[:, lane].
+    """One impact of one particle on `wall` after a short flight.
 
-    If the next flight would be shorter than the shortest too, the particle slides for that time instead.
+    Adds to impulse[:, lane] what each wall gives, then, where that has rows, the work per mass of each. If the next
+    flight would be shorter than the shortest too, the particle slides for that time instead.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
     carried, chain = chain, at(chain, flight.left)
-    given = scratch(walls.length(chain), np.float64)
+    given, work = scratch(walls.length(chain), np.float64), scratch(walls.length(chain), np.float64)
     w, now, met = v, energy, wall
     for _blow in range(_BLOWS):
         bounce = reflection.exact(method.laws, chain, gravity, met, r, w, now)
         w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
         given[walls.row(chain, met)] += bounce.impulse
+        work[walls.row(chain, met)] += 0.5 * bounce.work
         following = flights.first_hit(chain, gravity, r, w)
         if following.time >= method.shortest or following.wall < 0.0:
             row = walls.row(chain, wall)
@@ -95,6 +97,8 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
                 given[row] = end.impulse
             for i in range(given.size):
                 impulse[i, lane] += given[i]
+                if impulse.shape[0] > given.size:
+                    impulse[given.size + i, lane] += work[i]
             return Landing(end.r, end.v, end.used, now.twice)
         if following.wall == met or following.time > _SAME_INSTANT * method.shortest:
             break
@@ -140,8 +144,23 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
-        impulse[walls.row(chain, number[i]), lane] += given[i] + 2.0 * touch.held[i]
+        taken = given[i] + 2.0 * touch.held[i]
+        impulse[walls.row(chain, number[i]), lane] += taken
+        _add_work(moving, chain, impulse, lane, number[i], (flight.r, -taken * column(normal, 0, i)))
     return Landing(r, w, h, twice_energy)
+
+
+@by_type
+def _add_work(moving, chain, impulse, lane, wall, change):
+    """The work per mass of a wall that moves; `change` is (where, of the velocity)."""
+
+
+@_add_work.register(wall_laws.Moves)
+def _(moving, chain, impulse, lane, wall, change):
+    r, gained = change
+    behind = walls.length(chain)
+    if impulse.shape[0] > behind:
+        impulse[behind + walls.row(chain, wall), lane] += dot(gained, walls.velocity(chain, wall, r))
 
 
 @by_type_outlined

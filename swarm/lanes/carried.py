@@ -15,7 +15,7 @@ from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, scratch, select
-from ..kernel.vector import ZERO, Vec, absolute, column, cross, dot, norm, put, square, total
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
 from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
@@ -32,8 +32,8 @@ _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20
 _EPSILON = 2.220446049250313e-16
-# A step at whose end a wall does not press is tried again so much shorter.
-_RETRY = 0.25
+# A step at whose end a wall does not press is tried again so much shorter; one to another wall is cut so often.
+_RETRY, _MOST_TRIES = 0.25, 100
 
 
 class Corner(NamedTuple):
@@ -213,10 +213,9 @@ def _(moving, method, chain, gravity, state, i, p):
     shortest = 2.0 * events.GRAZING * method.size / math.sqrt(events.own_speed2(p))
     r, left, now = p.r, p.left, at(chain, p.left)
     held = _find(laws, now, gravity, r, near, least)
-    start, h, phase, used = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0
-    while left > 0.0:
+    start, h, phase, used, tries = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0, 0
+    while left > 0.0 and tries <= _MOST_TRIES:
         h = min(h, left, walls.shortest_pace(now))
-        met = -1.0
         middle, _there = _settled(at(chain, left - 0.5 * h), held, r + (0.5 * h) * start.u)
         r1, there = _settled(at(chain, left - h), held, r + h * start.u)
         half = _corner(laws, at(chain, left - 0.5 * h), gravity, held, middle, 0.0)
@@ -231,20 +230,20 @@ def _(moving, method, chain, gravity, state, i, p):
         if crossing.meets(now, at(chain, left - h), 0.0, held, path, none):
             found = crossing.arrival(chain, 0.0, held, path, none, left)
             if found.time == 0.0:
-                met = found.wall if used > 0.0 else -1.0
                 phase = EVENT if used > 0.0 else phase
                 state.contacts.met[i] = found.wall
                 break
             if found.time < 1.0:
                 # To there, and then it is met at once.
                 h *= found.time
+                tries += 1
                 continue
         if used == 0.0:
             _stop(laws, now, gravity, state, i, p, held, start.u)
         _book(chain, gravity, state, i, held, (start, half, end), (r1, h, left == h))
         used += h
         left = 0.0 if left == h else left - h
-        r, now, start, h = r1, at(chain, left), end, h / _RETRY
+        r, now, start, h, tries = r1, at(chain, left), end, h / _RETRY, 0
     if used == 0.0:
         return NOT_CARRIED
     put(state.position, 0, i, r)
@@ -281,9 +280,7 @@ def _book(chain, gravity, state, i, held, corners, end):
     rest = after - state.energy[i] + heat - (work.x + work.y + work.z)
     x, y, z = abs(work.x), abs(work.y), abs(work.z)
     first, second = (x >= y) & (x >= z), (y > x) & (y >= z)
-    work = work + Vec(
-        select(first, rest, 0.0), select(second, rest, 0.0), select(first | second, 0.0, rest)
-    )
+    work = work + Vec(select(first, rest, 0.0), select(second, rest, 0.0), select(first | second, 0.0, rest))
     _push(chain, state, i, held, load, work)
     state.dissipated[i] += heat * state.mass[i]
     state.energy[i] = after

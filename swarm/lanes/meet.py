@@ -9,7 +9,7 @@ from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift, split_at
 from ..contact.reflection import given, loses_energy, wall_velocity
 from ..kernel.gravity import potential
-from ..kernel.jit import by_type, by_type_outlined, inlined, kernel, outlined, scratch
+from ..kernel.jit import by_type, by_type_outlined, kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
@@ -18,7 +18,8 @@ from ..surfaces.moving import Carried, at
 from ..surfaces.near import count_near, list_near
 from ..surfaces.openings import Openings
 from . import log as impact_log
-from .arrays import following_particle, speed2_scale
+from .accounts import book, book_step, book_work, lose
+from .arrays import booked, following_particle, speed2_scale
 from .arrays import heat as book_heat
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of
@@ -86,7 +87,7 @@ def _decide(method, chain, gravity, share, i):
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
     u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
-    _book(carried, state, i, wall, p.twice, found.twice, given(u, found.v - v), wall_laws.loses(method.laws))
+    book(carried, state, i, wall, p.twice, found.twice, given(u, found.v - v), wall_laws.loses(method.laws))
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
     if phase == FLYING:
@@ -132,7 +133,7 @@ def _(thermal, method, chain, gravity, share, i):
         return False
     before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
     book_heat(state, i, walls.row(chain, wall), before, after - left.work)
-    _book_work(chain, state, i, wall, left.work)
+    book_work(chain, state, i, wall, left.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
@@ -159,39 +160,6 @@ def _spare(moving, chain, state, i, found, wall):
         taken = split_at(edge, chain, drift(moving, edge, chain, r), r, turned)
         state.impulse[walls.row(chain, found.other), i] += taken.c * state.mass[i]
     state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
-
-
-@inlined
-def _lose(state, i, before, after):
-    """Book what is left of twice the energy per mass."""
-    if before != after:
-        state.energy[i] = 0.5 * after
-        state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
-
-
-@by_type
-def _book(chain, state, i, wall, before, after, given, loses):
-    """Book the change of twice the energy per mass at a wall; `given` is what it gives by its motion, if it moves."""
-    _lose(state, i, before, after)
-
-
-@_book.register(Carried)
-def _(chain, state, i, wall, before, after, given, loses):
-    # Where nothing is lost all of it is work, to the last digit.
-    given = given if loses else after - before
-    state.energy[i] = 0.5 * after
-    state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
-    _book_work(chain, state, i, wall, given)
-
-
-@by_type
-def _book_work(chain, state, i, wall, given):
-    """Book twice the work per mass of a wall that moves."""
-
-
-@_book_work.register(Carried)
-def _(chain, state, i, wall, given):
-    state.impulse[walls.length(chain) + walls.row(chain, wall), i] += 0.5 * given * state.mass[i]
 
 
 @kernel
@@ -227,7 +195,7 @@ def _rest(method, chain, gravity, share, i, p, held):
         # Round-off that its walls have gathered, which nothing takes back from now on
         r = touching.inside(chain, p.r)
         put(state.position, 0, i, r)
-        _lose(state, i, p.twice, 2.0 * potential(gravity, r))
+        lose(state, i, p.twice, 2.0 * potential(gravity, r))
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.left
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
@@ -239,7 +207,7 @@ def _rest(method, chain, gravity, share, i, p, held):
 @outlined
 def _step(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
-    impulses = scratch((walls.length(chain), 1), np.float64)
+    impulses = scratch((booked(chain), 1), np.float64)
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
@@ -267,9 +235,10 @@ def _step(method, chain, gravity, share, i):
         state.impulse[s, i] += impulses[s, 0] * state.mass[i]
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
-    u = wall_velocity(wall_laws.moving(method.laws), now, contacts.met[i], r)
-    given_work = given(u, end.v - v)
-    _book(chain, state, i, contacts.met[i], p.twice, end.twice_energy, given_work, wall_laws.loses(method.laws))
+    given_work = 0.0
+    for s in range(walls.length(chain), impulses.shape[0]):
+        given_work += 2.0 * impulses[s, 0]
+    book_step(chain, state, i, contacts.met[i], p.twice, end.twice_energy, given_work, wall_laws.loses(method.laws))
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED

@@ -149,8 +149,8 @@ def _(freedom, walls, t):
 @drive_of.register(Hinged)
 def _(freedom, walls, t):
     rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, t).turn
-    turning = Turn(turn.x, turn.y, turn.z, freedom.axis, rate)
-    return Drive(ZERO, ZERO, None, None, turning, rate * freedom.axis, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+    turning, spin = Turn(turn.x, turn.y, turn.z, freedom.axis, rate), rate * freedom.axis
+    return Drive(ZERO, ZERO, None, None, turning, spin, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 @by_type

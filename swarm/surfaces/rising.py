@@ -152,8 +152,10 @@ _in_wall.register(Vec, lambda n, body: rotated_scene(body, n))
 
 @by_type
 def _along_normal(n, drive, bounds):
-    """Bounds of a flat wall, to which only the jerk along its normal counts: where a motion has none of it, a particle
-    that leaves the wall at no speed stays at it without end."""
+    """Bounds of a flat wall, to which only the jerk along its normal counts.
+
+    Where a motion has none of it, a particle that leaves the wall at no speed stays at it without end.
+    """
     return bounds
 
 
