@@ -13,7 +13,7 @@ import swarm
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 4
 # Coarse steps while it slides: the event loop says nothing of those.
-METHOD = swarm.Impact(sliding_tolerance=1e-5)
+METHOD = swarm.Impact(sliding_tolerance=1e-7)
 # Seconds of the processor, against a hang only: a run takes at most ten.
 PATIENCE = 100
 # Of the ring that takes minutes.
