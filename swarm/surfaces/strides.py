@@ -205,13 +205,13 @@ _steepness.register(Level, lambda level: level.steepness)
 
 @_rise.register(Level)
 def _(level, sixth, within, is_first):
-    c, b, a = level.level, level.half, level.bend + sixth * within
+    time = rise_time(level.level, level.half, level.bend + sixth * within)
     if is_first:
-        # From the wall inwards f is t (f' + f''/2 t + ...): one power of t nearer to it than the parabola.
-        leaves = level.half <= 0.0
-        c, b = select(leaves, 2.0 * level.half, c), select(leaves, 0.5 * level.bend, b)
-        a = select(leaves, sixth, a)
-    return rise_time(c, b, a)
+        # From the wall inwards f is t (f' + f''/2 t + ...): one power of t nearer to it than the parabola. Away from a
+        # wall it says less, and of a particle at rest nothing: both are nowhere below f.
+        leaving = rise_time(2.0 * level.half, 0.5 * level.bend, sixth)
+        time = select((level.half <= 0.0) & (leaving > time), leaving, time)
+    return time
 
 
 _steepness.register(Between, lambda level: 1.0)
@@ -239,10 +239,10 @@ def _(level, sixth, within, is_first):
     ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
     # The one behind: the particle moves away from it.
     c, a = -level.place - level.radius, k - level.bend
+    discriminant = b * b - a * c
+    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+    behind = select(a > 0.0, (b + root) / a, math.inf)
     if is_first:
-        behind = rise_time(-2.0 * b, -0.5 * level.bend, sixth)
-    else:
-        discriminant = b * b - a * c
-        root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-        behind = select(a > 0.0, (b + root) / a, math.inf)
+        leaving = rise_time(-2.0 * b, -0.5 * level.bend, sixth)
+        behind = select(leaving > behind, leaving, behind)
     return select(behind < ahead, behind, ahead)
