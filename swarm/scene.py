@@ -37,6 +37,11 @@ from .surfaces.surface import UNBOUNDED, Box, Surface
 MOST_WALLS = 24
 # Points whose gaps are found at once.
 _BATCH = 4096
+# A slot thinner than this part of the scene's extent is none of its lengths: steps that are a part of it end in the
+# round-off of a time.
+_THIN = 1e-6
+# Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
+_AT_ORIGIN = 1e-15
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
@@ -273,9 +278,9 @@ class Scene:
         return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
 
     def finite_size(self) -> float:
-        """`size`, or the extent of the surfaces where the volume is open."""
-        size = self.size()
-        return size if math.isfinite(size) else self.extent()
+        """`size`, or the extent of the surfaces where the volume is open, or a slot too thin to be a length of motion."""
+        size, extent = self.size(), self.extent()
+        return size if _THIN * extent < size < math.inf else extent
 
     def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
@@ -368,7 +373,8 @@ class Scene:
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
         lengths = [length for length in self.period or () if length is not None]
-        return max([*(surface.extent() for surface in self.surfaces), *lengths]) or 1.0
+        farthest = max([*(surface.extent() for surface in self.surfaces), *lengths])
+        return farthest if farthest > _AT_ORIGIN else 1.0
 
     def _images_of(self, i: int) -> tuple[Surface, ...]:
         if self.period is None:

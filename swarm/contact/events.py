@@ -67,8 +67,11 @@ def own_speed2(p):
 
 @inlined
 def weightless(rules, gravity, p):
-    """An acceleration that is none for this particle."""
-    return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.size)
+    """An acceleration that is none for this particle: round-off of gravity, and of the pull of walls that bend.
+
+    Not by the size: of a floor, or of a slot between two planes, that is where they are, and says nothing of the pull.
+    """
+    return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 
 
 @inlined

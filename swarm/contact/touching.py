@@ -312,13 +312,13 @@ def _normal(chain, wall, r0, r1):
 
 @outlined
 def _goes_straight(chain, gravity, touch, r, v):
-    """Whether the step may have any length: rest, or uniform motion along flat walls that gravity presses against."""
+    """Whether the step may have any length: rest, or uniform motion along flat walls, which gravity may press against."""
     g = accelerated(gravity, ZERO, 1.0)
     for i in range(touch.touched.size):
         if touch.touched[i]:
             put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r))
     falling = project(touch.touched, touch.normal, touch.held, g)
-    if not moves(g) or largest(falling) > ALLOWED * largest(g):
+    if largest(falling) > ALLOWED * largest(g):
         return False
     speed = largest(v)
     for i in range(touch.touched.size):

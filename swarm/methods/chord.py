@@ -13,6 +13,7 @@ class Chord(NamedTuple):
     """What kernels know of `Impact` with a contact step: `Lasting`, no laws, and the step."""
 
     size: float
+    bend: float
     fall2: float
     shortest_flight: float
     shortest_length: float

@@ -15,6 +15,8 @@ from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
+from ..surfaces.contract import flat
+from ..surfaces.surface import Surface
 from . import base, contract
 from .chord import Chord
 
@@ -111,13 +113,24 @@ class Impact(base.Method):
         size = scene.finite_size()
         length = base.SHORTEST * size if self.shortest_flight is None else 0.0
         pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
-        given = Lasting(size, pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance)
+        given = Lasting(size, _bend(scene), pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance)
         if self.contact_step > 0.0:
             return Chord(*given, None, self.contact_step)
         return Reflection(*given, scene.laws())
 
     def may_slide(self) -> bool:
         return True
+
+
+def _bend(scene: Scene) -> float:
+    """The least length on which walls bend, or the size of one that moves [m]; infinite where all are flat and rest."""
+    sizes = [surface.size() for surface in scene.surfaces if not _is_straight(surface)]
+    least = min(sizes, default=math.inf)
+    return least if math.isfinite(least) or not sizes else scene.finite_size()
+
+
+def _is_straight(surface: Surface) -> bool:
+    return surface.motion is None and all(flat(wall) for wall in surface.walls())
 
 
 def _require_reacting(scene: Scene) -> None:
@@ -150,6 +163,7 @@ class Lasting(NamedTuple):
     """What decides whether a contact lasts; one of the shortest flight's two numbers is 0."""
 
     size: float  # of the scene [m]
+    bend: float  # the least length on which walls bend [m], infinite where all are flat
     fall2: float  # |G| size, the square of a speed
     shortest_flight: float  # [s]
     shortest_length: float  # of a flight [m]
@@ -160,6 +174,7 @@ class Reflection(NamedTuple):
     """What kernels know of the method with the exact reflection: `Lasting` and the laws of the walls."""
 
     size: float
+    bend: float
     fall2: float
     shortest_flight: float
     shortest_length: float

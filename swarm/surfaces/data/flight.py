@@ -185,6 +185,12 @@ def march(surface, r, v, pull):
                 return t, True
             return bisected(surface, r, v, pull, before, t), True
         step, out, bent = _safe_step(surface, cell, Near(level, half, n), p, w, pull)
+        if half <= 0.0 and half * half <= bent.most * room * norm(n):
+            # See `slack` in march.py.
+            near = Near(min(level, -room * norm(n)), half, n)
+            step, _out, _bent_there = _safe_step(surface, cell, near, p, w, pull)
+            before, t = t, t + step
+            continue
         before, t = t, t + step
         # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
         # least this.
