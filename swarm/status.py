@@ -16,6 +16,7 @@ class Status(IntEnum):
     HARD_CONTACT = 7
     LEASE_ENDED = 8
     LOG_FULL = 9
+    TIMELESS = 10
 
     @property
     def sentence(self) -> str:
@@ -35,4 +36,7 @@ _SENTENCES = {
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
+    Status.TIMELESS: "1000 times in a row it went from flight to a wall, or from wall to wall, and no time passed; start "
+    "it elsewhere, or end the run before; if nothing is special about the place, it is an error of swarm: please report "
+    "it with the scene",
 }

@@ -129,7 +129,7 @@ def _rare(hard, method, chain, gravity, state, lanes, live):
     for i in range(live):
         if lanes.rows[HITS, i] > _most_hits(chain):
             put(state.position, 0, lanes.particle[i], column(lanes.rows, R, i))
-            _keep_time(chain, state.contacts, lanes, i)
+            _keep_left(state.contacts, lanes, i)
             return Status.STALLED.value, i
     return Status.DONE.value, 0
 
@@ -144,18 +144,8 @@ _most_hits.register(Carried, lambda chain: 0.1 * MOST_HITS)
 
 
 @by_type
-def _keep_time(chain, contacts, lanes, i):
-    """Keep when a particle is given up that walls have closed on."""
-
-
-@_keep_time.register(Carried)
-def _(chain, contacts, lanes, i):
-    _keep_left(contacts, lanes, i)
-
-
-@by_type
 def _keep_left(contacts, lanes, i):
-    """The same, where contacts may last."""
+    """Keep when a particle is given up."""
 
 
 @_keep_left.register(Contacts)

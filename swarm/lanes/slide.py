@@ -81,7 +81,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
         following, stop, drawn, loaded = _refill(
-            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn)
+            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn, passes)
         )
         if not loaded:
             break
@@ -103,12 +103,13 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             if phase != phase_of(kind):
                 _retire(kind, moving, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
-                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn)
+                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn, passes)
                 )
                 if not loaded:
                     live -= 1
                     _move(lanes, live, i)
-    return Status.DONE.value, 0, drawn
+    # A halt may have kept it from loading more.
+    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, drawn
 
 
 @outlined
@@ -120,9 +121,14 @@ def _leave(kind, moving, chain, share, lanes, live):
 
 @outlined
 def _refill(kind, method, chain, gravity, share, lanes, lane, at):
-    """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one."""
-    following, stop, drawn = at
+    """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one.
+
+    None after a halt: what is loaded may rest or fly at once, one particle after the other.
+    """
+    following, stop, drawn, passes = at
     while True:
+        if passes >= share.halt[0]:
+            return following, stop, drawn, False
         following, stop, drawn = following_particle(share, phase_of(kind), following, stop, drawn)
         if following == stop:
             return following, stop, drawn, False
