@@ -36,7 +36,6 @@ _SENTENCES = {
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
-    Status.TIMELESS: "1000 times in a row it went from flight to a wall, or from wall to wall, and no time passed; start "
-    "it elsewhere, or end the run before; if nothing is special about the place, it is an error of swarm: please report "
-    "it with the scene",
+    Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
+    "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
 }

@@ -23,7 +23,7 @@ from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.period import part_until
-from .arrays import LANES, following_particle, speed2_scale, with_distances
+from .arrays import LANES, LOOK, following_particle, goes_on_by, speed2_scale, with_distances
 from .compose import (
     CUT,
     FAILED,
@@ -31,6 +31,7 @@ from .compose import (
     LEAVES,
     LEFT,
     LIFTED,
+    LOOKED,
     MET,
     PASSES,
     PRESS,
@@ -85,6 +86,7 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         )
         if not loaded:
             break
+        lanes.rows[LOOKED, live] = -1.0
         live += 1
     moving = wall_laws.moving(methods.laws(method))
     while live > 0:
@@ -92,6 +94,9 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             _leave(kind, moving, chain, share, lanes, live)
             return Status.INTERRUPTED.value, 0, drawn
         passes += 1
+        if passes % LOOK == 0 and (i := _still(method, lanes, live)) >= 0:
+            _leave(kind, moving, chain, share, lanes, live)
+            return Status.TIMELESS.value, lanes.particle[i], drawn
         compose(kind, method, chain, gravity, lanes, live)
         end_steps(kind, method, chain, gravity, lanes, live)
         for i in range(live):
@@ -110,6 +115,18 @@ def slide_block(kind, method, chain, gravity, share, lanes):
                     _move(lanes, live, i)
     # A halt may have kept it from loading more.
     return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, drawn
+
+
+@outlined
+def _still(method, lanes, live):
+    """A lane that has not gone on since it was looked at, or -1."""
+    rows = lanes.rows
+    for i in range(live):
+        p, left = float(lanes.particle[i]), rows[LEFT, i]
+        if rows[LOOKED, i] == p and goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left:
+            return i
+        rows[LOOKED, i], rows[LOOKED + 1, i] = p, left
+    return -1
 
 
 @outlined
@@ -235,7 +252,8 @@ def _move(lanes, source, target):
     """The last live lane into the free slot."""
     for row in range(R1):
         lanes.rows[row, target] = lanes.rows[row, source]
-    lanes.rows[TRIALS, target] = lanes.rows[TRIALS, source]
+    for row in (TRIALS, LOOKED, LOOKED + 1):
+        lanes.rows[row, target] = lanes.rows[row, source]
     lanes.particle[target] = lanes.particle[source]
 
 

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .. import checks
 from ..contact import laws as wall_laws
 from ..contact import sliding, touching
@@ -20,6 +22,8 @@ from .chord import Chord
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
+# A particle gets nowhere in this part of a crossing.
+_INSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -196,6 +200,13 @@ def _(method, first, second, third):
 @contract.dissipates.register(Reflection)
 def _(method):
     return loses_energy(method.laws)
+
+
+@contract.instant.register(Reflection)
+@contract.instant.register(Chord)
+def _(method, v):
+    speed2 = square(v) + method.fall2
+    return _INSTANT * method.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
 
 
 contract.holds.register(Reflection, lambda method: True)

@@ -48,7 +48,7 @@ class Watch:
         """Whether a thread that has called kernels so often ends: many calls of a few passes each are passes too."""
         if time.monotonic() >= self._latest:
             self.halt()
-        return turns >= self.passes[0]
+        return bool(turns >= self.passes[0])
 
     def is_freed(self, seconds: float) -> bool:
         """Whether kernels have returned after so many seconds only since the caller's thread is to be free."""
