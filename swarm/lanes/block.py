@@ -122,12 +122,12 @@ def _halts(share, lanes, following, stop, drawn, live, passes):
     return Status.DONE.value
 
 
-@inlined
+@outlined
 def _rare(hard, method, chain, gravity, state, lanes, live, some_hard):
     """What a pass rarely needs: (worst status, its lane)."""
-    if some_hard:
-        return _hard_passes(hard, method, chain, gravity, lanes, live)
-    return _look(method, chain, state, lanes, live)
+    if not some_hard:
+        return _look(method, chain, state, lanes, live)
+    return _hard_passes(hard, method, chain, gravity, lanes, live)
 
 
 @outlined

@@ -90,13 +90,11 @@ def slide_block(kind, method, chain, gravity, share, lanes):
         live += 1
     moving = wall_laws.moving(methods.laws(method))
     while live > 0:
-        if passes >= share.halt[0]:
+        status, particle = _over(method, share, lanes, live, passes)
+        if status != Status.DONE.value:
             _leave(kind, moving, chain, share, lanes, live)
-            return Status.INTERRUPTED.value, 0, drawn
+            return status, particle, drawn
         passes += 1
-        if passes % LOOK == 0 and (i := _still(method, lanes, live)) >= 0:
-            _leave(kind, moving, chain, share, lanes, live)
-            return Status.TIMELESS.value, lanes.particle[i], drawn
         compose(kind, method, chain, gravity, lanes, live)
         end_steps(kind, method, chain, gravity, lanes, live)
         for i in range(live):
@@ -118,15 +116,19 @@ def slide_block(kind, method, chain, gravity, share, lanes):
 
 
 @outlined
-def _still(method, lanes, live):
-    """A lane that has not gone on since it was looked at, or -1."""
+def _over(method, share, lanes, live, passes):
+    """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
+    if passes >= share.halt[0]:
+        return Status.INTERRUPTED.value, 0
+    if passes % LOOK != 0:
+        return Status.DONE.value, 0
     rows = lanes.rows
     for i in range(live):
-        p, left = float(lanes.particle[i]), rows[LEFT, i]
-        if rows[LOOKED, i] == p and goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left:
-            return i
-        rows[LOOKED, i], rows[LOOKED + 1, i] = p, left
-    return -1
+        p, left = lanes.particle[i], rows[LEFT, i]
+        if rows[LOOKED, i] == float(p) and goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left:
+            return Status.TIMELESS.value, p
+        rows[LOOKED, i], rows[LOOKED + 1, i] = float(p), left
+    return Status.DONE.value, 0
 
 
 @outlined
