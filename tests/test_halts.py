@@ -217,7 +217,7 @@ CLOSING = """
 from swarm.lanes import block
 real_pass = block._pass
 def noted(*about):
-    if about[3].moment > 0.08:
+    if about[3].moment > 0.1:
         note()
     return real_pass(*about)
 block._pass = noted
@@ -226,7 +226,7 @@ walls = [
     swarm.Plane((0.0, 0.0, 1.0), 0.1, motion=swarm.Translation((0.0, 0.0, -1.0))),
 ]
 scene, start = swarm.Scene(walls), swarm.Particles([0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
-report(scene, start, swarm.Impact(), until=0.2, every=1e-3, compile="never")
+report(scene, start, swarm.Impact(), until=0.2, every=0.04, compile="never")
 """
 # An inelastic collapse of a wall on a particle.
 COLLAPSE = """
