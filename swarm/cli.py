@@ -15,6 +15,9 @@ from .errors import SceneError, SwarmError
 from .version import VERSION
 
 _FAILED, _BAD_INPUT = 1, 2
+_CODES = (
+    "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over, go on with --resume, 130 interrupted"
+)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -22,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Simulate particles and bodies bouncing in rigid cavities and off solids, with energy conserved to round-off.",
-    epilog="Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5",
+    epilog=f"Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5\n\n{_CODES}",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
@@ -42,8 +45,8 @@ def _options(
     pass
 
 
-app.command(epilog="Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2")(run)
-app.command(epilog="Example:  swarm sweep examples/sweeps/cooling.toml -o cooling")(sweep)
+app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
+app.command(epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}")(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
 app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
@@ -53,7 +56,7 @@ app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames :
 
 
 def main() -> None:
-    """Run the command line; the exit code is 0 done, 1 the run failed, 2 bad input, 130 interrupted."""
+    """Run the command line; its exit codes: `_CODES`."""
     try:
         app()
     except SwarmError as error:

@@ -405,13 +405,13 @@ def test_interrupt_keeps_finished_frames(folder, request):
 
 
 def test_wall_time_and_resume(folder):
-    """Exit code 0 and how to resume; then the same frames as in one go, in all their bits. A nanosecond is over at the
+    """Exit code 75 and how to resume; then the same frames as in one go, in all their bits. A nanosecond is over at the
     first frame."""
     text = GOOD.replace("until = 1.0", "until = 800.0").replace("every = 0.5", "every = 200.0")
     (folder / "scene.toml").write_text(text)
     limit = "0.000000001s"
     first = command("run", "scene.toml", "--walltime", limit, "--json", cwd=folder)
-    assert first.returncode == 0
+    assert first.returncode == 75
     assert "the wall time limit is reached" in first.stderr
     told = json.loads(first.stdout)
     assert told["status"] == "walltime"

@@ -14,7 +14,9 @@ from .. import interrupt
 from ..errors import CompleteError, SwarmError, WallTimeError
 from .shown import table
 
-INTERRUPTED = 130
+# Exit codes of what is stopped: that of a shell for SIGINT; EX_TEMPFAIL of sysexits.h, "try again later", where the
+# wall time is over, by which a chain of jobs knows that another one is needed.
+INTERRUPTED, OUT_OF_TIME = 130, 75
 
 
 def run(  # noqa: PLR0913  one argument an option
@@ -38,7 +40,8 @@ def run(  # noqa: PLR0913  one argument an option
         bool, typer.Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
     ] = False,
     walltime: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint.")
+        str | None,
+        typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint; the exit code is 75."),
     ] = None,
     compile: Annotated[
         str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
@@ -109,7 +112,7 @@ def run(  # noqa: PLR0913  one argument an option
                 report(status, target, resume=again)
             else:
                 report(status, frames=0, resume=again)
-        raise typer.Exit(0 if status == "walltime" else INTERRUPTED) from None
+        raise typer.Exit(OUT_OF_TIME if status == "walltime" else INTERRUPTED) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
         report("complete", target)

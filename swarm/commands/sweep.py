@@ -10,7 +10,7 @@ import typer
 
 from .. import interrupt
 from ..errors import SwarmError
-from .run import INTERRUPTED, arguments_again
+from .run import INTERRUPTED, OUT_OF_TIME, arguments_again
 from .shown import table
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ def sweep(  # noqa: PLR0913  one argument an option
         bool, typer.Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
     ] = False,
     walltime: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints.")
+        str | None,
+        typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
@@ -66,7 +67,7 @@ def sweep(  # noqa: PLR0913  one argument an option
     with interrupt.at_once():
         _report(outcome, quiet, as_json)
     if outcome.stopped:
-        raise typer.Exit(0 if outcome.stopped == "walltime" else INTERRUPTED)
+        raise typer.Exit(OUT_OF_TIME if outcome.stopped == "walltime" else INTERRUPTED)
     if outcome.results.of_state("failed"):
         raise typer.Exit(_FAILED)
 

@@ -22,6 +22,9 @@ LANES = 256
 STRIDE = 264
 # Bytes of a line of the cache, and of a number of eight flags.
 _LINE, EIGHT = 64, 8
+# After so many passes lanes are looked at: who has moved on since by less than this part of the time left would need
+# 1e9 passes, and is given up if it got nowhere.
+LOOK, _MOVED = 1024, 1e-6
 R, V, LEFT, OWN, HITS, ROWS = 0, 3, 6, 7, 10, 11
 
 with_distances = spaced(STRIDE)
@@ -44,6 +47,7 @@ class Lanes(NamedTuple):
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
     some: Array  # int64, those `eights` of which one is marked
     order: Array  # int64, the lanes that are marked
+    before_look: Array  # (3, stride) particle, time left and impacts when all lanes were looked at last
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
     period: Any = None  # the cell where it repeats
     before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
@@ -108,6 +112,7 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
+        before_look=table(3),
         left_behind=table(ROWS + rows),
         period=period,
     )
@@ -299,6 +304,12 @@ def speed2_scale(state, i):
     """The square of the speed that a particle's energy scale is that of."""
     scale = state.inverse_scale[i]
     return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)
+
+
+@inlined
+def goes_on_by(method, v, left):
+    """The time from one look to the next by which a particle must go on that has so much left of its frame [s]."""
+    return min(methods.instant(method, v), _MOVED * left)
 
 
 @by_type

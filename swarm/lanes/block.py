@@ -25,11 +25,13 @@ from .arrays import (
     HITS,
     LANES,
     LEFT,
+    LOOK,
     OWN,
     R,
     V,
     count_sweeps,
     following_particle,
+    goes_on_by,
     keep_failure,
     lane_of,
     leave,
@@ -50,8 +52,6 @@ from .wrap import return_lanes
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
-# After so many passes all lanes are looked at for that.
-_LOOK = 4096
 # Passes of a call of `advance_block` that is never halted.
 NEVER = 2**63 - 1
 
@@ -79,6 +79,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if following == stop:
             break
         load(method, chain, lanes, index(live), share, following)
+        lanes.before_look[0, live] = -1.0
         following += 1
         live += 1
     while live > 0:
@@ -87,8 +88,8 @@ def advance_block(method, chain, gravity, hard, share, lanes):
             return status, live, drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
-        if some_hard or (methods.holds(method) and passes % _LOOK == 0):
-            status, lane = _rare(hard, method, chain, gravity, state, lanes, live)
+        if some_hard or passes % LOOK == 0:
+            status, lane = _rare(hard, method, chain, gravity, state, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane], drawn
@@ -122,15 +123,32 @@ def _halts(share, lanes, following, stop, drawn, live, passes):
 
 
 @outlined
-def _rare(hard, method, chain, gravity, state, lanes, live):
-    """What a pass rarely needs: (worst status, its lane). A particle may meet its walls without end."""
-    if not methods.holds(method):
-        return _hard_passes(hard, method, chain, gravity, lanes, live)
+def _rare(hard, method, chain, gravity, state, lanes, live, some_hard):
+    """What a pass rarely needs: (worst status, its lane)."""
+    if not some_hard:
+        return _look(method, chain, state, lanes, live)
+    return _hard_passes(hard, method, chain, gravity, lanes, live)
+
+
+@outlined
+def _look(method, chain, state, lanes, live):
+    """Whether a particle meets its walls without end, or has not gone on since it was looked at: (status, its lane).
+
+    The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
+    """
+    rows, before = lanes.rows, lanes.before_look
     for i in range(live):
-        if lanes.rows[HITS, i] > _most_hits(chain):
-            put(state.position, 0, lanes.particle[i], column(lanes.rows, R, i))
-            _keep_time(chain, state.contacts, lanes, i)
-            return Status.STALLED.value, i
+        status, p, left = Status.DONE.value, float(lanes.particle[i]), rows[LEFT, i]
+        still = goes_on_by(method, column(rows, V, i), left) >= before[1, i] - left
+        if methods.holds(method) and rows[HITS, i] > _most_hits(chain):
+            status = Status.STALLED.value
+        elif before[0, i] == p and still and before[2, i] == rows[HITS, i]:
+            status = Status.TIMELESS.value
+        if status != Status.DONE.value:
+            put(state.position, 0, lanes.particle[i], column(rows, R, i))
+            _keep_left(state.contacts, lanes, i)
+            return status, i
+        before[0, i], before[1, i], before[2, i] = p, left, rows[HITS, i]
     return Status.DONE.value, 0
 
 
@@ -144,18 +162,8 @@ _most_hits.register(Carried, lambda chain: 0.1 * MOST_HITS)
 
 
 @by_type
-def _keep_time(chain, contacts, lanes, i):
-    """Keep when a particle is given up that walls have closed on."""
-
-
-@_keep_time.register(Carried)
-def _(chain, contacts, lanes, i):
-    _keep_left(contacts, lanes, i)
-
-
-@by_type
 def _keep_left(contacts, lanes, i):
-    """The same, where contacts may last."""
+    """Keep when a particle is given up."""
 
 
 @_keep_left.register(Contacts)

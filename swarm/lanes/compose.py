@@ -28,7 +28,9 @@ H, R1, V1, PRESS1, IMPULSE, WORK, ALLOWED, STILL = 19, 20, 23, 26, 28, 30, 31, 3
 # The part of the composition under way: w0, the last guess of its end, the direction in which it slides; the changes of
 # velocity that the accelerations of the last two parts would make in the whole step; how often the step has been cut;
 # twice the work of the second wall, where walls move.
-W, END, TOWARD, CHANGE, BEFORE, TRIALS, GIVEN, ROWS = 33, 36, 39, 42, 45, 48, 49, 50
+W, END, TOWARD, CHANGE, BEFORE, TRIALS, GIVEN = 33, 36, 39, 42, 45, 48, 49
+# The particle and the time left when all lanes were looked at last.
+LOOKED, ROWS = 50, 52
 # A step of this part of a crossing, or of the size, is the shortest.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
 # Friction has stopped a particle where this part of |v|^2 is left.

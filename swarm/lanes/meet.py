@@ -19,7 +19,7 @@ from ..surfaces.near import count_near, list_near
 from ..surfaces.openings import Openings
 from . import log as impact_log
 from .accounts import book, book_step, book_work, lose
-from .arrays import booked, following_particle, speed2_scale
+from .arrays import LANES, booked, following_particle, speed2_scale
 from .arrays import heat as book_heat
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of
@@ -36,17 +36,19 @@ _MOVED = 1e-9
 @kernel
 def meet_block(method, chain, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
-    following, stop, drawn, _live, _passes = impact_log.gone_on(share.log)
+    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
         if following == stop:
             return Status.DONE.value, 0, drawn
+        if done // LANES >= share.halt[0]:
+            return Status.INTERRUPTED.value, 0, drawn
         if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, 0)
+            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
             return Status.LOG_FULL.value, 0, drawn
         if not _decide(method, chain, gravity, share, following):
             return Status.STALLED.value, following, drawn
-        following += 1
+        following, done = following + 1, done + 1
 
 
 @outlined
@@ -165,13 +167,15 @@ def _spare(moving, chain, state, i, found, wall):
 @kernel
 def careful_block(method, chain, gravity, share):
     """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    following, stop, drawn, _live, _passes = impact_log.gone_on(share.log)
+    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
         if following == stop:
             return Status.DONE.value, 0, drawn
+        if done // LANES >= share.halt[0]:
+            return Status.INTERRUPTED.value, 0, drawn
         if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, 0)
+            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
             return Status.LOG_FULL.value, 0, drawn
         _step(method, chain, gravity, share, following)
         return_particle(share.state.period, chain, share.state, following)
@@ -179,7 +183,7 @@ def careful_block(method, chain, gravity, share):
         closed = _have_closed(chain, method, column(share.state.position, 0, following), contacts.left[following])
         if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:
             return Status.STALLED.value, following, drawn
-        following += 1
+        following, done = following + 1, done + 1
 
 
 @outlined

@@ -23,7 +23,7 @@ from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.period import part_until
-from .arrays import LANES, following_particle, speed2_scale, with_distances
+from .arrays import LANES, LOOK, following_particle, goes_on_by, speed2_scale, with_distances
 from .compose import (
     CUT,
     FAILED,
@@ -31,6 +31,7 @@ from .compose import (
     LEAVES,
     LEFT,
     LIFTED,
+    LOOKED,
     MET,
     PASSES,
     PRESS,
@@ -81,16 +82,18 @@ def slide_block(kind, method, chain, gravity, share, lanes):
     following, stop, drawn, live, passes = 0, 0, 0, 0, 0
     while live < LANES:
         following, stop, drawn, loaded = _refill(
-            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn)
+            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn, passes)
         )
         if not loaded:
             break
+        lanes.rows[LOOKED, live] = -1.0
         live += 1
     moving = wall_laws.moving(methods.laws(method))
     while live > 0:
-        if passes >= share.halt[0]:
+        status, particle = _over(method, share, lanes, live, passes)
+        if status != Status.DONE.value:
             _leave(kind, moving, chain, share, lanes, live)
-            return Status.INTERRUPTED.value, 0, drawn
+            return status, particle, drawn
         passes += 1
         compose(kind, method, chain, gravity, lanes, live)
         end_steps(kind, method, chain, gravity, lanes, live)
@@ -103,12 +106,29 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             if phase != phase_of(kind):
                 _retire(kind, moving, chain, share, lanes, i, phase)
                 following, stop, drawn, loaded = _refill(
-                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn)
+                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn, passes)
                 )
                 if not loaded:
                     live -= 1
                     _move(lanes, live, i)
-    return Status.DONE.value, 0, drawn
+    # A halt may have kept it from loading more.
+    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, drawn
+
+
+@outlined
+def _over(method, share, lanes, live, passes):
+    """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
+    if passes >= share.halt[0]:
+        return Status.INTERRUPTED.value, 0
+    if passes % LOOK != 0:
+        return Status.DONE.value, 0
+    rows = lanes.rows
+    for i in range(live):
+        p, left = lanes.particle[i], rows[LEFT, i]
+        if rows[LOOKED, i] == float(p) and goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left:
+            return Status.TIMELESS.value, p
+        rows[LOOKED, i], rows[LOOKED + 1, i] = float(p), left
+    return Status.DONE.value, 0
 
 
 @outlined
@@ -120,9 +140,14 @@ def _leave(kind, moving, chain, share, lanes, live):
 
 @outlined
 def _refill(kind, method, chain, gravity, share, lanes, lane, at):
-    """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one."""
-    following, stop, drawn = at
+    """The next particle that slides into a lane: (particle, stop, draws) to go on from, and whether there is one.
+
+    None after a halt: what is loaded may rest or fly at once, one particle after the other.
+    """
+    following, stop, drawn, passes = at
     while True:
+        if passes >= share.halt[0]:
+            return following, stop, drawn, False
         following, stop, drawn = following_particle(share, phase_of(kind), following, stop, drawn)
         if following == stop:
             return following, stop, drawn, False
@@ -229,7 +254,8 @@ def _move(lanes, source, target):
     """The last live lane into the free slot."""
     for row in range(R1):
         lanes.rows[row, target] = lanes.rows[row, source]
-    lanes.rows[TRIALS, target] = lanes.rows[TRIALS, source]
+    for row in (TRIALS, LOOKED, LOOKED + 1):
+        lanes.rows[row, target] = lanes.rows[row, source]
     lanes.particle[target] = lanes.particle[source]
 
 

@@ -160,6 +160,12 @@ def holds(method):
 
 
 @by_type
+def instant(method, v):
+    """A time [s] in which a particle of this velocity gets nowhere; 0 where the method does not say."""
+    return 0.0
+
+
+@by_type
 def laws(method):
     """The laws of its walls, or None."""
     return

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .. import checks
 from ..contact import laws as wall_laws
 from ..contact import sliding, touching
@@ -25,6 +27,8 @@ _FINEST, _COARSEST = 1e-13, 1e-3
 # Of what is slow, the impulse that is round-off of a particle at its wall: to count it would count by chance. Those of
 # particles that a wall lets go are 1e-16 to 1e-14 of the speed, what is slow 1e-4.
 _NO_IMPACT = 1e-8
+# A particle gets nowhere in this part of a crossing.
+_INSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -213,6 +217,13 @@ def _(method, first, second, third):
 @contract.dissipates.register(Reflection)
 def _(method):
     return loses_energy(method.laws)
+
+
+@contract.instant.register(Reflection)
+@contract.instant.register(Chord)
+def _(method, v):
+    speed2 = square(v) + method.fall2
+    return _INSTANT * method.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
 
 
 contract.holds.register(Reflection, lambda method: True)

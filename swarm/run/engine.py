@@ -27,7 +27,9 @@ from .impacts import Page
 from .state import Seeding, state_of
 from .tally import Watched
 from .tiers import Tier
+from .turns import End, Turns
 from .waiting import result_of
+from .watch import Watch
 
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
@@ -45,9 +47,7 @@ _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 # A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
 _PARTS = 4
 _UNWATCHED, _UNSEEDED = Watched(), Seeding()
-# (status, particle, what a halt left in the lanes)
-_End = tuple[int, int, lanes.Halted | None]
-_DONE: _End = (int(Status.DONE), 0, None)
+_DONE: End = (int(Status.DONE), 0, None)
 
 
 class Run:
@@ -74,7 +74,7 @@ class Run:
         self._draws = math.ceil(n / self._size)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
-        self._halt = np.full(1, blocks.NEVER)
+        self._watch = Watch()
         self._phase = np.zeros(n, np.int8)
         # Kernels have signed numbers, of the same 64 bits.
         self._seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
@@ -103,10 +103,9 @@ class Run:
     def halt(self, passes: int = 0) -> None:
         """Make every kernel call of this frame return after so many passes; 0: at once.
 
-        It ends when `advance` returns. Of two halts the sooner one counts, also if a signal or another thread sets the
-        second at the same time: NumPy compares and writes without releasing the interpreter's lock.
+        It ends when `advance` returns.
         """
-        np.minimum(self._halt, passes, out=self._halt)
+        self._watch.halt(passes)
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every particle by `span` in the method's unit and observe it: whether the frame is done.
@@ -124,6 +123,7 @@ class Run:
             latest = min(latest, time.monotonic() + self._tier.left)
         self._ticket[0] = 0
         others, helps = self._hands(span, writing)
+        self._watch.begin(latest, helps)
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
         ends = [self._share(span)] if helps else []
@@ -132,26 +132,32 @@ class Run:
         self._tier.left -= seconds
         status, particle, _left = max(ends, key=lambda end: end[:2])
         self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
-        if status == Status.HARD_CONTACT:
-            if self.state.contacts is not None:
-                self._kinds.add(particle)
-            else:
-                self._hard = blocks.Hard(blocks.MOST_HITS)
-            self._choose_tier()
+        if self._cut_short:
             self._keep([left for *_, left in ends if left is not None])
-            return self.advance(span, moment, writing, latest)
-        self._halt[0] = blocks.NEVER
-        if status == Status.INTERRUPTED:
-            self._keep([left for *_, left in ends if left is not None])
-        elif status != Status.DONE:
+            if status == Status.HARD_CONTACT:
+                self._meet_hard(particle)
+                return self.advance(span, moment, writing, latest)
+            if helps and self._watch.is_freed(seconds):
+                self._pace = math.inf  # it is a long frame
+                return self.advance(span, moment, writing, latest)
+        self._watch.end()
+        if status not in (Status.DONE, Status.INTERRUPTED):
             ended = Status(status), particle
             raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, self._first))
-        elif span > 0.0:
+        if status == Status.DONE and span > 0.0:
             self._halted = lanes.none_halted(self._booked)
             self._pace = seconds * (others + helps) / span
         return not self._cut_short
 
-    def _share(self, span: float) -> _End:
+    def _meet_hard(self, phase: int) -> None:
+        """Go on with the kernel of this phase, or with hard contacts where none last."""
+        if self.state.contacts is not None:
+            self._kinds.add(phase)
+        else:
+            self._hard = blocks.Hard(blocks.MOST_HITS)
+        self._choose_tier()
+
+    def _share(self, span: float) -> End:
         """Advance and observe what one thread draws."""
         draws = self._drawing()
         # To make lanes takes as long as all else that Python does of a small frame.
@@ -172,11 +178,14 @@ class Run:
         self._lanes.append(mine)
         return end
 
-    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes, page: Page | None) -> _End:
+    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes, page: Page | None) -> End:
         """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
         share = self._shared(span, draws)
         status, particle, drawn = self._call(blocks.advance_block, self._flying(share, mine), page)
+        turns = Turns(self._phase, self.state.contacts, draws, drawn)
         while status == Status.DONE and any(share.pending[phase] for phase in _KINDS):
+            if (over := turns.end(self._watch)) is not None:
+                return over
             share = self._shared(span, _again(draws, draws.mine[:drawn].copy()))
             for phase in _KINDS:
                 if phase not in self._kinds and (self._phase == phase).any():
@@ -264,7 +273,9 @@ class Run:
         log = None if self._impacts is None else self._impacts.example
         counts = None if self._tally is None else self._tally.counts()
         frame = span, self._seed, self._first, self._moment
-        return lanes.Share(self.state, self._phase, pending, self._halted, draws, self._halt, *frame, log, counts)
+        return lanes.Share(
+            self.state, self._phase, pending, self._halted, draws, self._watch.passes, *frame, log, counts
+        )
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""

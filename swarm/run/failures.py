@@ -16,14 +16,10 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
     """The sentence about a frame that ended with this status and particle; `first` is the number of particle 0."""
     status, particle = end
     sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
-    if status == Status.STALLED:
-        place = state.position[:, particle]
-        wall = int(np.argmax(scene.distances_outside(place[:, None], moment)[:, 0]))
-        sentence += f"; it is at ({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
-        if scene.moves() and state.contacts is not None:
-            # The kernel leaves there when it was.
-            found = moment - state.contacts.left[particle]
-            sentence += f" at {found:.9g} s: walls that move have closed on it; end the run before"
+    if status in (Status.STALLED, Status.TIMELESS):
+        sentence += _place(scene, state, particle, moment)
+    if status == Status.STALLED and scene.moves():
+        sentence += ": walls that move have closed on it; end the run before"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
     multipliers = state.multipliers
@@ -53,6 +49,15 @@ def require_admissible(
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
         depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
         raise RunError(f"{_failed(moment)} {first + particle}: it is {depth}")
+
+
+def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
+    """Where a particle is that does not go on, and when, if its contacts may last: kernels leave that there."""
+    left = 0.0 if state.contacts is None else state.contacts.left[particle]
+    place, found = state.position[:, particle], moment - left
+    wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
+    where = f"({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
+    return f"; it is at {where}" + (f" at {found:.9g} s" if left > 0.0 else "")
 
 
 def _failed(moment: float) -> str:

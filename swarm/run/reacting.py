@@ -32,9 +32,13 @@ _FAR = 100.0
 _NEVER = 2**62
 # Fewer particles than this are predicted sooner than another thread is awake.
 _FEW = 4096
+# So many are predicted at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the next.
+_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
 # The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
 # many events a particle, and too wide where they last longer than that many.
 _WIDTH, _TOO_SHORT, _TOO_LONG = 0.1, 4.0, 32.0
+# Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
+_ALL_AHEAD = -1.0
 
 
 class ReactingRun:
@@ -98,21 +102,16 @@ class ReactingRun:
         began = time.perf_counter()
         if not self._cut_short:
             self._clock[NOW] = 0.0
-            self._predict(rule)
-        taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
-        status, particle = int(Status.LEASE_ENDED), 0
-        while status == Status.LEASE_ENDED:
-            status, particle = result_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest, self.halt)
-            if status == Status.LEASE_ENDED:
-                self._fit_leases()
-                self._predict(rule)
+            self._clock[TAKEN] = _ALL_AHEAD
+        status, particle = self._take(rule, latest)
         self._tier.left -= time.perf_counter() - began
         self._halt[0] = _NEVER
         self._cut_short = status == Status.INTERRUPTED
         if status == Status.STALLED:
             raise RunError(self._stalled(particle, moment - span))
         if not self._cut_short:
-            self._in_parts(events.arrive, self._scenery, self._queue, rule)
+            arriving: Any = self._scenery, self._queue, rule
+            self._in_parts(events.arrive, *arriving, first=0, last=len(self.state.mass), latest=math.inf)
             self._tier.kernel(events.settle)(self._scenery, self._freedoms, span)
             self._freedoms.time.fill(0.0)
             self._clock[events.BEFORE] += span
@@ -120,10 +119,37 @@ class ReactingRun:
             self._observe(moment)
         return not self._cut_short
 
-    def _predict(self, rule: Rule) -> None:
-        """New leases, and what is next for every particle."""
-        self._tier.kernel(events.lease)(self._scenery, self._freedoms, self._clock)
-        self._in_parts(events.predict, self._scenery, self._freedoms, self._queue, self._clock, rule)
+    def _take(self, rule: Rule, latest: float) -> tuple[int, int]:
+        """Predict where leases have ended, and take events, to the end of the frame or a halt: (status, particle)."""
+        taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
+        leases = 0
+        while self._predict(rule, latest) and leases < self._halt[0]:
+            leases += 1
+            status, particle = result_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest, self.halt)
+            if status != Status.LEASE_ENDED:
+                return status, particle
+            self._fit_leases()
+            self._clock[TAKEN] = _ALL_AHEAD
+        return int(Status.INTERRUPTED), 0
+
+    def _predict(self, rule: Rule, latest: float) -> bool:
+        """Where leases have ended new ones, and what is next for every particle; False where a halt came between.
+
+        The clock keeps how many are done: what is left is done when the frame goes on.
+        """
+        n, plain = len(self.state.mass), self._tier.is_plain
+        size = _AT_ONCE_PLAIN if plain else _AT_ONCE
+        while self._clock[TAKEN] < 0.0:
+            if self._halt[0] == 0:
+                return False
+            first = int(_ALL_AHEAD - self._clock[TAKEN])
+            last = min(first + size, n)
+            if first == 0:
+                self._tier.kernel(events.lease)(self._scenery, self._freedoms, self._clock)
+            moving: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
+            self._in_parts(events.predict, *moving, first=first, last=last, latest=latest)
+            self._clock[TAKEN] = 0.0 if last == n else _ALL_AHEAD - last
+        return True
 
     def _fit_leases(self) -> None:
         """Wider leases where they ended soon, narrower ones where they lasted long."""
@@ -134,15 +160,14 @@ class ReactingRun:
         elif a_particle > _TOO_LONG:
             width *= 0.5
 
-    def _in_parts(self, kernel: Any, *arguments: Any) -> None:
-        """Call a kernel for all particles, a part of them in each thread."""
-        n = len(self.state.mass)
+    def _in_parts(self, kernel: Any, *arguments: Any, first: int, last: int, latest: float) -> None:
+        """Call a kernel for the particles from `first` to before `last`, a part of them in each thread."""
         threads = 1 if self._tier.is_plain else self._threads
-        ends = np.linspace(0, n, threads + 1).astype(int).tolist()
+        ends = np.linspace(first, last, threads + 1).astype(int).tolist()
         chosen = self._tier.kernel(kernel)
         parts = [self._pool.submit(chosen, *arguments, *part) for part in itertools.pairwise(ends)]
         for part in parts:
-            part.result()
+            result_of(part, latest, self.halt)
 
     def _stalled(self, particle: int, before: float) -> str:
         place = self.state.position[:, particle]

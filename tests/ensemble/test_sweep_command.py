@@ -60,3 +60,13 @@ def test_runs_that_the_file_no_longer_has_are_named(failed, capsys):
     assert "also holds 1 run that" in told.err
     assert "0123456789ab.h5" in told.err
     assert told.out == ""
+
+
+def test_the_wall_time_has_an_exit_code_of_its_own(tmp_path, capsys):
+    """75, "try again" of sysexits.h, by which a chain of jobs knows that another one is needed."""
+    path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
+    path.write_text(path.read_text().replace("every = 0.5\n", ""))
+    with pytest.raises(typer.Exit) as end:
+        sweep(path, tmp_path / "out", processes=1, quiet=True, walltime="0.000000001s")
+    assert end.value.exit_code == 75
+    assert "the wall time limit is reached: 2 runs are left; resume with" in capsys.readouterr().err

@@ -1,0 +1,56 @@
+"""The turns that particles take from kernel to kernel of a frame, and those in which no time passes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.events import ARRIVED, FLYING
+from ..lanes.arrays import Draws, Halted
+from ..particles import Contacts
+from ..status import Status
+from .watch import Watch
+
+# So often a particle may go from one kernel to another without time passing. A wedge, a cusp and a chatter stay in the
+# kernel of flights; ordinary contacts take two or three such turns.
+MOST = 1000
+# The turn in which they are looked at first: few frames have so many.
+_FIRST = 10
+# (status, particle, what a halt left in the lanes)
+End = tuple[int, int, Halted | None]
+
+
+class Turns:
+    """How often the kernels of a thread have been called in turn for the particles that it has drawn."""
+
+    def __init__(self, phase: NDArray[np.int8], contacts: Contacts | None, draws: Draws, drawn: int) -> None:
+        self._phase, self._contacts, self._draws, self._drawn = phase, contacts, draws, drawn
+        self._count = 0
+        self._particles, self._left = np.empty(0, np.int64), np.empty(0)
+
+    def end(self, watch: Watch) -> End | None:
+        """How the turns end before the next one: by a halt, or by a particle for which no time passes; or None.
+
+        Each turn of few passes asks for the halt, since many of them are passes too.
+        """
+        if watch.is_over(self._count):
+            return int(Status.INTERRUPTED), 0, None
+        self._count += 1
+        if self._count % MOST == _FIRST and (still := self._still()).size:
+            return int(Status.TIMELESS), int(still.min()), None
+        return None
+
+    def _still(self) -> NDArray[np.int64]:
+        """The particles for which no time has passed since this was asked last, in `MOST` turns.
+
+        In each turn every particle that has not arrived goes from one kernel to another. So nothing in a kernel counts
+        that, and no number of a particle.
+        """
+        assert self._contacts is not None
+        size, drawn = self._draws.size, self._draws.mine[: self._drawn]
+        mine: NDArray[np.int64] = np.add.outer(drawn * size, np.arange(size)).ravel()
+        mine = mine[mine < len(self._phase)]
+        mine = mine[(self._phase[mine] != FLYING) & (self._phase[mine] != ARRIVED)]
+        left = self._contacts.left[mine]
+        _both, now, then = np.intersect1d(mine, self._particles, return_indices=True)
+        still: NDArray[np.int64] = mine[now[left[now] == self._left[then]]]
+        self._particles, self._left = mine, left
+        return still

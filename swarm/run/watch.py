@@ -1,0 +1,71 @@
+"""When the kernels of a frame return: what they ask, who has asked for it, and what the caller's thread may compute."""
+
+import math
+import time
+
+import numpy as np
+
+from ..lanes.block import NEVER
+
+# Passes of the caller's thread in its first frame, after which it is free again. Then their number is doubled as long
+# as they take less than the second time [s], and halved where they take more than the first: they end in 0.1 s or so,
+# whatever a pass costs, and a short frame never meets them.
+_PASSES, _LONG, _SHORT = 16, 0.05, 0.025
+
+
+class Watch:
+    """The halt of the kernels of a frame.
+
+    Python hands a signal to the main thread alone, between two of its instructions. So a thread that may be this one
+    computes for a few passes only, without anybody to halt it, and then leaves the frame to others and watches them.
+    (Rejected: a thread that halts it in time, which is told of no signal, but by a descriptor that belongs to asyncio.)
+
+    Attributes:
+        passes: (1,) what kernels ask: after so many passes they return.
+    """
+
+    def __init__(self) -> None:
+        self.passes = np.full(1, NEVER)
+        self._asked, self._alone, self._latest = NEVER, _PASSES, math.inf
+
+    def halt(self, passes: int = 0) -> None:
+        """Make every kernel call of this frame return after so many passes.
+
+        Of two halts the sooner one counts, also if a signal or another thread sets the second at the same time: NumPy
+        compares and writes without releasing the interpreter's lock.
+        """
+        self._asked = min(self._asked, passes)
+        np.minimum(self.passes, passes, out=self.passes)
+
+    def begin(self, latest: float, helps: bool) -> None:
+        """Kernels begin, halted at the time `latest` [s of time.monotonic]; `helps`: the caller's thread computes."""
+        self._latest = latest
+        self._reset()
+        if helps:
+            np.minimum(self.passes, self._alone, out=self.passes)
+
+    def is_over(self, turns: int) -> bool:
+        """Whether a thread that has called kernels so often ends: many calls of a few passes each are passes too."""
+        if time.monotonic() >= self._latest:
+            self.halt()
+        return bool(turns >= self.passes[0])
+
+    def is_freed(self, seconds: float) -> bool:
+        """Whether kernels have returned after so many seconds only since the caller's thread is to be free."""
+        if self._asked <= self._alone:
+            return False
+        if seconds < _SHORT:
+            self._alone *= 2
+        elif seconds > _LONG:
+            self._alone = max(1, self._alone // 2)
+        return True
+
+    def end(self) -> None:
+        """The frame is done, or cut short."""
+        self._asked = NEVER
+        self._reset()
+
+    def _reset(self) -> None:
+        """Halted as was asked, also by a signal that comes just now."""
+        self.passes[0] = NEVER
+        np.minimum(self.passes, self._asked, out=self.passes)

@@ -1,0 +1,318 @@
+"""Nothing hangs: what gets nowhere ends with a sentence, and the wall time, SIGINT and SIGTERM end any run.
+
+Runs without end are made by force: in plain Python steps of kernels are replaced by ones that let no time pass, and for
+compiled ones a kernel is. So they stay without end when scenes that were are mended.
+"""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.contact.events import CAREFUL, EVENT
+from swarm.lanes import block, meet, slide
+from swarm.reacting import queue
+from swarm.run import reacting, turns
+from swarm.run.admission import task_of
+from swarm.run.engine import Run
+from swarm.run.options import RunOptions
+from swarm.run.runs import run_of
+from swarm.run.watch import Watch
+
+FLOOR = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], (0.0, 0.0, -9.81))
+# The first flies, and does not come back; the second slides.
+TWO = swarm.Particles([[0.0, 0.2], [0.0, 0.0], [1.0, 0.0]], [[1.0, 1.0], [0.0, 0.0], [50.0, 0.0]])
+NOWHERE = "no time passes; .*it is an error of swarm: please report it with the scene"
+
+
+def in_turn(method, chain, gravity, share, i):
+    """From one kernel to the next, and no time passes."""
+    following = EVENT if share.phase[i] == CAREFUL else CAREFUL
+    share.phase[i] = following
+    share.pending[following] += 1
+    return True
+
+
+def run_in_plain_python(scene, start, **options):
+    return swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never", threads=1, **options)
+
+
+# --- What gets nowhere -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("every", [None, 0.05])
+def test_turns_between_kernels_without_time_are_bounded(monkeypatch, every):
+    """A sentence with particle, wall and time, in long frames and in short ones, which the caller's thread computes."""
+    turned = []
+
+    def decide(*about):
+        turned.append(about[-1])
+        return in_turn(*about)
+
+    monkeypatch.setattr(meet, "_decide", decide)
+    monkeypatch.setattr(meet, "_step", in_turn)
+    monkeypatch.setattr(meet, "return_particle", lambda *about: None)
+    where = r"at \(0\.2, 0, 0\) m, at surfaces\[0\] \(Plane\) at 0(\.\d+|e-\d+)? s"
+    with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is {where}"):
+        run_in_plain_python(FLOOR, TWO, **({} if every is None else {"every": every}))
+    assert 1000 <= 2 * len(turned) <= 3 * turns.MOST
+
+
+def test_a_flight_that_gets_nowhere_is_bounded(monkeypatch):
+    passes = []
+
+    def nothing(*about):
+        passes.append(1)
+        return False, False
+
+    monkeypatch.setattr(block, "_pass", nothing)
+    with pytest.raises(swarm.RunError, match=rf"failed at particle 0: .*{NOWHERE}; it is at \(0, 0, 1\) m.* at 0 s"):
+        run_in_plain_python(FLOOR, TWO)
+    assert len(passes) <= 2 * block.LOOK
+
+
+def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
+    """Also one whose time passes by a hair a step: a crossing would take 1e9 steps."""
+    passes = []
+
+    def creep(kind, method, chain, gravity, lanes, live):
+        passes.append(1)
+        lanes.rows[slide.LEFT, 0] -= 1e-15
+        lanes.event[0] = 0
+
+    for name, instead in (("compose", creep), ("end_steps", lambda *about: None), ("account", lambda *about: None)):
+        monkeypatch.setattr(slide, name, instead)
+    with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is at \(0\.2, 0, 0\) m"):
+        run_in_plain_python(FLOOR, TWO)
+    assert len(passes) <= 2 * slide.LOOK
+
+
+def test_impacts_without_time_between_them_are_no_standstill():
+    """The tip of a wedge: 3141 impacts, most of them sooner after another than the time can tell."""
+    angle, tip = 1e-3, 1e-14
+    walls = [swarm.Plane((0.0, -1.0, 0.0), 0.0), swarm.Plane((-np.sin(angle), np.cos(angle), 0.0), 0.0)]
+    start = swarm.Particles((1.0, 0.5 * angle, 0.0), (-1.0, -0.5 * angle + tip, 0.0))
+    result = swarm.simulate(swarm.Scene(walls), start, swarm.Impact(), until=4.0, compile="never")
+    assert result.observables["impacts"][-1] == pytest.approx(np.pi / angle, abs=2.0)
+    assert result.particles.velocity[0, 0] == pytest.approx(1.0, rel=1e-6)
+
+
+# --- What ends any run -----------------------------------------------------------------------------------
+
+# The wall time is over, or a signal comes, at the 50th call of `note`.
+ENDS = """
+import os, signal, sys, time
+import swarm
+signal.signal(signal.SIGINT, signal.default_int_handler)
+real_time, count, ends = time.monotonic, 0, ""
+
+def note():
+    global count
+    count += 1
+    if count == 50 and ends == "walltime":
+        time.monotonic = lambda: real_time() + 1e6
+    elif count == 50:
+        os.kill(os.getpid(), getattr(signal, ends))
+
+def report(scene, start, method, **options):
+    global count, ends
+    for ends in ("walltime", "SIGINT", "SIGTERM"):
+        count, time.monotonic = 0, real_time
+        try:
+            swarm.simulate(scene, start, method, walltime=1e4, threads=1, **options)
+        except (KeyboardInterrupt, swarm.WallTimeError) as stop:
+            print(type(stop).__name__, count >= 50)
+"""
+ALL_END = "WallTimeError True\nKeyboardInterrupt True\nKeyboardInterrupt True\n"
+# Turns between kernels without end.
+IN_TURN = """
+from swarm.contact.events import CAREFUL, EVENT
+from swarm.lanes import meet
+from swarm.run import turns
+turns.MOST = 10**12
+
+def again(method, chain, gravity, share):
+    note()
+    share.pending[EVENT] += 1
+    return 0, 0, 0
+
+def in_turn(method, chain, gravity, share, i):
+    note()
+    following = EVENT if share.phase[i] == CAREFUL else CAREFUL
+    share.phase[i] = following
+    share.pending[following] += 1
+    return True
+
+tier, every = {tier!r}, {every!r}
+if tier == "always":
+    meet.meet_block = again  # of all kernels only this one is not compiled
+else:
+    meet._decide = meet._step = in_turn
+    meet.return_particle = lambda *about: None
+# It chatters for 0.04 s first.
+scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5)], (0.0, 0.0, -9.81))
+start = swarm.Particles([0.0, 0.0, 1e-3], [1.0, 0.0, 0.0])
+report(scene, start, swarm.Impact(), until=1.0, every=every, compile=tier)
+"""
+
+
+def assert_all_end(script):
+    """Nothing but the test itself ends what does not end."""
+    done = subprocess.run(
+        [sys.executable, "-c", ENDS + script], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.stdout == ALL_END, done.stderr
+
+
+@pytest.mark.parametrize(("tier", "every"), [("never", 1.0), ("never", 1e-3), ("always", 1e-3)])
+def test_turns_without_end_are_ended(tier, every):
+    """In long frames, and in short ones, which the caller's thread computes: nobody watches it."""
+    assert_all_end(IN_TURN.format(tier=tier, every=every))
+
+
+def test_a_frame_that_becomes_long_frees_the_callers_thread():
+    """It was short until now, so this thread computes it: 1e10 impacts. After a few passes another does."""
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    with Run(scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), 1, None, "always") as run:
+        for _ in range(3):
+            assert run.advance(1e-3, 1e-3)
+        run._pace = 0.0
+        assert not run.advance(1e9, 1e9, 0.0, time.monotonic() + 0.1)
+        assert run._cut_short
+
+
+def test_a_frame_in_two_threads_has_the_same_bits():
+    """Wherever the caller's thread leaves it: after any number of passes."""
+    scene = swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -9.81))
+    start, ends = swarm.fill(scene, 30, speed=1.0, seed=1), set()
+    for alone in (0, 1, 3, 10**6):
+        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+            for moment in (0.5, 1.0, 1.5):
+                run._pace, run._watch._alone = 0.0 if alone else np.inf, alone
+                assert run.advance(0.5, moment)
+            ends.add((run.state.position.tobytes(), run.state.velocity.tobytes(), run.state.impacts.tobytes()))
+    assert len(ends) == 1
+
+
+def test_a_signal_is_not_lost_when_the_callers_thread_is_freed():
+    """Whenever it comes: before, between and after what is done to free it."""
+    watch = Watch()
+    watch.begin(np.inf, helps=True)
+    assert watch.passes[0] > 0
+    assert watch.is_freed(0.0)
+    watch.halt()
+    watch.begin(np.inf, helps=False)
+    assert watch.passes[0] == 0
+    watch.end()
+    watch.begin(np.inf, helps=True)
+    watch.halt()
+    assert not watch.is_freed(0.0)
+
+
+# Walls that close on a particle with short frames: 1e7 impacts, minutes in plain Python, in the caller's thread.
+CLOSING = """
+from swarm.lanes import block
+real_pass = block._pass
+def noted(*about):
+    if about[3].moment > 0.1:
+        note()
+    return real_pass(*about)
+block._pass = noted
+walls = [
+    swarm.Plane((0.0, 0.0, -1.0), 0.0),
+    swarm.Plane((0.0, 0.0, 1.0), 0.1, motion=swarm.Translation((0.0, 0.0, -1.0))),
+]
+scene, start = swarm.Scene(walls), swarm.Particles([0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
+report(scene, start, swarm.Impact(), until=0.2, every=0.04, compile="never")
+"""
+# An inelastic collapse of a wall on a particle.
+COLLAPSE = """
+from swarm.reacting import queue
+queue.MOST_HITS, real = 10**15, queue._carry_out
+def noted(*about):
+    note()
+    return real(*about)
+queue._carry_out = noted
+plate = swarm.Plane((0.0, 0.0, 1.0), 1.0, mass=100.0, restitution=0.5, motion=swarm.Translation((0.0, 0.0, -1.0)))
+scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5), plate])
+report(scene, swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01), swarm.Impact(), until=1e9, compile="never")
+"""
+# Leases that end at once.
+LEASES = """
+from swarm.reacting import queue
+real = queue.take.py_func
+def take(*about):
+    note()
+    return 8, 0
+queue.take = take
+plate = swarm.Plane((0.0, 0.0, 1.0), 1.0, mass=100.0)
+scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0), plate])
+report(scene, swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01), swarm.Impact(), until=1e9, compile="never")
+"""
+CHAIN = """
+from swarm.lanes.tied import advance
+real = advance._judge
+def noted(*about):
+    note()
+    return real(*about)
+advance._judge = noted
+scene = swarm.Scene([swarm.Sphere(0.5)])
+start = swarm.place(scene, swarm.chain(3, 0.9, 1.0), 1, speed=1.0, seed=1)
+report(scene, start, swarm.Impact(dt=1e-2), until=1e9, compile="never")
+"""
+
+
+@pytest.mark.parametrize("script", [CLOSING, COLLAPSE, LEASES, CHAIN], ids=["closing", "collapse", "leases", "chain"])
+def test_what_does_not_end_is_ended(script):
+    """Also walls that react, and bodies."""
+    assert_all_end(script)
+
+
+def test_a_collapse_on_a_wall_that_reacts_is_bounded():
+    """Without gravity a wall and a particle that lose energy meet ever sooner: at one instant for ever."""
+    plate = swarm.Plane((0.0, 0.0, 1.0), 1.0, mass=100.0, restitution=0.5, motion=swarm.Translation((0.0, 0.0, -1.0)))
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5), plate])
+    start = swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01)
+    task = task_of(scene, start, swarm.Impact(), RunOptions(until=5.0, compile="never"))
+    with (
+        run_of(task) as run,
+        pytest.raises(swarm.RunError, match=r"particle 0: the particle meets its walls without end"),
+    ):
+        run.advance(5.0, 5.0)
+    assert run.state.impacts[0] < 1.1 * queue.MOST_HITS / queue.AT_ONCE
+
+
+def test_predictions_that_are_halted_have_the_same_bits(monkeypatch):
+    """After any number of particles, also taken over by another run."""
+    monkeypatch.setattr(reacting, "_AT_ONCE_PLAIN", 3)
+    plate = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=1.0)
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 1.0)), plate])
+    start = swarm.fill(scene, 20, speed=1.0, seed=1)
+    task = task_of(scene, start, swarm.Impact(), RunOptions(until=2.0, compile="never"))
+    with run_of(task) as run:
+        run.observe()
+        assert run.advance(2.0, 2.0)
+        whole = {name: array.copy() for name, array in run.arrays().items()}
+    run, calls = run_of(task_of(scene, start, swarm.Impact(), RunOptions(until=2.0, compile="never"))), 0
+    run.observe()
+    predict = run._in_parts
+
+    def halted(*about, **which):
+        nonlocal calls
+        calls += 1
+        predict(*about, **which)
+        if calls < 12:
+            run.halt()
+
+    run._in_parts = halted
+    while not run.advance(2.0, 2.0):
+        other = run_of(task_of(scene, start, swarm.Impact(), RunOptions(until=2.0, compile="never")))
+        other.restore(run.arrays(), cut_short=True)
+        predict = other._in_parts
+        other._in_parts, run = halted, other
+    assert calls > 12
+    for name, array in run.arrays().items():
+        assert array.tobytes() == whole[name].tobytes(), name
