@@ -8,7 +8,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -50,29 +50,30 @@ def sources() -> list[Path]:
     return sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place]))
 
 
-def _base() -> Path:
+def base() -> Path:
+    """Folder of all that is kept between processes: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm")
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then a digest of their code.
+    """Folder of the compiled kernels: that of all that is kept, then a digest of their code.
 
     Numba's cache looks at the file of the compiled function only, so after an edit in another file it would return
     the old code.
     """
     texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
     # Parsing all files takes 0.3 s, so the result is kept under a digest of their bytes.
-    known = _base() / "sources" / _digest(texts)
+    known = base() / "sources" / _digest(texts)
     with contextlib.suppress(OSError):
-        return _base() / known.read_text()
+        return base() / known.read_text()
     code = _digest([(name, _code(text)) for name, text in texts])
     with contextlib.suppress(OSError):
         known.parent.mkdir(parents=True, exist_ok=True)
         part = known.with_suffix(f".{os.getpid()}")
         part.write_text(code)
         part.replace(known)
-    return _base() / code
+    return base() / code
 
 
 def _digest(texts: list[tuple[bytes, bytes]]) -> str:
@@ -190,6 +191,13 @@ def _digests(kinds: Any) -> Iterator[str]:
 def in_python(kernel: Any) -> Any:
     """The function that a kernel is compiled from."""
     return getattr(kernel, "py_func", kernel)
+
+
+def kind(kernel: Any, arguments: tuple[Any, ...]) -> Hashable:
+    """What a kernel is compiled for, whatever its code: its name, and the types of its arguments with their code."""
+    kinds = tuple(map(numba.typeof, arguments))
+    function = in_python(kernel)
+    return function.__module__, function.__qualname__, kinds, tuple(_digests(kinds))
 
 
 def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:

@@ -106,7 +106,7 @@ class ReactingRun:
             if status == Status.LEASE_ENDED:
                 self._fit_leases()
                 self._predict(rule)
-        self._tier.left -= time.perf_counter() - began
+        self._tier.spend(time.perf_counter() - began)
         self._halt[0] = _NEVER
         self._cut_short = status == Status.INTERRUPTED
         if status == Status.STALLED:
