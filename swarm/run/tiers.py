@@ -5,7 +5,7 @@ Plain Python takes 30 to 150 us an impact, the compiler 3 to 10 s for a new kind
 
 import math
 import time
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ class Tier:
         # Time left for plain Python [s].
         self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
         self.is_plain = self.left > 0.0
-        self._missing: list[Hashable] = []
+        self._missing: list[str] = []
         self._latest = time.monotonic() + _LONGEST_COMPILATION if self.is_plain else -math.inf
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
