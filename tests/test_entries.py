@@ -104,6 +104,49 @@ def test_a_definition_of_an_object_that_is_not_known_is_never_found():
     assert key(made) != key(made)
 
 
+@jit.by_type
+def of_the_user(thing):
+    return 0.0
+
+
+def test_a_family_of_the_user_counts_for_its_callers_alone():
+    before, kinds = key(cell()["Mine"]), [numba.typeof((Gravity(0.0, 0.0, 1.0), None, 1.0))]
+    others = key_of(kinds).text, key_of(kinds, of_the_user).text
+    for one in (Gravity, type(None), float):
+        of_the_user.register(one, lambda thing: 1.0)
+    assert key(cell()["Mine"]) == before
+    assert key_of(kinds).text == others[0]
+    assert key_of(kinds, of_the_user).text != others[1]
+
+
+def shifted(x):
+    return x + 1.0
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+helper = shifted
+
+
+def with_a_helper(x):
+    return helper(x)
+
+
+@compiled_only
+def test_a_kernel_of_the_users_with_another_helper_is_compiled(tmp_path, monkeypatch):
+    """Numba looks at the file of the kernel alone."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    found = []
+    for one, value in ((shifted, 4.0), (shifted, 4.0), (doubled, 6.0)):
+        monkeypatch.setitem(globals(), "helper", jit.inlined(one))
+        kernel = jit.kernel(with_a_helper)
+        assert kernel(3.0) == value
+        found.append(sum(kernel.stats.cache_hits.values()))
+    assert found == [0, 1, 0]
+
+
 # --- With Numba ------------------------------------------------------------------------------------------
 
 
@@ -127,7 +170,8 @@ def test_a_cell_that_is_run_again_compiles_nothing(tmp_path, monkeypatch):
 SCRIPT = """
 from swarm.kernel.vector import Vec
 from swarm.surfaces.formulas.own import _compiled_phi
-print([_compiled_phi(surface, Vec(1.0, 0.0, 0.0)) for surface in surfaces], sum(_compiled_phi.stats.cache_hits.values()))
+values = [_compiled_phi(surface, Vec(1.0, 0.0, 0.0)) for surface in surfaces]
+print(values, sum(_compiled_phi.stats.cache_hits.values()))
 """
 
 

@@ -103,7 +103,7 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
         _CONFIG.CACHE_DIR = previous
     disk = made._cache
     name, stamp = disk._impl.filename_base, disk._impl.locator.get_source_stamp()
-    if function.__module__.partition(".")[0] == __name__.partition(".")[0]:
+    if _is_own(function):
         # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
         # every comment.
         name, stamp = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}", ""
@@ -115,11 +115,16 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     return made
 
 
+def _is_own(function: Callable[..., Any]) -> bool:
+    return function.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """A kernel of a class that code outside of this package has defined is found only if that code is unchanged."""
+    """A kernel that has code from outside of this package is found only if that code is unchanged."""
 
     def _index_key(self, kinds: Any, codegen: Any) -> Key:
-        return key_of(kinds, *super()._index_key((), codegen))
+        outside = () if _is_own(self._py_func) else (self._py_func,)
+        return key_of(kinds, *super()._index_key((), codegen), *outside)
 
     def save_overload(self, kinds: Any, made: Any) -> None:
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.

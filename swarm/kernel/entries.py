@@ -27,12 +27,12 @@ class Key(NamedTuple):
 
 
 def key_of(kinds: Sequence[Any], *others: Any) -> Key:
-    """The key of Numba types, and of what else tells two kernels apart.
+    """The key of Numba types, and of what else tells two kernels apart: plain values and functions.
 
-    It never repeats where what is defined for a class refers to what is not known, see `Frozen`.
+    It never repeats where a function, or what is defined for a class, refers to what is not known, see `Frozen`.
     """
     frozen, classes = Frozen(), dict[type, None]()
-    frozen.add(*others)
+    frozen.value(others)
     for kind in kinds:
         _add(kind, frozen, classes)
     return Key(frozen.digest(), tuple(classes))

@@ -33,8 +33,11 @@ _outside: dict[type, list[tuple[str, Function]]] = {}
 
 
 def registered(family: Function, made: Any, definition: Function) -> None:
-    """Record a definition for a class: the cache folder is named by the code of this package alone."""
-    if _root(definition) != "swarm":
+    """Record a definition for a class: the cache folder is named by the code of this package alone.
+
+    Of a family that is not of this package it is known to who calls it, and no other kernel has it.
+    """
+    if _root(family) == "swarm" != _root(definition):
         _outside.setdefault(made, []).append((f"{family.__module__}.{family.__qualname__}", definition))
 
 
