@@ -167,6 +167,18 @@ def test_a_cell_that_is_run_again_compiles_nothing(tmp_path, monkeypatch):
     assert found == [0, 1, 0, 1]
 
 
+@compiled_only
+def test_what_is_never_found_is_not_written(tmp_path, monkeypatch):
+    """Each start would add a file."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    scope = cell("FACTOR * x", "family(x) * x")
+    scope["family"] = jit.by_type(lambda thing: 2.0)
+    kernel, surface = jit.kernel(phi_of), scope["Mine"](0.5)
+    assert kernel(surface, Vec(1.0, 0.0, 0.0)) == 1.5
+    assert cache.is_compiled(kernel, (surface, Vec(1.0, 0.0, 0.0)))
+    assert not list(tmp_path.rglob("*.nb?"))
+
+
 SCRIPT = """
 from swarm.kernel.vector import Vec
 from swarm.surfaces.formulas.own import _compiled_phi

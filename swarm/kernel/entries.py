@@ -20,10 +20,11 @@ from .frozen import Frozen
 
 
 class Key(NamedTuple):
-    """A text for the types of arguments, and the classes of tuples in them, in its order."""
+    """A text for the types of arguments, the classes of tuples in them, in its order, and whether it comes again."""
 
     text: str
     classes: tuple[type, ...]
+    repeats: bool
 
 
 def key_of(kinds: Sequence[Any], *others: Any) -> Key:
@@ -35,7 +36,7 @@ def key_of(kinds: Sequence[Any], *others: Any) -> Key:
     frozen.value(others)
     for kind in kinds:
         _add(kind, frozen, classes)
-    return Key(frozen.digest(), tuple(classes))
+    return Key(frozen.digest(), tuple(classes), frozen.is_known)
 
 
 def _add(kind: Any, frozen: Frozen, classes: dict[type, None]) -> None:
@@ -63,7 +64,9 @@ class File(IndexDataCacheFile):  # type: ignore[misc]
     """The index and the kernels of one function, by `Key`."""
 
     def save(self, key: Key, data: Any) -> None:
-        """Write a kernel."""
+        """Write a kernel that can be found again."""
+        if not key.repeats:
+            return
         written = io.BytesIO()
         _Writer(written, key.classes).dump(data)
         super().save(key.text, written.getvalue())

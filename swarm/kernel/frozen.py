@@ -53,6 +53,7 @@ class Frozen:
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
         self._classes: list[type] = []
+        self.is_known = True
 
     def digest(self) -> str:
         """16 hexadecimal digits of what was frozen so far."""
@@ -111,6 +112,7 @@ class Frozen:
         else:
             # Nothing is known about it: a digest that never repeats.
             self.add("unknown", os.urandom(16))
+            self.is_known = False
         return value
 
     def _class(self, made: type) -> None:
