@@ -33,7 +33,7 @@ from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.room import has_room
 from .surfaces.surface import UNBOUNDED, Box, Surface
 
-# Most walls that kernels can be compiled for: 24 with `contact_step` take three minutes, 28 fail.
+# Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
 # Points whose gaps are found at once.
 _BATCH = 4096
@@ -131,7 +131,7 @@ class Scene:
         if walls > MOST_WALLS:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
-                "surfaces: each wall is compiled into the kernels, and with more the compiler runs out of stack; "
+                "surfaces: each wall is compiled into the kernels, which takes minutes with so many; "
                 "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one "
                 "kind, of which any number is one field for Impact where nothing moves, and as Spheres and the like "
                 "always"

@@ -129,6 +129,21 @@ def test_a_kernel_of_an_edited_surface_is_never_an_old_one(tmp_path):
     assert run() == (0.3, 1)
 
 
+@pytest.mark.physics
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
+@pytest.mark.parametrize("file", [FILE, METHOD], ids=lambda file: file.name)
+def test_the_second_start_compiles_nothing(file, tmp_path):
+    """Nor does it write a kernel anew."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    written = []
+    for _ in range(2):
+        done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[-3000:]
+        written.append({path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")})
+    assert written[0] == written[1]
+    assert any("advance_block" in path.name for path in written[0])
+
+
 def lines_of(file):
     """Lines of a file without docstrings and blank ones."""
     text = file.read_text()

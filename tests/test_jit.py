@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import types
 from pathlib import Path
 from typing import NamedTuple
@@ -18,8 +19,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import LAWS, METHODS, call, every_surface, numbers_of, scene_of
+from conftest import LAWS, METHODS, call, every_surface, numbers_of, rarely, scene_of
 from numba.core.codegen import JITCodeLibrary
+from numba.core.errors import TypingError
 
 import swarm
 from swarm.contact import regularisation
@@ -27,8 +29,10 @@ from swarm.kernel import cache
 from swarm.kernel import jit as _jit
 from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
 from swarm.kernel.jit import kept, select
+from swarm.kernel.parts import _DEEPEST, deep
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.run.engine import Run
+from swarm.scene import MOST_WALLS
 from swarm.surfaces import contract, flights
 from swarm.surfaces import fold as chain
 
@@ -319,6 +323,103 @@ def test_a_helper_may_call_python(monkeypatch, tmp_path):
     """Numba looks for the objects of a helper beside its machine code, which it has in the kernel only."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     assert _jit.kernel(calls_python)(1.0) == 2.0
+
+
+# --- How deep a kernel may be ------------------------------------------------------------------------------
+
+
+def in_all_directions(n, **laws):
+    """Planes in n random directions, 0.5 m away from the origin."""
+    normals = np.random.default_rng(0).normal(size=(n, 3))
+    return [swarm.Plane(tuple(normal), 0.5, **laws) for normal in normals]
+
+
+def takes_steps(walls, r):
+    return flights.in_steps(walls) is not None or chain.outside(walls, -1.0, r)
+
+
+@pytest.fixture
+def limit_of_a_script():
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(1000)
+    yield
+    assert sys.getrecursionlimit() == 1000
+    sys.setrecursionlimit(before)
+
+
+@compiled_only
+def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
+    """24 walls nest 1500 frames of the compiler; a script has 1000."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    walls = swarm.Scene(in_all_directions(MOST_WALLS)).chain()
+    assert not _jit.kernel(takes_steps)(walls, Vec(0.0, 0.0, 0.0))
+
+
+@compiled_only
+def test_a_compilation_that_fails_gives_the_limit_back(limit_of_a_script, monkeypatch, tmp_path):
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    with pytest.raises(TypingError):
+        _jit.kernel(cannot_be_compiled)(1.0)
+
+
+def cannot_be_compiled(x):
+    return x + "a"
+
+
+def test_the_limit_stays_until_the_last_thread_is_out(limit_of_a_script):
+    entered, may_leave, seen = threading.Event(), threading.Event(), []
+
+    def compile_slowly():
+        with deep():
+            entered.set()
+            may_leave.wait()
+
+    other = threading.Thread(target=compile_slowly)
+    with deep():
+        other.start()
+        entered.wait()
+        seen.append(sys.getrecursionlimit())
+    seen.append(sys.getrecursionlimit())
+    may_leave.set()
+    other.join()
+    seen.append(sys.getrecursionlimit())
+    assert seen == [_DEEPEST, _DEEPEST, 1000]
+    # One that is larger, or that is set meanwhile, is left alone.
+    for before, within in ((20_000, None), (1000, 5000)):
+        sys.setrecursionlimit(before)
+        with deep():
+            assert sys.getrecursionlimit() == max(before, _DEEPEST)
+            sys.setrecursionlimit(within or sys.getrecursionlimit())
+        assert sys.getrecursionlimit() == (within or before)
+    sys.setrecursionlimit(1000)
+
+
+MANY_PLANES = """
+import sys
+sys.path.insert(0, {tests!r})
+import swarm
+from test_jit import in_all_directions
+assert sys.getrecursionlimit() == 1000
+scene = swarm.Scene(in_all_directions(24, **{laws!r}), gravity={gravity!r})
+start = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.2, 0.4))
+ends = [swarm.simulate(scene, start, swarm.Impact(), until=2.0, compile=tier) for tier in ("always", "never")]
+assert ends[0].observables["impacts"][-1] == ends[1].observables["impacts"][-1] > 2
+assert (ends[0].particles.position == ends[1].particles.position).all()
+assert sys.getrecursionlimit() == 1000
+"""
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    ("laws", "gravity"),
+    [
+        pytest.param({}, None, marks=pytest.mark.physics, id="elastic"),  # 12 s
+        rarely({"friction": 0.3, "restitution": 0.5}, (0.3, -0.2, -9.81)),  # comes to rest in a corner: a minute
+    ],
+)
+def test_a_script_runs_in_the_most_walls(laws, gravity, tmp_path):
+    code = MANY_PLANES.format(tests=str(Path(__file__).parent), laws=laws, gravity=gravity)
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
 
 
 # --- The cache -------------------------------------------------------------------------------------------

@@ -163,6 +163,7 @@ def test_another_word_is_refused():
 
 @compiled_only
 def test_while_another_process_compiles_a_run_goes_on_in_plain_python(monkeypatch):
+    monkeypatch.setattr(cache, "kind", lambda *call: call)
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
     for waits in (True, False):
         monkeypatch.setattr(cache, "is_being_compiled", lambda *call, waits=waits: waits)

@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import types
 from numba.core import event, sigutils
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache
 
-from .frozen import Frozen
+from .entries import File, Key, key_of
 from .once import held, is_held
 
 _CONFIG: Any = numba.config
@@ -26,8 +25,6 @@ _LOCK = ".lock"
 _COMPILING = "compiling kernels for this scene, once: {}"
 _kernels: list[Any] = []
 _compiling = threading.local()
-# The definitions that code outside of this package has registered, by their class.
-_outside: dict[Any, list[Callable[..., Any]]] = {}
 
 _ROOT = Path(__file__).parents[1]
 # What kernels are made of: the functions and constants that they compile, and the types of their arguments.
@@ -50,29 +47,30 @@ def sources() -> list[Path]:
     return sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place]))
 
 
-def _base() -> Path:
+def base() -> Path:
+    """Folder of all that is kept between processes: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm")
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache, then a digest of their code.
+    """Folder of the compiled kernels: that of all that is kept, then a digest of their code.
 
     Numba's cache looks at the file of the compiled function only, so after an edit in another file it would return
     the old code.
     """
     texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
     # Parsing all files takes 0.3 s, so the result is kept under a digest of their bytes.
-    known = _base() / "sources" / _digest(texts)
+    known = base() / "sources" / _digest(texts)
     with contextlib.suppress(OSError):
-        return _base() / known.read_text()
+        return base() / known.read_text()
     code = _digest([(name, _code(text)) for name, text in texts])
     with contextlib.suppress(OSError):
         known.parent.mkdir(parents=True, exist_ok=True)
         part = known.with_suffix(f".{os.getpid()}")
         part.write_text(code)
         part.replace(known)
-    return _base() / code
+    return base() / code
 
 
 def _digest(texts: list[tuple[bytes, bytes]]) -> str:
@@ -103,12 +101,13 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
         made._cache = _Cache(function)
     finally:
         _CONFIG.CACHE_DIR = previous
-    if function.__module__.partition(".")[0] == __name__.partition(".")[0]:
+    disk = made._cache
+    name, stamp = disk._impl.filename_base, disk._impl.locator.get_source_stamp()
+    if _is_own(function):
         # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
         # every comment.
-        disk = made._cache
-        name = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}"
-        disk._cache_file = IndexDataCacheFile(cache_path=disk.cache_path, filename_base=name, source_stamp="")
+        name, stamp = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}", ""
+    disk._cache_file = File(disk.cache_path, name, stamp)
     # On the object: Numba's own code calls it from C and from other kernels, and a class of ours would have to be
     # registered as its target's.
     made.compile = functools.partial(_compile_once, made, made.compile)
@@ -116,17 +115,16 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     return made
 
 
-def registered(kind: Any, definition: Callable[..., Any]) -> None:
-    """Record a definition for a class: the folder is named by the code of this package alone."""
-    if str(definition.__module__).partition(".")[0] != "swarm":
-        _outside.setdefault(kind, []).append(definition)
+def _is_own(function: Callable[..., Any]) -> bool:
+    return function.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """A kernel of a class with such definitions is found only if they are unchanged."""
+    """A kernel that has code from outside of this package is found only if that code is unchanged."""
 
-    def _index_key(self, kinds: Any, codegen: Any) -> Any:
-        return (*super()._index_key(kinds, codegen), *_digests(kinds))
+    def _index_key(self, kinds: Any, codegen: Any) -> Key:
+        outside = () if _is_own(self._py_func) else (self._py_func,)
+        return key_of(kinds, *super()._index_key((), codegen), *outside)
 
     def save_overload(self, kinds: Any, made: Any) -> None:
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
@@ -156,14 +154,13 @@ def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) ->
             _compiling.one = False
 
 
-def _key_of(kernel: Any, kinds: Any) -> Any:
-    return kernel._cache._index_key(kinds, kernel.targetctx.codegen())
+def _key_of(kernel: Any, kinds: Any) -> str:
+    return str(kernel._cache._index_key(kinds, kernel.targetctx.codegen()).text)
 
 
 def _lock_of(kernel: Any, kinds: Any) -> Path:
     """The file that a process locks while it compiles a kernel for such arguments."""
-    digest = hashlib.sha256(repr(_key_of(kernel, kinds)).encode()).hexdigest()[:16]
-    return Path(f"{kernel._cache._cache_file._index_path}.{digest}{_LOCK}")
+    return Path(f"{kernel._cache._cache_file._index_path}.{_key_of(kernel, kinds)}{_LOCK}")
 
 
 def _is_found(kernel: Any, kinds: Any) -> bool:
@@ -176,20 +173,15 @@ def _is_found(kernel: Any, kinds: Any) -> bool:
     return name is not None and os.path.exists(file._data_path(name))
 
 
-def _digests(kinds: Any) -> Iterator[str]:
-    for kind in kinds:
-        if isinstance(kind, types.BaseTuple):
-            frozen = Frozen()
-            for parent in getattr(kind, "instance_class", tuple).__mro__:
-                for definition in _outside.get(parent, ()):
-                    frozen.value(definition)
-                    yield frozen.digest()
-            yield from _digests(kind.types)  # type: ignore[attr-defined]
-
-
 def in_python(kernel: Any) -> Any:
     """The function that a kernel is compiled from."""
     return getattr(kernel, "py_func", kernel)
+
+
+def kind(kernel: Any, arguments: tuple[Any, ...]) -> str:
+    """A name for what a kernel is compiled for, whatever its own code: the same in every process."""
+    function = in_python(kernel)
+    return key_of(tuple(map(numba.typeof, arguments)), function.__module__, function.__qualname__).text
 
 
 def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:

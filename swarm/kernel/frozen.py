@@ -1,4 +1,4 @@
-"""A user's function, frozen: a copy of it and of all it refers to, and a digest of them.
+"""A user's function, frozen: a copy of it and of all it refers to, and a digest of them; likewise a class.
 
 The copy is compiled, so what the cache has under a digest is the code that was digested: after an edit anywhere, or
 when a global changes, the digest differs.
@@ -26,6 +26,19 @@ _CODE = operator.attrgetter(
     "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
     "co_kwonlyargcount", "co_posonlyargcount",
 )  # fmt: skip
+# Other classes that functions are chosen by.
+_DISPATCHED = (type(None), float, object)
+# The definitions that code outside of this package has registered, by their class: each with the name of its family.
+_outside: dict[type, list[tuple[str, Function]]] = {}
+
+
+def registered(family: Function, made: Any, definition: Function) -> None:
+    """Record a definition for a class: the cache folder is named by the code of this package alone.
+
+    Of a family that is not of this package it is known to who calls it, and no other kernel has it.
+    """
+    if _root(family) == "swarm" != _root(definition):
+        _outside.setdefault(made, []).append((f"{family.__module__}.{family.__qualname__}", definition))
 
 
 class Frozen:
@@ -39,6 +52,8 @@ class Frozen:
         self._prepared = prepared
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
+        self._classes: list[type] = []
+        self.is_known = True
 
     def digest(self) -> str:
         """16 hexadecimal digits of what was frozen so far."""
@@ -49,7 +64,7 @@ class Frozen:
         function = getattr(function, "py_func", function)
         assert isinstance(function, types.FunctionType)
         if function in self._copies:
-            self._add("again", list(self._copies).index(function))
+            self.add("again", list(self._copies).index(function))
             return self._copies[function]
         code = function.__code__
         # Numba looks up the module of a function by this name when it loads a kernel.
@@ -58,10 +73,10 @@ class Frozen:
         copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
         for part in _parts(code):
             constants = [one for one in part.co_consts if not isinstance(one, types.CodeType)]
-            self._add(*_CODE(part))
-            self._add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
+            self.add(*_CODE(part))
+            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
         copy.__defaults__ = self.value(function.__defaults__)
-        self._add(*sorted((function.__kwdefaults__ or {}).items()))
+        self.add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
         for cell, original in zip(cells, function.__closure__ or (), strict=True):
             # A cell is empty while the name has no value: its use fails as in the original.
@@ -70,7 +85,7 @@ class Frozen:
         # co_names has the names of attributes too.
         instructions = (one for part in _parts(code) for one in dis.get_instructions(part))
         for name in sorted({one.argval for one in instructions if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}):
-            self._add("global", name)
+            self.add("global", name)
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name], code)
         return self._prepared(copy)
@@ -78,35 +93,52 @@ class Frozen:
     def value(self, value: Any, code: types.CodeType | None = None) -> Any:
         """A copy of what a function refers to; `code` says which of a module's names it takes."""
         if type(value) in _PLAIN or isinstance(value, np.generic):
-            self._add(type(value).__name__, value)
+            self.add(type(value).__name__, value)
         elif isinstance(value, tuple) and (type(value) is tuple or hasattr(value, "_fields")):
-            self._add(type(value).__name__, getattr(value, "_fields", None), len(value))
+            self.add(type(value).__name__, getattr(value, "_fields", None), len(value))
             parts = [self.value(part, code) for part in value]
             return tuple(parts) if type(value) is tuple else type(value)(*parts)
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
-            self._add("array", value.dtype.str, value.shape, value.strides, value.tobytes())
+            self.add("array", value.dtype.str, value.shape, value.strides, value.tobytes())
             return value.copy(order="K")
+        elif isinstance(value, type) and (issubclass(value, tuple) or value in _DISPATCHED):
+            self._class(value)
         elif _root(value) in _VERSIONS:
-            self._add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS[_root(value)])
+            self.add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS[_root(value)])
         elif isinstance(getattr(value, "py_func", value), types.FunctionType):
             return self.function(value)
         elif isinstance(value, types.ModuleType) and code is not None:
             return self._module(value, code)
         else:
             # Nothing is known about it: a digest that never repeats.
-            self._add("unknown", os.urandom(16))
+            self.add("unknown", os.urandom(16))
+            self.is_known = False
         return value
+
+    def _class(self, made: type) -> None:
+        """Of a class Numba takes the fields, and `by_type` what is defined for it and its parents."""
+        if made in self._classes:
+            return self.add("class again", self._classes.index(made))
+        self._classes.append(made)
+        for parent in made.__mro__:
+            self.add("class", parent.__module__, parent.__qualname__, getattr(parent, "_fields", None))
+            self.value(tuple(getattr(parent, "_field_defaults", {}).values()))
+            for family, definition in _outside.get(parent, ()):
+                self.add("definition", family)
+                self.value(definition)
+        return None
 
     def _module(self, module: types.ModuleType, code: types.CodeType) -> types.ModuleType:
         copy = types.ModuleType(module.__name__)
-        self._add("module", module.__name__)
+        self.add("module", module.__name__)
         for name in sorted({name for part in _parts(code) for name in part.co_names}):
             if hasattr(module, name):
-                self._add(name)
+                self.add(name)
                 setattr(copy, name, self.value(getattr(module, name), code))
         return copy
 
-    def _add(self, *parts: Any) -> None:
+    def add(self, *parts: Any) -> None:
+        """Add parts by what they print."""
         # The length of each, so that two parts are never taken for one.
         for part in parts:
             text = repr(part).encode()

@@ -24,6 +24,8 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
+from .entries import python_class
+from .frozen import registered
 from .parts import KernelCompiler, PartCompiler
 
 Array = NDArray[np.generic]
@@ -83,15 +85,6 @@ def inlined(function: F) -> F:
     return function
 
 
-def _python_class(kind: Any) -> Any:
-    """The Python class whose values the Numba type `kind` describes."""
-    if isinstance(kind, types.BaseNamedTuple):
-        return kind.instance_class  # type: ignore[attr-defined]
-    if isinstance(kind, types.NoneType):
-        return type(None)
-    return float if isinstance(kind, types.Float) else object
-
-
 def by_type(function: Callable[..., Any]) -> Any:
     """A function dispatched on the type of its first argument, in Python and inside kernels alike; always inlined.
 
@@ -128,7 +121,7 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
                 f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
             )
         known(kind, definition)
-        cache.registered(kind, made)
+        registered(function, kind, made)
         for other, derived in implied:
             if kind is not object and other.dispatch(kind) is other.dispatch(object):
                 other.register(kind, derived)
@@ -145,7 +138,7 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
 
     @functools.wraps(function)
     def chosen(*args: Any) -> Any:
-        return generic.dispatch(_python_class(args[0]))
+        return generic.dispatch(python_class(args[0]))
 
     overload(generic, jit_options=options)(chosen)
     return generic

@@ -12,12 +12,19 @@ collected while a kernel compiles. Tried, and no faster: LLVM's passes of each f
 import contextlib
 import gc
 import inspect
+import sys
+import threading
 from collections.abc import Iterator
 from typing import Any
 
 from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+
+# Frames that the compiler may nest. A fold over the walls of a scene is a function of the first that calls itself for
+# the others, up to 58 frames a wall: 24 planes, the most that a scene has, nest 1600, in less than 512 kB of a stack.
+# Rejected: each of some 60 folds written a second time, as a loop that is unrolled for a number of walls.
+_DEEPEST = 10_000
 
 # Of closures, `literally`, functions that Numba itself is to inline, and expressions of whole arrays.
 _SKIPPED = (
@@ -76,7 +83,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a kernel with its helpers."""
-        with _uncollected():
+        with _uncollected(), deep():
             return super().compile_extra(func)
 
 
@@ -89,3 +96,26 @@ def _uncollected() -> Iterator[None]:
     finally:
         if before:
             gc.enable()
+
+
+_limits = threading.Lock()
+_inside: list[int] = []
+
+
+@contextlib.contextmanager
+def deep() -> Iterator[None]:
+    """Let Python nest `_DEEPEST` frames until the last thread is out: the limit is one for the whole process."""
+    with _limits:
+        before = _inside[0] if _inside else sys.getrecursionlimit()
+        _inside.append(before)
+        raised = max(before, _DEEPEST)
+        if len(_inside) == 1:
+            sys.setrecursionlimit(raised)
+    try:
+        yield
+    finally:
+        with _limits:
+            _inside.pop()
+            # Who has set another limit meanwhile keeps it.
+            if not _inside and sys.getrecursionlimit() == raised:
+                sys.setrecursionlimit(before)

@@ -129,7 +129,7 @@ class Run:
         ends = [self._share(span)] if helps else []
         ends += [result_of(share, latest, self.halt) for share in shares]
         seconds = time.perf_counter() - began
-        self._tier.left -= seconds
+        self._tier.spend(seconds)
         status, particle, _left = max(ends, key=lambda end: end[:2])
         self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
         if self._cut_short:
@@ -221,7 +221,9 @@ class Run:
         self._move_walls(0.0)
         self._phase.fill(ARRIVED)
         self._ticket[0] = 0
+        began = time.perf_counter()
         self._share(0.0)
+        self._tier.spend(time.perf_counter() - began)
 
     def _move_walls(self, moment: float) -> None:
         """The walls of the frame that ends at a moment [s]."""

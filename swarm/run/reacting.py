@@ -104,7 +104,7 @@ class ReactingRun:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
         status, particle = self._take(rule, latest)
-        self._tier.left -= time.perf_counter() - began
+        self._tier.spend(time.perf_counter() - began)
         self._halt[0] = _NEVER
         self._cut_short = status == Status.INTERRUPTED
         if status == Status.STALLED:

@@ -13,9 +13,10 @@ import numpy as np
 from ..contact.regularisation import Power
 from ..kernel import cache
 from ..surfaces.formulas.numbers import OwnNumbers
+from . import ledger
 
 CHOICES = ("auto", "always", "never")
-# Seconds of plain Python after which a run compiles its kernels.
+# Seconds of plain Python, of all runs of a process with the same missing kernels, after which these are compiled.
 _PATIENCE = 1.0
 # Seconds at most for which a run stays in plain Python because another process compiles its kernels.
 _LONGEST_COMPILATION = 120.0
@@ -27,8 +28,9 @@ class Tier:
     """The tier of a run.
 
     Args:
-        choice: "auto": compiled where the kernels are found compiled, else in plain Python for about a second first,
-            and on while another process compiles them; "always" or "never" compiled.
+        choice: "auto": compiled where the kernels are found compiled, or an earlier process has found them worth it,
+            else in plain Python until this process has been for about a second, and on while another process compiles
+            them; "always" or "never" compiled.
         numbers: the arguments of the kernels. Where they call library functions, whose last bit may differ between
             the tiers, "auto" compiles at once: the result must not depend on the wall time.
         particles: their number.
@@ -39,6 +41,7 @@ class Tier:
         # Time left for plain Python [s].
         self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
         self.is_plain = self.left > 0.0
+        self._missing: list[str] = []
         self._latest = time.monotonic() + _LONGEST_COMPILATION if self.is_plain else -math.inf
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
@@ -47,12 +50,25 @@ class Tier:
         if self.left == math.inf:
             return False
         missing = [call for call in calls if (before or may) and not cache.is_compiled(*call)]
+        self._missing = [cache.kind(*call) for call in missing]
+        if may and missing:
+            known = ledger.is_remembered(self._missing)
+            self.left = 0.0 if known else min(self.left, _PATIENCE - ledger.spent(self._missing))
+            may = self.left > 0.0
         if before and missing and not may and time.monotonic() < self._latest:
             # Where another process has begun, to wait for it would waste a core.
             may = any(cache.is_being_compiled(*call) for call in missing)
             self.left = _PATIENCE if may else self.left
         self.is_plain = may and bool(missing)
+        if missing and not may and ledger.spent(self._missing) >= _PATIENCE:
+            ledger.remember(self._missing)
         return self.is_plain != before
+
+    def spend(self, seconds: float) -> None:
+        """Count a time [s] that the kernels of this tier took."""
+        self.left -= seconds
+        if self.is_plain:
+            ledger.book(self._missing, seconds)
 
     def kernel(self, kernel: Any) -> Any:
         """The function that this tier calls for a kernel."""

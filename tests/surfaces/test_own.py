@@ -531,5 +531,5 @@ def test_sympy_is_loaded_only_for_a_formula():
 
 def test_kernels_of_the_package_are_known_by_its_folder():
     assert "swarm" in frozen._VERSIONS
-    assert cache.cache_folder().parent == cache._base()
+    assert cache.cache_folder().parent == cache.base()
     assert set(cache.sources()) >= set(Path(swarm.__file__).parent.glob("surfaces/**/*.py"))

@@ -1,0 +1,97 @@
+"""What a compiled kernel is found by on disk, and how it is written there.
+
+Numba finds it by the types of its arguments, pickled in an index with the classes of tuples: a class of a module by its
+name, so that no process can read the index which cannot import that module, and a class of a script or of a cell of a
+notebook by its value, which no other process takes for its own. Here a text stands for the types: the names of classes
+and the code of what is defined for them outside of this package. In a kernel itself classes are numbers, so that the
+process that loads it has its own in their place.
+"""
+
+import io
+import pickle
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from numba import types
+from numba.core.caching import IndexDataCacheFile
+from numba.core.serialize import NumbaPickler
+
+from .frozen import Frozen
+
+
+class Key(NamedTuple):
+    """A text for the types of arguments, the classes of tuples in them, in its order, and whether it comes again."""
+
+    text: str
+    classes: tuple[type, ...]
+    repeats: bool
+
+
+def key_of(kinds: Sequence[Any], *others: Any) -> Key:
+    """The key of Numba types, and of what else tells two kernels apart: plain values and functions.
+
+    It never repeats where a function, or what is defined for a class, refers to what is not known, see `Frozen`.
+    """
+    frozen, classes = Frozen(), dict[type, None]()
+    frozen.value(others)
+    for kind in kinds:
+        _add(kind, frozen, classes)
+    return Key(frozen.digest(), tuple(classes), frozen.is_known)
+
+
+def _add(kind: Any, frozen: Frozen, classes: dict[type, None]) -> None:
+    made = python_class(kind)
+    frozen.value(made)
+    if isinstance(kind, types.BaseTuple):
+        classes[made] = None
+        frozen.add(len(kind.types))  # type: ignore[attr-defined]
+        for part in kind.types:  # type: ignore[attr-defined]
+            _add(part, frozen, classes)
+    else:
+        frozen.add(repr(kind))
+
+
+def python_class(kind: Any) -> Any:
+    """The Python class whose values the Numba type `kind` describes, as far as functions are chosen by it."""
+    if isinstance(kind, types.BaseTuple):
+        return getattr(kind, "instance_class", tuple)
+    if isinstance(kind, types.NoneType):
+        return type(None)
+    return float if isinstance(kind, types.Float) else object
+
+
+class File(IndexDataCacheFile):  # type: ignore[misc]
+    """The index and the kernels of one function, by `Key`."""
+
+    def save(self, key: Key, data: Any) -> None:
+        """Write a kernel that can be found again."""
+        if not key.repeats:
+            return
+        written = io.BytesIO()
+        _Writer(written, key.classes).dump(data)
+        super().save(key.text, written.getvalue())
+
+    def load(self, key: Key) -> Any:
+        """A kernel, or None."""
+        written = super().load(key.text)
+        return None if written is None else _Reader(io.BytesIO(written), key.classes).load()
+
+
+class _Writer(NumbaPickler):  # type: ignore[misc]
+    def __init__(self, file: io.BytesIO, classes: tuple[type, ...]) -> None:
+        super().__init__(file, protocol=4)
+        self._numbers = {made: number for number, made in enumerate(classes)}
+
+    def persistent_id(self, thing: Any) -> int | None:
+        """The number of a class."""
+        return self._numbers.get(thing) if isinstance(thing, type) else None
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, classes: tuple[type, ...]) -> None:
+        super().__init__(file)
+        self._classes = classes
+
+    def persistent_load(self, number: int) -> type:
+        """The class of a number."""
+        return self._classes[number]
