@@ -93,6 +93,7 @@ class Body:
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        checked.uncoupled(self.anchors, self.mass_matrix)
         tied.require_reachable(self.points, self.links, self.anchors)
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
 

@@ -229,6 +229,18 @@ def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | N
     return {int(key): motion for key, motion in value.items()}
 
 
+def uncoupled(led: Mapping[int, Motion | None], matrix: Floats) -> None:
+    """Raise if a led point has a mass in common with one that can move: its path would push that one."""
+    for number, motion in led.items():
+        coupled = np.flatnonzero(matrix[number])
+        if motion is not None and not set(coupled.tolist()) <= set(led):
+            raise SceneError(
+                f"anchors[{number}] must be None, fixed in space, or its point have no mass coupling with points that "
+                f"can move, got {motion} and a mass_matrix with couplings of point {number} to points "
+                f"{coupled.tolist()}"
+            )
+
+
 def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tuple[tuple[int, Surface], ...]:
     """`rows` as (point, surface), each point on its surface."""
     held = set(anchored)
@@ -237,6 +249,8 @@ def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tupl
         given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
         number = point(f"guides[{k}][0]", given[0], len(places))
         surface = _smooth(f"guides[{k}][1]", given[1])
+        if surface.friction > 0.0:
+            raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
         if number in held:
             raise SceneError(f"guides[{k}] must hold a point that can move, got {number}, which is anchored")
         on_surface(f"guides[{k}]: point {number}", surface, places[number, :, None])

@@ -142,6 +142,7 @@ class Points(Made):
 
     points: tuple[Vector, ...]
     velocity: tuple[Vector, ...] | None = None
+    project: bool = False
     mass: float | tuple[float, ...] | None = None
     mass_matrix: tuple[tuple[float, ...], ...] | None = None
     links: tuple[tuple[int, int], ...] = ()
@@ -174,15 +175,16 @@ class Points(Made):
         from .state import Bodies
 
         if self.count is not None:
-            if self.velocity is not None:
-                raise SceneError("velocity: must go without count, got both; copies at random have speed and spin")
+            for name in ("velocity", "project"):
+                if getattr(self, name):
+                    raise SceneError(f"{name}: must go without count, got both; copies at random have speed and spin")
             return super().start(scene)
         placed = [name for name in ("speed", "spin", "seed") if getattr(self, name) is not None]
         if placed:
             raise SceneError(f"{placed[0]}: is of copies at random; add count = ..., or give velocity = ... instead")
         position = np.array(self.points)
         velocity = np.zeros_like(position) if self.velocity is None else np.array(self.velocity)
-        return Bodies(self.body(), position.T, velocity.T)
+        return Bodies(self.body(), position.T, velocity.T, project=self.project)
 
 
 KINDS: dict[str, type[Made]] = {
