@@ -18,7 +18,7 @@ from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
 from ..surfaces.surface import Surface
-from . import checked, tied
+from . import checked, room, tied
 from .checked import Pairs, Spring
 from .strain import Strain
 
@@ -77,6 +77,7 @@ class Body:
     ) -> None:
         places = checked.points("points", points)
         count = len(places)
+        room.require(count)
         led = checked.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)
         values = {
@@ -93,6 +94,7 @@ class Body:
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        room.require(count, len(self.bonds()) + len(self.guides) + len(self.cavities), len(touching), self._edges())
         checked.uncoupled(self.anchors, self.mass_matrix)
         tied.require_reachable(self.points, self.links, self.anchors)
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
@@ -104,6 +106,9 @@ class Body:
     def __repr__(self) -> str:
         parts = {name: len(getattr(self, name)) for name in ("links", "springs", "anchors", "contacts", "faces")}
         return f"Body({', '.join([f'{len(self)} points', *(f'{n} {name}' for name, n in parts.items() if n)])})"
+
+    def _edges(self) -> int:
+        return 0 if self.strain is None else len(self.strain.edges)
 
     def bonds(self) -> Pairs:
         """(B, 2) all pairs that are tied, for readers that draw them."""

@@ -11,6 +11,7 @@ from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
 from ..surfaces.surface import SIDES, Surface
+from . import room
 
 Pairs = NDArray[np.int64]
 Spring = tuple[int, int, float, float]
@@ -87,7 +88,14 @@ def symmetric(name: str, matrix: Floats) -> Floats:
 def _positive_definite(name: str, matrix: Floats) -> Floats:
     # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
     scale = np.sqrt(np.diagonal(matrix))
-    values, vectors = np.linalg.eigh(matrix / scale / scale[:, None])
+    scaled = matrix / scale / scale[:, None]
+    try:
+        # Far faster than eigenvalues, which say where it is wrong.
+        least = _ROUND_OFF + 8.0 * len(matrix) * np.finfo(np.float64).eps
+        np.linalg.cholesky(scaled - least * np.eye(len(matrix)))
+        return matrix
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(scaled)
     if values[0] < _ROUND_OFF:
         mode = vectors[:, 0] / scale
         first = int(np.abs(mode).argmax())
@@ -188,27 +196,38 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
     """`value`, numbers of points or rows of coefficients, as (K, P) coefficients; no contact twice."""
     held = set(anchored)
     if value is None:
-        return np.eye(count)[[p for p in range(count) if p not in held]]
+        free = [p for p in range(count) if p not in held]
+        room.require(count, contacts=len(free))
+        return np.eye(count)[free]
     rows = np.array(checks.array("contacts", value))
     if rows.ndim == 1:
         chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
+        room.require(count, contacts=len(chosen))
+        # Faster than rows that are compared.
+        _require_once(chosen)
         rows = np.eye(count)[chosen]
     if rows.ndim != 2 or rows.shape[1] != count:
         raise SceneError(f"contacts must be numbers of points or have shape (K, {count}), got shape {rows.shape}")
+    room.require(count, contacts=len(rows))
     finite("contacts", rows)
     sums, sizes = rows.sum(axis=1), np.abs(rows).sum(axis=1)
     for k in np.flatnonzero(np.abs(sums - 1.0) > _ROUND_OFF * np.maximum(sizes, 1.0)).tolist():
         raise SceneError(
             f"contacts[{k}], its coefficients, must add up to 1, got {sums[k]:g}: the point must move with its body"
         )
-    for k, row in enumerate(rows):
-        if set(np.flatnonzero(row).tolist()) <= held:
-            raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
-    _first, index = np.unique(rows, axis=0, return_index=True)
-    for k in sorted(set(range(len(rows))) - set(index.tolist())):
-        first = int(np.argmax((rows == rows[k]).all(axis=1)))
-        raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")
+    can_move = (np.delete(rows, sorted(held), axis=1) != 0.0).any(axis=1)
+    for k in np.flatnonzero(~can_move)[:1]:
+        raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
+    _require_once([row.tobytes() for row in rows + 0.0])
     return rows
+
+
+def _require_once(given: list[Any]) -> None:
+    found: dict[Any, int] = {}
+    for k, one in enumerate(given):
+        first = found.setdefault(one, k)
+        if first < k:
+            raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")
 
 
 def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | None]:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..particles import Floats
-from . import checked
+from . import checked, room
 from .body import Body
 from .checked import Pairs
 
@@ -59,6 +59,7 @@ def chain(n: int, length: float, mass: float) -> Body:
     Body(10 points, 9 links, 10 contacts)
     """
     n = checks.count("n", n, least=2)
+    room.require(n, ties=n - 1, contacts=n)
     length, mass = checks.length("length", length), checks.positive("mass", mass)
     points = np.zeros((n, 3))
     points[:, 0] = length * (np.arange(n) / (n - 1) - 0.5)
@@ -111,6 +112,7 @@ def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -
     6.0
     """
     corners = checked.points("vertices", vertices)
+    room.require(4, contacts=len(corners))
     density = checks.positive("density", density)
     triangles = _hull(corners) if faces is None else _closed(corners, faces)
     volume, center, moment = _moments(corners, triangles)

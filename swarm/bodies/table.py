@@ -16,6 +16,7 @@ from ..errors import SceneError
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
+from . import room
 from .body import Body
 from .strain import Strain
 
@@ -206,6 +207,7 @@ class _Strain:
 
     def strain(self) -> Strain:
         n = len(self.edges)
+        room.require(0, edges=n)
         matrix = np.zeros((n, n))
         for k, (i, j, value) in enumerate(self.stiffness):
             if not (0 <= i < n and 0 <= j < n):
