@@ -202,6 +202,7 @@ def _rows(name: str, value: ArrayLike) -> Floats:
         raise SceneError(f"{name} must have shape (3, N), rows x, y, z, got {rows.shape}{hint}")
     if rows.shape[1] == 0:
         raise SceneError(f"{name} must hold at least one particle, got shape {rows.shape}")
+    checks.particles_fit(name, rows.shape[1])
     # NaN compares as false. Beyond the limit the kinetic energy and phi overflow.
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)

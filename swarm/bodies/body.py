@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
@@ -121,6 +122,6 @@ def _of_body(strain: Strain | None, count: int) -> Strain | None:
     if strain is None:
         return None
     if not isinstance(strain, Strain):
-        raise SceneError(f"strain must be a swarm.Strain or None, got {strain!r:.200}")
-    checked.numbers("strain.edges", strain.edges.tolist(), 2, count)
+        raise SceneError(f"strain must be a swarm.Strain or None, got {checks.shown(strain)}")
+    checked.numbers("strain.edges", strain.edges, 2, count)
     return strain

@@ -1,6 +1,7 @@
 """Checks of a body's arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from .. import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
+from ..surfaces.fields.many import Many
 from ..surfaces.surface import SIDES, Surface
 from . import room
 
@@ -20,17 +22,20 @@ Spring = tuple[int, int, float, float]
 _SAME_PLACE = 1e-12
 # The round-off of a matrix that was assembled, and of rows of coefficients, relative to their largest entry.
 _ROUND_OFF = 1e-12
+# Points of a body that is not known yet.
+_ANY_POINT = 1 << 31
 # How far from its surface a guided point may start, relative to the surface's size.
 _ON_SURFACE = 1e-9
 
 
 def points(name: str, value: ArrayLike) -> Floats:
     """`value` as (P, 3) places."""
-    rows = np.array(checks.array(name, value))
+    rows = checks.array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
         hint = "; transpose it" if rows.ndim == 2 and rows.shape[0] == 3 else ""
         raise SceneError(f"{name} must have shape (P, 3), one row a point, got {rows.shape}{hint}")
-    return finite(name, rows)
+    room.require(len(rows))
+    return finite(name, np.array(rows))
 
 
 def finite(name: str, values: Floats) -> Floats:
@@ -55,9 +60,10 @@ def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) ->
         if masses.shape not in ((), (count,)):
             raise SceneError(f"mass must be one number or have shape ({count},), got shape {masses.shape}")
         return np.diag(_masses("mass", np.broadcast_to(masses, (count,))))
-    rows = np.array(checks.array("mass_matrix", matrix))  # type: ignore[arg-type]
+    rows = checks.array("mass_matrix", matrix)  # type: ignore[arg-type]
     if rows.shape != (count, count):
         raise SceneError(f"mass_matrix must have shape ({count}, {count}), got {rows.shape}")
+    rows = np.array(rows)
     finite("mass_matrix", rows)
     _masses("the diagonal of mass_matrix", np.diagonal(rows))
     return _positive_definite("mass_matrix", symmetric("mass_matrix", rows))
@@ -123,9 +129,13 @@ def not_negative(name: str, matrix: Floats) -> None:
 
 def point(name: str, value: Any, count: int | None) -> int:
     """`value` as the number of one of `count` points."""
-    number = checks.count(name, value, least=0)
-    if count is not None and number >= count:
-        raise SceneError(f"{name} must be the number of a point, from 0 to {count - 1}, got {number}")
+    number, below = checks.count(name, value, least=0), _ANY_POINT if count is None else count
+    if number >= below:
+        raise SceneError(
+            f"{name} must be the number of a point, from 0 to {below - 1}, got {min(number, 10**300):.6g}"
+            if number >= _ANY_POINT
+            else f"{name} must be the number of a point, from 0 to {below - 1}, got {number}"
+        )
     return number
 
 
@@ -133,7 +143,7 @@ def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pa
     """`rows` as (N, width) numbers of points, no point twice in a row and no row twice; count None: of any body."""
     found: dict[frozenset[int], int] = {}
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each(name, rows, f"rows of {width} numbers of points"):
         parts = entries(f"{name}[{k}]", row, width, "numbers of points")
         given = [point(f"{name}[{k}][{i}]", part, count) for i, part in enumerate(parts)]
         if len(set(given)) < width:
@@ -148,12 +158,23 @@ def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pa
 def entries(name: str, row: Any, width: int, what: str) -> tuple[Any, ...]:
     """`row` as a tuple of `width` parts."""
     try:
-        parts = tuple(row)
+        # One more than there should be: what has no end is refused as well.
+        parts = tuple(itertools.islice(row, width + 1))
     except TypeError:
-        raise SceneError(f"{name} must be {width} {what}, got {row!r}") from None
+        raise SceneError(f"{name} must be {width} {what}, got {checks.shown(row)}") from None
     if len(parts) != width:
-        raise SceneError(f"{name} must be {width} {what}, got {len(parts)}: {row!r:.200}")
+        came = len(parts) if len(parts) < width else "more"
+        raise SceneError(f"{name} must be {width} {what}, got {came}: {checks.shown(row)}")
     return parts
+
+
+def each(name: str, rows: Iterable[Any], what: str) -> Iterator[tuple[int, Any]]:
+    """The rows of an argument with their numbers; an array's as lists."""
+    try:
+        for k, row in enumerate(rows):
+            yield k, row.tolist() if isinstance(row, np.ndarray) else row
+    except TypeError:
+        raise SceneError(f"{name} must be {what}, got {checks.shown(rows)}") from None
 
 
 def links(rows: Iterable[Any], places: Floats) -> Pairs:
@@ -175,7 +196,7 @@ def _at_one_place(first: Floats, second: Floats) -> bool:
 def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
     """`rows` as springs (i, j, stiffness, rest length)."""
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each("springs", rows, "rows (i, j, stiffness, rest length)"):
         given = entries(f"springs[{k}]", row, 4, "values (i, j, stiffness, rest length)")
         i, j = (point(f"springs[{k}][{n}]", given[n], len(places)) for n in range(2))
         if i == j:
@@ -199,17 +220,16 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
         free = [p for p in range(count) if p not in held]
         room.require(count, contacts=len(free))
         return np.eye(count)[free]
-    rows = np.array(checks.array("contacts", value))
+    rows = checks.array("contacts", value)
+    room.require(count, contacts=len(rows) if rows.ndim else 0)
     if rows.ndim == 1:
         chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
-        room.require(count, contacts=len(chosen))
         # Faster than rows that are compared.
         _require_once(chosen)
         rows = np.eye(count)[chosen]
     if rows.ndim != 2 or rows.shape[1] != count:
         raise SceneError(f"contacts must be numbers of points or have shape (K, {count}), got shape {rows.shape}")
-    room.require(count, contacts=len(rows))
-    finite("contacts", rows)
+    rows = finite("contacts", np.array(rows))
     sums, sizes = rows.sum(axis=1), np.abs(rows).sum(axis=1)
     for k in np.flatnonzero(np.abs(sums - 1.0) > _ROUND_OFF * np.maximum(sizes, 1.0)).tolist():
         raise SceneError(
@@ -241,7 +261,7 @@ def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | N
         if motion is not None and not isinstance(motion, Motion):
             raise SceneError(
                 f"anchors[{key}] must be None, for a point that is fixed, or a Translation, Oscillation or Rotation, "
-                f"got {motion!r:.200}"
+                f"got {checks.shown(motion)}"
             )
     if len(value) == count:
         raise SceneError(f"anchors must leave a point that can move, got all {count} points of the body")
@@ -264,7 +284,7 @@ def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tupl
     """`rows` as (point, surface), each point on its surface."""
     held = set(anchored)
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each("guides", rows, "rows (point, surface)"):
         given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
         number = point(f"guides[{k}][0]", given[0], len(places))
         surface = _smooth(f"guides[{k}][1]", given[1])
@@ -294,7 +314,7 @@ def on_surface(name: str, surface: Surface, places: Floats) -> None:
 def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
     """`rows` as (surface, carrier, point), each point on the admissible side."""
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each("cavities", rows, "rows (surface, carrier, point)"):
         given = entries(f"cavities[{k}]", row, 3, "values (surface, carrier, point)")
         surface = _smooth(f"cavities[{k}][0]", given[0])
         carrier, held = (point(f"cavities[{k}][{n}]", given[n], len(places)) for n in (1, 2))
@@ -312,7 +332,9 @@ def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, i
 
 def _smooth(name: str, surface: Any) -> Surface:
     if not isinstance(surface, Surface):
-        raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {surface!r:.200}")
+        raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {checks.shown(surface)}")
+    if isinstance(surface, Many):
+        raise SceneError(f"{name} must be one surface, got a field of {len(surface)}; give one of them by itself")
     walls = len(surface.walls())
     if walls > 1:
         raise SceneError(

@@ -109,7 +109,7 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
         raise SceneError(f"mesh must be two arrays (nodes, elements), got {type(mesh).__name__}")
     nodes = checked.points("nodes", mesh[0])
     room.require(len(nodes))
-    elements = checked.numbers("elements", np.asarray(mesh[1]).tolist(), 4, len(nodes))
+    elements = checked.numbers("elements", mesh[1], 4, len(nodes))  # type: ignore[arg-type]
     if not len(elements):
         raise SceneError("elements must hold at least one tetrahedron, got none")
     for k in sorted(set(range(len(nodes))) - set(elements.ravel().tolist())):

@@ -155,7 +155,7 @@ def _hull(corners: Floats) -> Pairs:
 
 def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
     """`faces` as triangles, each of whose sides is run through once in both directions."""
-    triangles = checked.numbers("faces", np.asarray(faces).tolist(), 3, len(corners))
+    triangles = checked.numbers("faces", faces, 3, len(corners))  # type: ignore[arg-type]
     if not len(triangles):
         raise SceneError(
             "faces must hold the triangles of a closed surface, got none; leave it out for the convex hull"

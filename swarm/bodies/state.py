@@ -56,7 +56,7 @@ class Bodies:
 
     def _take(self, body: Body, position: ArrayLike, velocity: ArrayLike) -> None:
         if not isinstance(body, Body):
-            raise SceneError(f"body must be a swarm.Body, got {body!r:.200}")
+            raise SceneError(f"body must be a swarm.Body, got {checks.shown(body)}")
         self.body = body
         self.position = _rows("position", position, len(body))
         self.velocity = _rows("velocity", velocity, len(body))
@@ -123,7 +123,7 @@ class Bodies:
 
 
 def _rows(name: str, value: ArrayLike, count: int) -> Floats:
-    rows = np.array(checks.array(name, value), order="C")
+    rows = checks.array(name, value)
     if rows.ndim == 2:
         rows = rows[:, :, None]
     if rows.ndim != 3 or rows.shape[:2] != (3, count) or not rows.shape[2]:
@@ -131,7 +131,8 @@ def _rows(name: str, value: ArrayLike, count: int) -> Floats:
             f"{name} must have shape (3, {count}, n), rows x, y, z of the {count} points of n copies, at least one, "
             f"got {np.shape(value)}"
         )
-    return checked.finite(name, rows)
+    checks.particles_fit(name, count * rows.shape[2])
+    return checked.finite(name, np.array(rows, order="C"))
 
 
 def _require_lengths(body: Body, position: Floats) -> None:

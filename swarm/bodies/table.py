@@ -245,7 +245,7 @@ def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
 def _anchor(table: Any, where: str) -> tuple[int, Any]:
     """A point, and the motion that leads it, if the table has a kind."""
     if not isinstance(table, dict) or type(table.get("point")) is not int:
-        raise SceneError(f"{where}: expected a table with the number of a point, got {table!r}")
+        raise SceneError(f"{where}: expected a table with the number of a point, got {checks.shown(table)}")
     motion = {key: value for key, value in table.items() if key != "point"}
     return table["point"], tables.of_kind(motion, where, _motions()) if motion else None
 
