@@ -111,12 +111,13 @@ class Rigid(Made):
     vertices: tuple[Vector, ...]
     density: float
     faces: tuple[tuple[int, int, int], ...] | None = None
+    contacts: float | tuple[Vector, ...] | None = None
 
     def body(self) -> Body:
         """A polyhedron."""
         from .shapes import rigid
 
-        return rigid(self.vertices, self.density, self.faces)
+        return rigid(self.vertices, self.density, self.faces, self.contacts)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from ..motion import Path, parts_of
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
-from . import workload
+from . import passing, workload
 from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
@@ -89,6 +89,7 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
     assert method.dt is not None  # type: ignore[attr-defined]
+    passing.check(scene, bodies.body)
     workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
     if options.compile != "never":
