@@ -162,7 +162,7 @@ def vector(name: str, value: Any) -> Vector:
     except TypeError:
         raise SceneError(f"{name} must be three numbers, got {shown(value)}") from None
     if len(parts) != 3:
-        came = len(parts) if len(parts) < 4 else "more"
+        came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < 4 else "more"
         raise SceneError(f"{name} must be three numbers, got {came}: {shown(value)}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(parts))
     return x, y, z

@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
 from ..surfaces.surface import Surface
-from . import checked, room, tied
+from . import checked, holding, room, tied
 from .checked import Pairs, Spring
 from .strain import Strain
 
@@ -79,7 +79,7 @@ class Body:
         places = checked.points("points", points)
         count = len(places)
         room.require(count)
-        led = checked.anchors(anchors, count)
+        led = holding.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)
         values = {
             "points": places,
@@ -89,14 +89,14 @@ class Body:
             "contacts": touching,
             "strain": _of_body(strain, count),
             "anchors": led,
-            "guides": checked.guides(guides, places, led),
-            "cavities": checked.cavities(cavities, places),
+            "guides": holding.guides(guides, places, led),
+            "cavities": holding.cavities(cavities, places),
             "faces": checked.numbers("faces", faces, 3, len(touching)),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
         room.require(count, len(self.bonds()) + len(self.guides) + len(self.cavities), len(touching), self._edges())
-        checked.uncoupled(self.anchors, self.mass_matrix)
+        holding.uncoupled(self.anchors, self.mass_matrix)
         tied.require_reachable(self.points, self.links, self.anchors)
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
 

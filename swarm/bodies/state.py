@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..particles import Floats, Particles
-from . import checked, velocities
+from . import checked, holding, velocities
 from .body import Body
 from .checked import Pairs
 
@@ -66,7 +66,7 @@ class Bodies:
             )
         _require_lengths(body, self.position)
         for k, (point, surface) in enumerate(body.guides):
-            checked.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
+            holding.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
 
     def copy(self) -> "Bodies":
         """The same bodies as a start, checked again, with arrays of their own."""

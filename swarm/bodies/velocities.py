@@ -55,7 +55,11 @@ def led_along(body: Body, position: Floats, velocity: Floats) -> Floats:
         given, path = velocity[:, point], made[:, point]
         off = np.abs(given - path).max(axis=0) > _AGREED * _fastest(velocity)
         for copy in np.flatnonzero(off & given.any(axis=0))[:1]:
-            where = "fixed in space" if motion is None else f"led at {path[:, copy].tolist()} m/s at the start"
+            where = (
+                "fixed in space"
+                if motion is None
+                else f"led at {path[:, copy].tolist()} m/s at the start (a phase lets a motion begin elsewhere)"
+            )
             raise SceneError(
                 f"velocity of anchors[{point}] must be that of its path, or 0, which stands for it, got "
                 f"{given[:, copy].tolist()} m/s for point {point} of copy {copy}, which is {where}"
