@@ -189,7 +189,7 @@ def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:
     given = given.reshape(3, 1) if given.ndim == 1 and given.size == 3 else given
     # Whole numbers beyond this are no floats of their own.
     if given.shape != (3, n) or not (np.abs(given) <= 2.0**53).all() or (given != np.floor(given)).any():
-        raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {value!r:.200}")
+        raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {checks.shown(value)}")
     return given.astype(np.int64, order="C")
 
 

@@ -171,7 +171,7 @@ class Samples:
 
 
 def _spacing(value: Any) -> Vector:
-    if np.ndim(value) == 0 or isinstance(value, str | bytes):
+    if not isinstance(value, (list, tuple)) and getattr(value, "ndim", 0) == 0:
         one = checks.length("spacing", value)
         return one, one, one
     x, y, z = (checks.length(f"spacing[{k}]", part) for k, part in enumerate(checks.vector("spacing", value)))
@@ -182,12 +182,13 @@ def _samples(values: Any) -> Floats:
     """The argument `values`, checked: an array or a path."""
     if isinstance(values, str | Path):
         values = read(values)
-    found = np.ascontiguousarray(checks.array("values", values))
+    found = checks.array("values", values)
     if found.ndim != 3 or min(found.shape) < spline.LEAST:
         raise SceneError(
             f"values must have the shape (nx, ny, nz), {spline.LEAST} samples or more along each axis, got "
             f"{found.shape}"
         )
+    found = np.ascontiguousarray(found)
     wrong = ~np.isfinite(found)
     if wrong.any():
         i, j, k = np.argwhere(wrong)[0]
