@@ -2,7 +2,9 @@
 
 import difflib
 import functools
+import itertools
 import math
+import operator
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -17,7 +19,23 @@ Vector = tuple[float, float, float]
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
 _PARTICLE, _FEW = 146, 1_000_000
+_DOUBLE = 8
+# Characters of a value that are shown in a sentence.
+_SHOWN = 200
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+
+
+def shown(value: Any) -> str:
+    """A value in a line of a sentence.
+
+    >>> shown(np.zeros((2, 2)))
+    'array([[0., 0.], [0., 0.]])'
+    """
+    try:
+        said = repr(value)
+    except Exception:  # of an object of others, or a number of too many digits
+        return f"a {type(value).__name__}"
+    return " ".join(said.split())[:_SHOWN]
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
@@ -28,7 +46,7 @@ def number(name: str, value: Any, expected: str = "a finite number") -> float:
             raise TypeError
         result = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise SceneError(f"{name} must be {expected}, got {value!r:.200}") from None
+        raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if not math.isfinite(result):
         raise SceneError(f"{name} must be {expected}, got {result}")
     return result
@@ -68,11 +86,14 @@ def magnitude(name: str, value: Any) -> float:
 
 def count(name: str, value: Any, least: int = 1) -> int:
     """`value` as an integer not below `least`."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise SceneError(f"{name} must be a whole number, {least} or more, got {value!r}")
-    result = int(value)
+    try:
+        if isinstance(value, (bool, np.bool_, np.ma.MaskedArray)):
+            raise TypeError
+        result = operator.index(value)
+    except TypeError:
+        raise SceneError(f"{name} must be a whole number, {least} or more, got {shown(value)}") from None
     if result < least:
-        raise SceneError(f"{name} must be {least} or more, got {result}")
+        raise SceneError(f"{name} must be {least} or more, got {shown(result)}")
     return result
 
 
@@ -127,7 +148,7 @@ def duration(name: str, value: str) -> float:
 def flag(name: str, value: Any) -> bool:
     """`value` as true or false."""
     if not isinstance(value, (bool, np.bool_)):
-        raise SceneError(f"{name} must be true or false, got {value!r}")
+        raise SceneError(f"{name} must be true or false, got {shown(value)}")
     return bool(value)
 
 
@@ -136,11 +157,13 @@ def vector(name: str, value: Any) -> Vector:
     try:
         if isinstance(value, (str, bytes)):
             raise TypeError
-        parts = list(value)
+        # No more than is looked at: what has no end is refused as well.
+        parts = list(itertools.islice(value, 4))
     except TypeError:
-        raise SceneError(f"{name} must be three numbers, got {value!r}") from None
+        raise SceneError(f"{name} must be three numbers, got {shown(value)}") from None
     if len(parts) != 3:
-        raise SceneError(f"{name} must be three numbers, got {len(parts)}: {value!r}")
+        came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < 4 else "more"
+        raise SceneError(f"{name} must be three numbers, got {came}: {shown(value)}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(parts))
     return x, y, z
 
@@ -154,6 +177,11 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         given = np.asarray(value)
         if given.dtype.kind not in "iufO":
             raise TypeError
+        # A view of one number may say that it has any shape: nothing of that size is copied.
+        if _DOUBLE * given.size > memory():
+            raise SceneError(
+                f"{name} must fit in memory, got shape {given.shape}; this machine has {in_bytes(memory())}"
+            )
         return given.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
@@ -165,12 +193,12 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
     known = list(choices)
     if isinstance(value, str) and value in known:
         return value
-    raise SceneError(f"{name} must be one of {listed(known)}, got {value!r}{closest(value, known)}")
+    raise SceneError(f"{name} must be one of {listed(known)}, got {shown(value)}{closest(value, known)}")
 
 
 def closest(value: Any, known: Iterable[str]) -> str:
     """A hint "; did you mean ...?" or nothing."""
-    found = difflib.get_close_matches(str(value), list(known), n=1, cutoff=0.5)
+    found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""
 
 

@@ -44,6 +44,8 @@ def fill(
     >>> swarm.fill(cavity, 10, speed=0.5, seed=1)
     Particles(10)
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"scene must be a swarm.Scene, got {checks.shown(scene)}")
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)

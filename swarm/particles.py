@@ -189,7 +189,7 @@ def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:
     given = given.reshape(3, 1) if given.ndim == 1 and given.size == 3 else given
     # Whole numbers beyond this are no floats of their own.
     if given.shape != (3, n) or not (np.abs(given) <= 2.0**53).all() or (given != np.floor(given)).any():
-        raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {value!r:.200}")
+        raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {checks.shown(value)}")
     return given.astype(np.int64, order="C")
 
 
@@ -202,6 +202,7 @@ def _rows(name: str, value: ArrayLike) -> Floats:
         raise SceneError(f"{name} must have shape (3, N), rows x, y, z, got {rows.shape}{hint}")
     if rows.shape[1] == 0:
         raise SceneError(f"{name} must hold at least one particle, got shape {rows.shape}")
+    checks.particles_fit(name, rows.shape[1])
     # NaN compares as false. Beyond the limit the kinetic energy and phi overflow.
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)

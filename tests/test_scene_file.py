@@ -315,6 +315,14 @@ ROD = "points = [[0, 0, 0], [0.1, 0, 0]]\nmass = 0.5\nlinks = [[0, 1]]"
         ('kind = "chain"\nn = 3\nlength = 0.1\nmass = 0.5', lambda: swarm.chain(3, 0.1, 0.5)),
         (f'kind = "rigid"\ndensity = 500\nvertices = {[list(v) for v in CUBE]}', lambda: swarm.rigid(CUBE, 500.0)),
         (
+            f'kind = "rigid"\ndensity = 500\nvertices = {[list(v) for v in CUBE]}\ncontacts = 0.04',
+            lambda: swarm.rigid(CUBE, 500.0, contacts=0.04),
+        ),
+        (
+            f'kind = "rigid"\ndensity = 500\nvertices = {[list(v) for v in CUBE]}\ncontacts = [[0.05, 0.05, 0.0]]',
+            lambda: swarm.rigid(CUBE, 500.0, contacts=[(0.05, 0.05, 0.0)]),
+        ),
+        (
             'kind = "elastic"\nlengths = [0.1, 0.1, 0.2]\ncells = [1, 1, 2]\nyoung = 1e5\npoisson = 0.3\n'
             'density = 500\nmass = "consistent"',
             lambda: swarm.elastic(block((0.1, 0.1, 0.2), (1, 1, 2)), 1e5, 0.3, 500.0, mass="consistent"),
@@ -338,6 +346,11 @@ def test_one_body_where_its_points_are(tmp_path):
     assert start.position[:, :, 0].T.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
     assert start.velocity[:, :, 0].T.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]]
     assert start.body.anchors == {0: None}
+    across = "velocity = [[0, 0, 0], [0.5, 0, 1.5]]\nanchors = [{ point = 0 }]"
+    with pytest.raises(swarm.SceneError, match=r"\[body\]: velocity must agree .* 0\.5 m/s along links\[0\]"):
+        read(tmp_path, with_body(f'kind = "points"\n{ROD}\n{across}')).start()
+    nearest = read(tmp_path, with_body(f'kind = "points"\n{ROD}\n{across}\nproject = true')).start()
+    assert nearest.velocity[:, :, 0].T.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]]
     still = read(tmp_path, with_body(f'kind = "points"\n{ROD}')).start()
     assert len(still) == 1
     assert not still.velocity.any()

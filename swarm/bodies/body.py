@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..particles import Floats
 from ..surfaces.surface import Surface
-from . import checked, tied
+from . import checked, holding, room, tied
 from .checked import Pairs, Spring
 from .strain import Strain
 
@@ -77,7 +78,8 @@ class Body:
     ) -> None:
         places = checked.points("points", points)
         count = len(places)
-        led = checked.anchors(anchors, count)
+        room.require(count)
+        led = holding.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)
         values = {
             "points": places,
@@ -87,12 +89,14 @@ class Body:
             "contacts": touching,
             "strain": _of_body(strain, count),
             "anchors": led,
-            "guides": checked.guides(guides, places, led),
-            "cavities": checked.cavities(cavities, places),
+            "guides": holding.guides(guides, places, led),
+            "cavities": holding.cavities(cavities, places),
             "faces": checked.numbers("faces", faces, 3, len(touching)),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        room.require(count, len(self.bonds()) + len(self.guides) + len(self.cavities), len(touching), self._edges())
+        holding.uncoupled(self.anchors, self.mass_matrix)
         tied.require_reachable(self.points, self.links, self.anchors)
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
 
@@ -103,6 +107,9 @@ class Body:
     def __repr__(self) -> str:
         parts = {name: len(getattr(self, name)) for name in ("links", "springs", "anchors", "contacts", "faces")}
         return f"Body({', '.join([f'{len(self)} points', *(f'{n} {name}' for name, n in parts.items() if n)])})"
+
+    def _edges(self) -> int:
+        return 0 if self.strain is None else len(self.strain.edges)
 
     def bonds(self) -> Pairs:
         """(B, 2) all pairs that are tied, for readers that draw them."""
@@ -115,6 +122,6 @@ def _of_body(strain: Strain | None, count: int) -> Strain | None:
     if strain is None:
         return None
     if not isinstance(strain, Strain):
-        raise SceneError(f"strain must be a swarm.Strain or None, got {strain!r:.200}")
-    checked.numbers("strain.edges", strain.edges.tolist(), 2, count)
+        raise SceneError(f"strain must be a swarm.Strain or None, got {checks.shown(strain)}")
+    checked.numbers("strain.edges", strain.edges, 2, count)
     return strain

@@ -1,6 +1,7 @@
 """Checks of a body's arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import checks
 from ..errors import SceneError
-from ..motion import Motion
 from ..particles import Floats
-from ..surfaces.surface import SIDES, Surface
+from . import room
 
 Pairs = NDArray[np.int64]
 Spring = tuple[int, int, float, float]
@@ -19,17 +19,18 @@ Spring = tuple[int, int, float, float]
 _SAME_PLACE = 1e-12
 # The round-off of a matrix that was assembled, and of rows of coefficients, relative to their largest entry.
 _ROUND_OFF = 1e-12
-# How far from its surface a guided point may start, relative to the surface's size.
-_ON_SURFACE = 1e-9
+# Points of a body that is not known yet.
+_ANY_POINT = 1 << 31
 
 
 def points(name: str, value: ArrayLike) -> Floats:
     """`value` as (P, 3) places."""
-    rows = np.array(checks.array(name, value))
+    rows = checks.array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
         hint = "; transpose it" if rows.ndim == 2 and rows.shape[0] == 3 else ""
         raise SceneError(f"{name} must have shape (P, 3), one row a point, got {rows.shape}{hint}")
-    return finite(name, rows)
+    room.require(len(rows))
+    return finite(name, np.array(rows))
 
 
 def finite(name: str, values: Floats) -> Floats:
@@ -54,9 +55,10 @@ def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) ->
         if masses.shape not in ((), (count,)):
             raise SceneError(f"mass must be one number or have shape ({count},), got shape {masses.shape}")
         return np.diag(_masses("mass", np.broadcast_to(masses, (count,))))
-    rows = np.array(checks.array("mass_matrix", matrix))  # type: ignore[arg-type]
+    rows = checks.array("mass_matrix", matrix)  # type: ignore[arg-type]
     if rows.shape != (count, count):
         raise SceneError(f"mass_matrix must have shape ({count}, {count}), got {rows.shape}")
+    rows = np.array(rows)
     finite("mass_matrix", rows)
     _masses("the diagonal of mass_matrix", np.diagonal(rows))
     return _positive_definite("mass_matrix", symmetric("mass_matrix", rows))
@@ -87,7 +89,14 @@ def symmetric(name: str, matrix: Floats) -> Floats:
 def _positive_definite(name: str, matrix: Floats) -> Floats:
     # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
     scale = np.sqrt(np.diagonal(matrix))
-    values, vectors = np.linalg.eigh(matrix / scale / scale[:, None])
+    scaled = matrix / scale / scale[:, None]
+    try:
+        # Far faster than eigenvalues, which say where it is wrong.
+        least = _ROUND_OFF + 8.0 * len(matrix) * np.finfo(np.float64).eps
+        np.linalg.cholesky(scaled - least * np.eye(len(matrix)))
+        return matrix
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(scaled)
     if values[0] < _ROUND_OFF:
         mode = vectors[:, 0] / scale
         first = int(np.abs(mode).argmax())
@@ -115,9 +124,13 @@ def not_negative(name: str, matrix: Floats) -> None:
 
 def point(name: str, value: Any, count: int | None) -> int:
     """`value` as the number of one of `count` points."""
-    number = checks.count(name, value, least=0)
-    if count is not None and number >= count:
-        raise SceneError(f"{name} must be the number of a point, from 0 to {count - 1}, got {number}")
+    number, below = checks.count(name, value, least=0), _ANY_POINT if count is None else count
+    if number >= below:
+        raise SceneError(
+            f"{name} must be the number of a point, from 0 to {below - 1}, got {min(number, 10**300):.6g}"
+            if number >= _ANY_POINT
+            else f"{name} must be the number of a point, from 0 to {below - 1}, got {number}"
+        )
     return number
 
 
@@ -125,7 +138,7 @@ def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pa
     """`rows` as (N, width) numbers of points, no point twice in a row and no row twice; count None: of any body."""
     found: dict[frozenset[int], int] = {}
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each(name, rows, f"rows of {width} numbers of points"):
         parts = entries(f"{name}[{k}]", row, width, "numbers of points")
         given = [point(f"{name}[{k}][{i}]", part, count) for i, part in enumerate(parts)]
         if len(set(given)) < width:
@@ -140,12 +153,23 @@ def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pa
 def entries(name: str, row: Any, width: int, what: str) -> tuple[Any, ...]:
     """`row` as a tuple of `width` parts."""
     try:
-        parts = tuple(row)
+        # One more than there should be: what has no end is refused as well.
+        parts = tuple(itertools.islice(row, width + 1))
     except TypeError:
-        raise SceneError(f"{name} must be {width} {what}, got {row!r}") from None
+        raise SceneError(f"{name} must be {width} {what}, got {checks.shown(row)}") from None
     if len(parts) != width:
-        raise SceneError(f"{name} must be {width} {what}, got {len(parts)}: {row!r:.200}")
+        came = len(row) if isinstance(row, (list, tuple)) else len(parts) if len(parts) < width else "more"
+        raise SceneError(f"{name} must be {width} {what}, got {came}: {checks.shown(row)}")
     return parts
+
+
+def each(name: str, rows: Iterable[Any], what: str) -> Iterator[tuple[int, Any]]:
+    """The rows of an argument with their numbers; an array's as lists."""
+    try:
+        for k, row in enumerate(rows):
+            yield k, row.tolist() if isinstance(row, np.ndarray) else row
+    except TypeError:
+        raise SceneError(f"{name} must be {what}, got {checks.shown(rows)}") from None
 
 
 def links(rows: Iterable[Any], places: Floats) -> Pairs:
@@ -167,7 +191,7 @@ def _at_one_place(first: Floats, second: Floats) -> bool:
 def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
     """`rows` as springs (i, j, stiffness, rest length)."""
     result = []
-    for k, row in enumerate(rows):
+    for k, row in each("springs", rows, "rows (i, j, stiffness, rest length)"):
         given = entries(f"springs[{k}]", row, 4, "values (i, j, stiffness, rest length)")
         i, j = (point(f"springs[{k}][{n}]", given[n], len(places)) for n in range(2))
         if i == j:
@@ -188,106 +212,34 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
     """`value`, numbers of points or rows of coefficients, as (K, P) coefficients; no contact twice."""
     held = set(anchored)
     if value is None:
-        return np.eye(count)[[p for p in range(count) if p not in held]]
-    rows = np.array(checks.array("contacts", value))
+        free = [p for p in range(count) if p not in held]
+        room.require(count, contacts=len(free))
+        return np.eye(count)[free]
+    rows = checks.array("contacts", value)
+    room.require(count, contacts=len(rows) if rows.ndim else 0)
     if rows.ndim == 1:
         chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
+        # Faster than rows that are compared.
+        _require_once(chosen)
         rows = np.eye(count)[chosen]
     if rows.ndim != 2 or rows.shape[1] != count:
         raise SceneError(f"contacts must be numbers of points or have shape (K, {count}), got shape {rows.shape}")
-    finite("contacts", rows)
+    rows = finite("contacts", np.array(rows))
     sums, sizes = rows.sum(axis=1), np.abs(rows).sum(axis=1)
     for k in np.flatnonzero(np.abs(sums - 1.0) > _ROUND_OFF * np.maximum(sizes, 1.0)).tolist():
         raise SceneError(
             f"contacts[{k}], its coefficients, must add up to 1, got {sums[k]:g}: the point must move with its body"
         )
-    for k, row in enumerate(rows):
-        if set(np.flatnonzero(row).tolist()) <= held:
-            raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
-    _first, index = np.unique(rows, axis=0, return_index=True)
-    for k in sorted(set(range(len(rows))) - set(index.tolist())):
-        first = int(np.argmax((rows == rows[k]).all(axis=1)))
-        raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")
+    can_move = (np.delete(rows, sorted(held), axis=1) != 0.0).any(axis=1)
+    for k in np.flatnonzero(~can_move)[:1]:
+        raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
+    _require_once([row.tobytes() for row in rows + 0.0])
     return rows
 
 
-def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | None]:
-    """`value` as motions of points."""
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping):
-        raise SceneError(f"anchors must be a mapping of points to None or a motion, got {type(value).__name__}")
-    for key, motion in value.items():
-        point("a key of anchors", key, count)
-        if motion is not None and not isinstance(motion, Motion):
-            raise SceneError(
-                f"anchors[{key}] must be None, for a point that is fixed, or a Translation, Oscillation or Rotation, "
-                f"got {motion!r:.200}"
-            )
-    if len(value) == count:
-        raise SceneError(f"anchors must leave a point that can move, got all {count} points of the body")
-    return {int(key): motion for key, motion in value.items()}
-
-
-def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tuple[tuple[int, Surface], ...]:
-    """`rows` as (point, surface), each point on its surface."""
-    held = set(anchored)
-    result = []
-    for k, row in enumerate(rows):
-        given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
-        number = point(f"guides[{k}][0]", given[0], len(places))
-        surface = _smooth(f"guides[{k}][1]", given[1])
-        if number in held:
-            raise SceneError(f"guides[{k}] must hold a point that can move, got {number}, which is anchored")
-        on_surface(f"guides[{k}]: point {number}", surface, places[number, :, None])
-        result.append((number, surface))
-    return tuple(result)
-
-
-def on_surface(name: str, surface: Surface, places: Floats) -> None:
-    """Raise unless places (3, N) are on the surface."""
-    slopes = np.sqrt((surface.gradient(places) ** 2).sum(axis=0))
-    values = surface.phi(places)
-    off = np.abs(values) / np.maximum(slopes, np.finfo(np.float64).tiny)
-    room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
-    for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
-        which = f" of copy {i}" if places.shape[1] > 1 else ""
-        raise SceneError(
-            f"{name}{which} must start on its surface, within {_ON_SURFACE:g} of its size, got "
-            f"{places[:, i].tolist()}, where phi of {surface!r} is {values[i]:.3g}"
-        )
-
-
-def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
-    """`rows` as (surface, carrier, point), each point on the admissible side."""
-    result = []
-    for k, row in enumerate(rows):
-        given = entries(f"cavities[{k}]", row, 3, "values (surface, carrier, point)")
-        surface = _smooth(f"cavities[{k}][0]", given[0])
-        carrier, held = (point(f"cavities[{k}][{n}]", given[n], len(places)) for n in (1, 2))
-        if carrier == held:
-            raise SceneError(f"cavities[{k}] must name a carrier and another point, got {carrier} for both")
-        gap = SIDES[getattr(surface, "side", "inside")] * surface.phi((places[held] - places[carrier])[:, None])[0]
-        if not gap <= 0.0:
-            raise SceneError(
-                f"cavities[{k}]: point {held} must start on the admissible side of its surface, got a gap of "
-                f"{gap:.3g}; the surface's origin is point {carrier}"
-            )
-        result.append((surface, carrier, held))
-    return tuple(result)
-
-
-def _smooth(name: str, surface: Any) -> Surface:
-    if not isinstance(surface, Surface):
-        raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {surface!r:.200}")
-    walls = len(surface.walls())
-    if walls > 1:
-        raise SceneError(
-            f"{name} must be a surface without edges, got {surface!r} of {walls} walls; give one for each wall"
-        )
-    if surface.motion is not None or surface.reacts() or surface.openings:
-        raise SceneError(
-            f"{name} must have no motion, mass, inertia or openings, got {surface!r}; a cavity moves with its carrier, "
-            "and anchors lead points"
-        )
-    return surface
+def _require_once(given: list[Any]) -> None:
+    found: dict[Any, int] = {}
+    for k, one in enumerate(given):
+        first = found.setdefault(one, k)
+        if first < k:
+            raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")

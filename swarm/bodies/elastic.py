@@ -6,6 +6,7 @@ E = (F^T F - 1)/2. Six edges give the six components of E, so its energy V = vol
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..particles import Floats
-from . import checked
+from . import checked, room
 from .body import Body
 from .checked import Pairs
 from .strain import Strain
@@ -88,6 +89,7 @@ def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs
     """
     edges = [checks.length(f"lengths[{i}]", part) for i, part in enumerate(checks.vector("lengths", lengths))]
     counts = [checks.count(f"cells[{i}]", n) for i, n in enumerate(checked.entries("cells", cells, 3, "numbers"))]
+    room.require(math.prod(count + 1 for count in counts))
     axes = [edge * (np.arange(count + 1) / count - 0.5) for edge, count in zip(edges, counts, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     steps = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
@@ -106,7 +108,8 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
     if not isinstance(mesh, (tuple, list)) or len(mesh) != 2:
         raise SceneError(f"mesh must be two arrays (nodes, elements), got {type(mesh).__name__}")
     nodes = checked.points("nodes", mesh[0])
-    elements = checked.numbers("elements", np.asarray(mesh[1]).tolist(), 4, len(nodes))
+    room.require(len(nodes))
+    elements = checked.numbers("elements", mesh[1], 4, len(nodes))  # type: ignore[arg-type]
     if not len(elements):
         raise SceneError("elements must hold at least one tetrahedron, got none")
     for k in sorted(set(range(len(nodes))) - set(elements.ravel().tolist())):
@@ -152,6 +155,7 @@ def _strain(nodes: Floats, elements: Pairs, volumes: Floats, young: float, poiss
     pairs = np.sort(elements[:, _EDGES], axis=2).reshape(-1, 2)
     edges, number = np.unique(pairs, axis=0, return_inverse=True)
     number = number.reshape(-1, 6)
+    room.require(len(nodes), ties=len(edges), edges=len(edges))
     matrix = np.zeros((len(edges), len(edges)))
     np.add.at(matrix, (number[:, :, None], number[:, None, :]), stiffness)
     rest = ((nodes[edges[:, 0]] - nodes[edges[:, 1]]) ** 2).sum(axis=1)

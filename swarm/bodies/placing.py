@@ -40,6 +40,8 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     >>> place(cavity, swarm.tetrahedron(edge=0.1, mass=1.0), 10, speed=0.5, spin=3.0, seed=1)
     Bodies(10 of 4 points)
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"scene must be a swarm.Scene, got {checks.shown(scene)}")
     _require_free(body)
     n = checks.count("n", n)
     checks.particles_fit("n", n * len(body))
@@ -58,7 +60,7 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
 
 def _require_free(body: Body) -> None:
     if not isinstance(body, Body):
-        raise SceneError(f"body must be a swarm.Body, got {body!r:.200}")
+        raise SceneError(f"body must be a swarm.Body, got {checks.shown(body)}")
     for name in ("anchors", "guides", "cavities"):
         if getattr(body, name):
             raise SceneError(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..particles import Floats
-from . import checked
+from . import checked, covering, room
 from .body import Body
 from .checked import Pairs
 
@@ -59,6 +59,7 @@ def chain(n: int, length: float, mass: float) -> Body:
     Body(10 points, 9 links, 10 contacts)
     """
     n = checks.count("n", n, least=2)
+    room.require(n, ties=n - 1, contacts=n)
     length, mass = checks.length("length", length), checks.positive("mass", mass)
     points = np.zeros((n, 3))
     points[:, 0] = length * (np.arange(n) / (n - 1) - 0.5)
@@ -85,20 +86,25 @@ def tetrahedron(edge: float, mass: float) -> Body:
     return Body(_CORNERS * (edge / np.sqrt(8.0)), mass / 4.0, links=_ALL_PAIRS, faces=_OUTWARD)
 
 
-def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -> Body:
+def rigid(
+    vertices: ArrayLike, density: float, faces: ArrayLike | None = None, contacts: ArrayLike | None = None
+) -> Body:
     """A rigid homogeneous polyhedron.
 
     Its four base points are mass points of a quarter of its mass each, placed so that their centre and their inertia
-    are exactly those of the solid. The vertices are its contact points.
+    are exactly those of the solid. The vertices are its contact points; between them nothing touches a wall, so a solid
+    that is smaller than a face, or a corner of one, passes into the body unless `contacts` are closer than it is wide.
 
     Args:
         vertices: (K, 3) corners [m].
         density: above 0 [kg/m^3].
         faces: (F, 3) triangles of vertices, closed, anticlockwise seen from outside; None: the convex hull, which needs
             SciPy.
+        contacts: what touches walls besides the vertices: a number, points on the edges and in the faces that are at
+            most so far from their neighbours [m]; or points (Q, 3) anywhere in the body [m].
 
     Returns:
-        The body; vertex k is its contact point k, where it was given.
+        The body; vertex k is its contact point k, where it was given, and the other contact points follow.
 
     Raises:
         SceneError: an argument is out of its range; the vertices lie in a plane; the faces are not closed, or do not
@@ -111,6 +117,7 @@ def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -
     6.0
     """
     corners = checked.points("vertices", vertices)
+    room.require(4, contacts=len(corners))
     density = checks.positive("density", density)
     triangles = _hull(corners) if faces is None else _closed(corners, faces)
     volume, center, moment = _moments(corners, triangles)
@@ -118,11 +125,21 @@ def rigid(vertices: ArrayLike, density: float, faces: ArrayLike | None = None) -
     if not squares[0] > _FLAT**2 * squares[2]:
         raise _flat(corners)
     base = center + _CORNERS @ ((axes * np.sqrt(squares)) @ axes.T)
-    # Weights of the base points, which add up to 1, that give each corner.
+    touching = np.concatenate([corners, _between(corners, triangles, contacts)])
+    # Weights of the base points, which add up to 1, that give each of these.
     weights = np.linalg.solve(
-        np.vstack([(base - center).T, np.ones(4)]), np.vstack([(corners - center).T, np.ones(len(corners))])
+        np.vstack([(base - center).T, np.ones(4)]), np.vstack([(touching - center).T, np.ones(len(touching))])
     )
     return Body(base, density * volume / 4.0, links=_ALL_PAIRS, contacts=weights.T, faces=triangles.tolist())
+
+
+def _between(corners: Floats, triangles: Pairs, contacts: ArrayLike | None) -> Floats:
+    """The contact points (Q, 3) that are no corners."""
+    if contacts is None:
+        return np.zeros((0, 3))
+    if checks.array("contacts", contacts).ndim == 0:
+        return covering.points(corners, triangles, checks.length("contacts", contacts))
+    return checked.points("contacts", contacts)
 
 
 def _flat(corners: Floats) -> SceneError:
@@ -153,7 +170,7 @@ def _hull(corners: Floats) -> Pairs:
 
 def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
     """`faces` as triangles, each of whose sides is run through once in both directions."""
-    triangles = checked.numbers("faces", np.asarray(faces).tolist(), 3, len(corners))
+    triangles = checked.numbers("faces", faces, 3, len(corners))  # type: ignore[arg-type]
     if not len(triangles):
         raise SceneError(
             "faces must hold the triangles of a closed surface, got none; leave it out for the convex hull"

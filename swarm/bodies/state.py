@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..particles import Floats, Particles
-from . import checked
+from . import checked, holding, velocities
 from .body import Body
 from .checked import Pairs
 
@@ -20,23 +20,43 @@ class Bodies:
     Args:
         body: the template. An anchored point of a copy is fixed, or led from, where that copy has it.
         position: (3, P, n) or, of one copy, (3, P) [m], rows x, y, z of every point; the links have their lengths.
-        velocity: the same shape [m/s].
+        velocity: the same shape [m/s]: along a link its points have the same, across a guide a point has none, and that
+            of an anchored point is of its path at the start, or 0, which stands for it.
+        project: whether the nearest velocities that agree with links, guides and paths are taken, nearest in the metric
+            of the kinetic energy; False: velocities that do not agree are an error.
 
-    The arrays are copied, in C order.
+    The arrays are copied, in C order. Those of a result or a trajectory agree as far as the steps of the run let them.
 
     Raises:
         SceneError: wrong shapes, no copy, a value that is not finite or beyond 1e100, a link that is not as long as the
-            template's, a guided point that is not on its surface.
+            template's, a guided point that is not on its surface, velocities that contradict a link, a guide or a path.
 
     >>> import swarm
     >>> rod = swarm.dumbbell(length=2.0, mass=1.0)
     >>> Bodies(rod, rod.points.T, np.zeros((3, 2)))
     Bodies(1 of 2 points)
+    >>> Bodies(rod, rod.points.T, [[1.0, 0.0], [0.0, 2.0], [0.0, 0.0]], project=True).velocity[:, :, 0]
+    array([[0.5, 0.5],
+           [0. , 2. ],
+           [0. , 0. ]])
     """
 
-    def __init__(self, body: Body, position: ArrayLike, velocity: ArrayLike) -> None:
+    body: Body
+    position: Floats
+    velocity: Floats
+    # Whether a run left them: its steps keep lengths, and velocities along ties but to the order of the step.
+    _is_of_run = False
+
+    def __init__(self, body: Body, position: ArrayLike, velocity: ArrayLike, *, project: bool = False) -> None:
+        self._take(body, position, velocity)
+        self.velocity = velocities.led_along(body, self.position, self.velocity)
+        if checks.flag("project", project):
+            self.velocity = velocities.projected(body, self.position, self.velocity)
+        velocities.require_agreed(body, self.position, self.velocity, project)
+
+    def _take(self, body: Body, position: ArrayLike, velocity: ArrayLike) -> None:
         if not isinstance(body, Body):
-            raise SceneError(f"body must be a swarm.Body, got {body!r:.200}")
+            raise SceneError(f"body must be a swarm.Body, got {checks.shown(body)}")
         self.body = body
         self.position = _rows("position", position, len(body))
         self.velocity = _rows("velocity", velocity, len(body))
@@ -46,11 +66,15 @@ class Bodies:
             )
         _require_lengths(body, self.position)
         for k, (point, surface) in enumerate(body.guides):
-            checked.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
+            holding.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
 
     def copy(self) -> "Bodies":
-        """The same bodies, checked again, with arrays of their own."""
-        return Bodies(self.body, self.position, self.velocity)
+        """The same bodies as a start, checked again, with arrays of their own."""
+        if not self._is_of_run:
+            return Bodies(self.body, self.position, self.velocity)
+        made = Bodies.of_run(self.body, self.position, self.velocity)
+        made.velocity = velocities.led_along(made.body, made.position, made.velocity)
+        return made
 
     def __len__(self) -> int:
         return int(self.position.shape[2])
@@ -76,7 +100,15 @@ class Bodies:
     def unchecked(body: Body, position: Floats, velocity: Floats) -> "Bodies":
         """Bodies of a run: a tolerance of Uzawa's loop is the run's, and more than what a start may be off by."""
         made = object.__new__(Bodies)
-        made.body, made.position, made.velocity = body, position, velocity
+        made.body, made.position, made.velocity, made._is_of_run = body, position, velocity, True
+        return made
+
+    @staticmethod
+    def of_run(body: Body, position: ArrayLike, velocity: ArrayLike) -> "Bodies":
+        """Bodies that a run left, checked as those of a start but for their velocities."""
+        made = object.__new__(Bodies)
+        made._take(body, position, velocity)
+        made._is_of_run = True
         return made
 
     def particles(self) -> Particles:
@@ -91,7 +123,7 @@ class Bodies:
 
 
 def _rows(name: str, value: ArrayLike, count: int) -> Floats:
-    rows = np.array(checks.array(name, value), order="C")
+    rows = checks.array(name, value)
     if rows.ndim == 2:
         rows = rows[:, :, None]
     if rows.ndim != 3 or rows.shape[:2] != (3, count) or not rows.shape[2]:
@@ -99,7 +131,8 @@ def _rows(name: str, value: ArrayLike, count: int) -> Floats:
             f"{name} must have shape (3, {count}, n), rows x, y, z of the {count} points of n copies, at least one, "
             f"got {np.shape(value)}"
         )
-    return checked.finite(name, rows)
+    checks.particles_fit(name, count * rows.shape[2])
+    return checked.finite(name, np.array(rows, order="C"))
 
 
 def _require_lengths(body: Body, position: Floats) -> None:

@@ -33,7 +33,7 @@ class Strain:
     stiffness: Floats
 
     def __post_init__(self) -> None:
-        edges = checked.numbers("strain.edges", np.asarray(self.edges).tolist(), 2, None)
+        edges = checked.numbers("strain.edges", self.edges, 2, None)
         size = len(edges)
         if not size:
             raise SceneError("strain.edges must hold at least one edge, got none")
@@ -55,7 +55,7 @@ class Strain:
 
 
 def _shaped(name: str, value: Floats, shape: tuple[int, ...]) -> Floats:
-    array = np.array(checks.array(name, value))
+    array = checks.array(name, value)
     if array.shape != shape:
         raise SceneError(f"{name} must have shape {shape}, as there are {shape[0]} edges, got {array.shape}")
-    return checked.finite(name, array)
+    return checked.finite(name, np.array(array))

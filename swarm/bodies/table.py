@@ -16,6 +16,7 @@ from ..errors import SceneError
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
+from . import room
 from .body import Body
 from .strain import Strain
 
@@ -110,12 +111,13 @@ class Rigid(Made):
     vertices: tuple[Vector, ...]
     density: float
     faces: tuple[tuple[int, int, int], ...] | None = None
+    contacts: float | tuple[Vector, ...] | None = None
 
     def body(self) -> Body:
         """A polyhedron."""
         from .shapes import rigid
 
-        return rigid(self.vertices, self.density, self.faces)
+        return rigid(self.vertices, self.density, self.faces, self.contacts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +144,7 @@ class Points(Made):
 
     points: tuple[Vector, ...]
     velocity: tuple[Vector, ...] | None = None
+    project: bool = False
     mass: float | tuple[float, ...] | None = None
     mass_matrix: tuple[tuple[float, ...], ...] | None = None
     links: tuple[tuple[int, int], ...] = ()
@@ -174,15 +177,16 @@ class Points(Made):
         from .state import Bodies
 
         if self.count is not None:
-            if self.velocity is not None:
-                raise SceneError("velocity: must go without count, got both; copies at random have speed and spin")
+            for name in ("velocity", "project"):
+                if getattr(self, name):
+                    raise SceneError(f"{name}: must go without count, got both; copies at random have speed and spin")
             return super().start(scene)
         placed = [name for name in ("speed", "spin", "seed") if getattr(self, name) is not None]
         if placed:
             raise SceneError(f"{placed[0]}: is of copies at random; add count = ..., or give velocity = ... instead")
         position = np.array(self.points)
         velocity = np.zeros_like(position) if self.velocity is None else np.array(self.velocity)
-        return Bodies(self.body(), position.T, velocity.T)
+        return Bodies(self.body(), position.T, velocity.T, project=self.project)
 
 
 KINDS: dict[str, type[Made]] = {
@@ -204,6 +208,7 @@ class _Strain:
 
     def strain(self) -> Strain:
         n = len(self.edges)
+        room.require(0, edges=n)
         matrix = np.zeros((n, n))
         for k, (i, j, value) in enumerate(self.stiffness):
             if not (0 <= i < n and 0 <= j < n):
@@ -241,7 +246,7 @@ def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
 def _anchor(table: Any, where: str) -> tuple[int, Any]:
     """A point, and the motion that leads it, if the table has a kind."""
     if not isinstance(table, dict) or type(table.get("point")) is not int:
-        raise SceneError(f"{where}: expected a table with the number of a point, got {table!r}")
+        raise SceneError(f"{where}: expected a table with the number of a point, got {checks.shown(table)}")
     motion = {key: value for key, value in table.items() if key != "point"}
     return table["point"], tables.of_kind(motion, where, _motions()) if motion else None
 

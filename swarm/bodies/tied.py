@@ -1,5 +1,6 @@
 """Whether a body can move as its links and its led points ask: which links are redundant, which paths too long."""
 
+import heapq
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,9 @@ from .checked import Pairs
 # Links depend on each other where their directions agree to the square root of this: their system of equations has
 # the inverse of it as condition, and multipliers have no digit then.
 _DEPENDENT = 1e-12
+# Directions at a point are clearly independent where no eigenvalue of their products is below this: an angle of 8
+# degrees between two.
+_CLEAR = 1e-2
 # A link takes part in a dependence if its share of it is not round-off.
 _SHARE = 1e-5
 # Errors of distances that are round-off, relative.
@@ -28,20 +32,19 @@ def require_independent(
     points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]]
 ) -> None:
     """Raise unless the forces of links and guides are determined: their directions must be independent."""
-    names = [f"links[{k}] {tuple(pair)}" for k, pair in enumerate(links.tolist())]
-    names += [f"guides[{k}] (point {guide[0]})" for k, guide in enumerate(guides)]
-    if not names:
-        return
-    null = _dependences(points, links, anchors, guides)
+    left = _left(points, links, anchors, guides)
+    null = _dependences(points, links, anchors, guides, left)
     if not null.shape[1]:
         return
-    involved = [name for name, row in zip(names, np.abs(null), strict=True) if row.max() > _SHARE]
+    names = [f"links[{k}] {tuple(pair)}" for k, pair in enumerate(links.tolist())]
+    names += [f"guides[{k}] (point {guide[0]})" for k, guide in enumerate(guides)]
+    involved = [names[k] for k, row in zip(left, np.abs(null), strict=True) if row.max() > _SHARE]
     said = ", ".join(involved[:_NAMED]) + (f" and {len(involved) - _NAMED} more" if len(involved) > _NAMED else "")
     # Somewhere else the same links may be independent: then it is the place of the points that is special.
     size = np.ptp(points, axis=0).max()
     elsewhere = points + 0.1 * size * np.random.default_rng(0).standard_normal(points.shape)
     excess = null.shape[1]
-    if _dependences(elsewhere, links, anchors, guides).shape[1] < excess:
+    if _dependences(elsewhere, links, anchors, guides, left).shape[1] < excess:
         raise SceneError(
             f"links and guides must be independent, got {said}, whose directions depend on each other where the points "
             "are (in a line or in a plane, say): their forces are not determined; leave out "
@@ -53,19 +56,69 @@ def require_independent(
     )
 
 
-def _dependences(points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]]) -> Floats:
-    """(links + guides, D) combinations of the constraints' directions that vanish."""
-    directions = np.zeros((len(links) + len(guides), *points.shape))
-    every = np.arange(len(links))
-    apart = points[links[:, 0]] - points[links[:, 1]]
-    directions[every, links[:, 0]], directions[every, links[:, 1]] = apart, -apart
-    for k, (point, surface) in enumerate(guides, start=len(links)):
-        directions[k, point] = surface.gradient(points[point, :, None])[:, 0]
-    directions[:, list(anchors)] = 0.0
+def _direction(
+    points: Floats, links: Pairs, guides: Sequence[tuple[int, Any]], number: int
+) -> tuple[tuple[int, ...], Floats]:
+    """The points of a link, or of a guide by numbers after those of links, and its direction, of the first."""
+    if number < len(links):
+        i, j = links[number].tolist()
+        return (i, j), points[i] - points[j]
+    point, surface = guides[number - len(links)]
+    return (point,), surface.gradient(points[point, :, None])[:, 0]
+
+
+def _left(points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]]) -> list[int]:
+    """The constraints whose independence is not seen point by point: of a chain or a tree none.
+
+    Where those at a point, at most three, are clearly independent of each other, no others can be combined to cancel
+    them there: they take part in no dependence, and are left out, with what that frees at their other ends.
+    """
+    at: list[dict[int, Floats]] = [{} for _point in points]
+    ends = {}
+    for number in range(len(links) + len(guides)):
+        held, direction = _direction(points, links, guides, number)
+        length = np.sqrt((direction**2).sum())
+        ends[number] = held
+        for point in held:
+            if point not in anchors:
+                at[point][number] = direction / max(length, np.finfo(np.float64).tiny)
+    left, waiting = dict.fromkeys(range(len(ends))), list(range(len(points)))
+    while waiting:
+        point = waiting.pop()
+        rows = np.array(list(at[point].values()))
+        if 0 < len(rows) <= 3 and np.linalg.eigvalsh(rows @ rows.T)[0] > _CLEAR:
+            for number in list(at[point]):
+                del left[number]
+                for end in ends[number]:
+                    at[end].pop(number, None)
+                    waiting.append(end)
+    return list(left)
+
+
+def _dependences(
+    points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]], chosen: Sequence[int]
+) -> Floats:
+    """(chosen, D) combinations of the directions of these constraints that vanish."""
+    if not chosen:
+        return np.zeros((0, 0))
+    given = [_direction(points, links, guides, number) for number in chosen]
+    free = sorted({point for held, _direction in given for point in held} - set(anchors))
+    place = {point: k for k, point in enumerate(free)}
+    directions = np.zeros((len(chosen), len(free), 3))
+    for row, (held, direction) in zip(directions, given, strict=True):
+        for point, sign in zip(held, (1.0, -1.0), strict=False):
+            if point in place:
+                row[place[point]] = sign * direction
     rows = directions.reshape(len(directions), -1)
     rows /= np.maximum(np.sqrt((rows**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
-    values, vectors = np.linalg.eigh(rows @ rows.T)
-    return vectors[:, values < _DEPENDENT]
+    products, size = rows @ rows.T, len(rows)
+    try:
+        # Far faster than eigenvalues: it ends well where all are above this, round-off and all.
+        np.linalg.cholesky(products - (10.0 * _DEPENDENT + 8.0 * size * np.finfo(np.float64).eps) * np.eye(size))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(products)
+        return np.asarray(vectors[:, values < _DEPENDENT])
+    return np.zeros((size, 0))
 
 
 def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion | None]) -> None:
@@ -84,15 +137,18 @@ def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion
             raise SceneError(
                 f"links[{k}], {(i, j)}, must tie a point that can move, got two that are anchored; leave it out"
             )
-    reach = _reach(points, links)
-    led_points = sorted(paths)
-    for i, j in ((i, j) for i in led_points for j in led_points if i < j and np.isfinite(reach[i, j])):
-        farthest = _distances(paths[i], paths[j], drift=False).max()
-        if farthest > reach[i, j] * (1.0 + _ROUND_OFF):
-            raise SceneError(
-                f"anchors[{i}] and anchors[{j}] must stay within the reach of the links between them, "
-                f"{reach[i, j]:g} m, but are led up to {farthest:g} m apart; shorten the path, or lengthen the links"
-            )
+    # Fixed points are where they are, and there the links have their lengths.
+    moving = [point for point in sorted(paths) if anchors[point] is not None]
+    for i in moving:
+        reach = _reach(points, links, i)
+        for j in (j for j in sorted(paths) if j in reach and j != i and not (j in moving and j < i)):
+            farthest = _distances(paths[i], paths[j], drift=False).max()
+            if farthest > reach[j] * (1.0 + _ROUND_OFF):
+                first, second = sorted((i, j))
+                raise SceneError(
+                    f"anchors[{first}] and anchors[{second}] must stay within the reach of the links between them, "
+                    f"{reach[j]:g} m, but are led up to {farthest:g} m apart; shorten the path, or lengthen the links"
+                )
 
 
 def _distances(first: Led, second: Led, drift: bool = True) -> Floats:
@@ -108,12 +164,19 @@ def _distances(first: Led, second: Led, drift: bool = True) -> Floats:
     return np.asarray(np.sqrt(((first.position(times) - second.position(times)) ** 2).sum(axis=0)))
 
 
-def _reach(points: Floats, links: Pairs) -> Floats:
-    """(P, P) lengths of the shortest ways from point to point along links."""
-    reach = np.full((len(points),) * 2, np.inf)
-    np.fill_diagonal(reach, 0.0)
-    i, j = links.T
-    reach[i, j] = reach[j, i] = np.sqrt(((points[i] - points[j]) ** 2).sum(axis=1))
-    for middle in range(len(points)):
-        reach = np.minimum(reach, reach[:, middle, None] + reach[middle])
-    return reach
+def _reach(points: Floats, links: Pairs, start: int) -> dict[int, float]:
+    """The lengths of the shortest ways along links from a point, to each that can be reached (Dijkstra)."""
+    lengths = np.sqrt(((points[links[:, 0]] - points[links[:, 1]]) ** 2).sum(axis=1)).tolist()
+    ways: dict[int, list[tuple[float, int]]] = {}
+    for (i, j), length in zip(links.tolist(), lengths, strict=True):
+        ways.setdefault(i, []).append((length, j))
+        ways.setdefault(j, []).append((length, i))
+    found: dict[int, float] = {}
+    waiting = [(0.0, start)]
+    while waiting:
+        length, point = heapq.heappop(waiting)
+        if point not in found:
+            found[point] = length
+            for part, end in ways.get(point, ()):
+                heapq.heappush(waiting, (length + part, end))
+    return found

@@ -140,7 +140,7 @@ class Trajectory(Presented):
         from ..bodies.state import Bodies
 
         with self._reading(f"frame {k}"):
-            return Bodies(body, points.position.reshape(shape), points.velocity.reshape(shape))
+            return Bodies.of_run(body, points.position.reshape(shape), points.velocity.reshape(shape))
 
     def impacts(self, k: int) -> NDArray[np.int64]:
         """How many impacts each of the particles of frame k has had since the start, (N,)."""

@@ -7,11 +7,11 @@ from ..errors import SceneError
 from ..methods import AugmentedLagrangian, Impact, Penalty
 from ..methods.base import Method, check_laws, check_surfaces
 from ..methods.fixed_step import check_solids
-from ..motion import Path, led, parts_of
+from ..motion import Path, parts_of
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
-from . import workload
+from . import passing, workload
 from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
@@ -88,8 +88,8 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
-    _lead(bodies)
     assert method.dt is not None  # type: ignore[attr-defined]
+    passing.check(scene, bodies.body)
     workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
     if options.compile != "never":
@@ -157,23 +157,6 @@ def _require_paths(scene: Scene, until: float) -> None:
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
                     f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
                 )
-
-
-def _lead(bodies: Bodies) -> None:
-    """Give anchored points the velocity of their paths."""
-    body = bodies.body
-    for point, motion in body.anchors.items():
-        for k in range(len(bodies)):
-            bodies.velocity[:, point, k] = led(motion, bodies.position[:, point, k]).velocity_at(0.0)
-        coupled = np.flatnonzero(body.mass_matrix[point])
-        if motion is not None and not set(coupled.tolist()) <= set(body.anchors):
-            raise SceneError(
-                f"anchors[{point}] must be None, fixed in space, or its point have no mass coupling with points that "
-                f"can move, got {motion} and a mass_matrix with couplings of point {point} to points {coupled.tolist()}"
-            )
-    for k, (_point, surface) in enumerate(body.guides):
-        if surface.friction > 0.0:
-            raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
 
 
 def _in_the_cell(scene: Scene, particles: Particles) -> Particles:

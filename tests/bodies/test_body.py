@@ -13,6 +13,7 @@ RING = [(0, 1), (1, 2), (2, 3), (3, 0)]
 ALL_OF_5 = list(itertools.combinations(range(5), 2))
 ANYWHERE = np.random.default_rng(5).standard_normal((5, 3))
 FLOOR = swarm.Plane((0.0, 0.0, 1.0), 0.0)
+SPHERES = swarm.Spheres([(0.0, 0.0, 0.0), (9.0, 0.0, 0.0)], 1.0)
 SPRING = swarm.Strain([(0, 1)], [1.0], [[1.0]])
 
 
@@ -169,6 +170,14 @@ def test_what_is_not_linked_may_go_anywhere():
         ),
         ({"guides": [(0, "floor")]}, ["guides[0][1]", "surface", "floor"]),
         ({"guides": [(0,)]}, ["guides[0]", "2 values"]),
+        ({"guides": [(0, SPHERES)]}, ["guides[0][1]", "one surface", "field of 2", "one of them"]),
+        ({"cavities": [(SPHERES, 0, 1)]}, ["cavities[0][0]", "one surface", "field of 2"]),
+        ({"guides": [(1, swarm.Sphere(1.0, friction=0.1))]}, ["guides[0].friction", "must be 0", "0.1"]),
+        ({"guides": [(1, swarm.Sphere(1.0, temperature=300.0))]}, ["guides[0][1].temperature", "None", "300"]),
+        ({"cavities": [(swarm.Sphere(2.0, temperature=300.0), 0, 1)]}, ["cavities[0][0].temperature", "None", "300"]),
+        ({"links": None}, ["links", "rows of 2 numbers of points", "None"]),
+        ({"links": 5}, ["links", "rows of 2 numbers of points", "got 5"]),
+        ({"faces": [(0, 1, 2), (1, 2)]}, ["faces[1]", "3 numbers of points", "got 2"]),
         ({"guides": [(0, swarm.Box((1.0, 1.0, 1.0)))]}, ["guides[0][1]", "without edges", "3 walls"]),
         ({"guides": [(0, swarm.Sphere(1.0))]}, ["guides[0]: point 0", "on its surface", "phi", "is -1"]),
         ({"guides": [(1, swarm.Sphere(1.0 + 1e-8))]}, ["guides[0]: point 1", "on its surface"]),

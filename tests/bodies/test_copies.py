@@ -10,7 +10,9 @@ import swarm
 BODY = swarm.tetrahedron(edge=1.0, mass=4.0)
 # Two copies, the second 3 m farther along x.
 PLACES = BODY.points.T[:, :, None] + np.array([0.0, 3.0]) * np.array([1.0, 0.0, 0.0])[:, None, None]
-RATES = np.arange(24.0).reshape(3, 4, 2)
+# Each copy drifts and turns as a rigid body: all numbers differ.
+DRIFT, SPIN = np.array([[1.0, 4.0], [-2.0, 7.0], [3.0, -5.0]]), np.array([[0.5, -1.0], [2.0, 3.0], [-1.5, 0.25]])
+RATES = DRIFT[:, None] + np.cross(SPIN[:, None], BODY.points.T[:, :, None], axis=0)
 
 
 def test_arrays_are_copied_in_c_order():

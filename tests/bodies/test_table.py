@@ -24,6 +24,7 @@ CRANK = swarm.Body(
 BODIES = {
     "dumbbell": swarm.dumbbell(length=0.1, mass=0.3),
     "cube": swarm.rigid(CORNERS, density=1000.0 / 3.0),
+    "dense": swarm.rigid(CORNERS, density=1000.0 / 3.0, contacts=0.1),
     "elastic": swarm.elastic(block((0.1, 0.2, 0.3), (2, 1, 1)), young=1e5 / 3.0, poisson=0.3, density=1.1),
     "consistent": swarm.elastic(block((0.1, 0.2, 0.3), (1, 1, 1)), 1e5, 0.3, 1.1, mass="consistent"),
     "crank": CRANK,

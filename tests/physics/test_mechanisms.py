@@ -15,7 +15,8 @@ DOWN = (0.0, 0.0, -9.81)
 
 
 def at_rest(body):
-    return swarm.Bodies(body, body.points.T[:, :, None], np.zeros((3, len(body), 1)))
+    """As much as anchors that are led along a link let it be."""
+    return swarm.Bodies(body, body.points.T[:, :, None], np.zeros((3, len(body), 1)), project=True)
 
 
 def run(bodies, until, dt, order=2, gravity=DOWN, walls=FAR, **options):
@@ -221,12 +222,10 @@ def test_a_rod_whose_end_slides_on_a_floor_keeps_its_energy():
 
 def test_a_led_point_with_a_coupled_mass_is_refused():
     matrix = np.array([[2.0, 0.5], [0.5, 2.0]])
-    body = swarm.Body([[0, 0, 0], [0.1, 0, 0]], mass_matrix=matrix, links=[(0, 1)], anchors={0: LED["translation"]})
     with pytest.raises(swarm.SceneError, match="no mass coupling"):
-        run(at_rest(body), 1.0, 1e-2)
+        swarm.Body([[0, 0, 0], [0.1, 0, 0]], mass_matrix=matrix, links=[(0, 1)], anchors={0: LED["translation"]})
 
 
 def test_a_guide_with_friction_is_refused():
-    body = swarm.Body([[0.3, 0, 0]], mass=1.0, guides=[(0, swarm.Sphere(0.3, friction=0.1))])
     with pytest.raises(swarm.SceneError, match=r"guides\[0\].friction must be 0"):
-        run(at_rest(body), 1.0, 1e-2)
+        swarm.Body([[0.3, 0, 0]], mass=1.0, guides=[(0, swarm.Sphere(0.3, friction=0.1))])

@@ -19,7 +19,8 @@ _CHATTER = 12
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
 SHORT = 1.0 / 16.0
 # Units of round-off by which a body may miss its energy.
-_ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
+_EPS = float(np.finfo(np.float64).eps)
+_ROUND_OFF = 64.0 * _EPS
 # After so many blows without a step the contacts last.
 _LASTS = 20
 
@@ -60,10 +61,12 @@ def _restore(ties, rule, lanes, state, i, number):
             fall -= mass * rule.gravity[x] * lanes.r[p, x, i]
     missing = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
     if abs(missing) <= _ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
+        # To first order: a body that has come to rest has no velocity by which more could be restored.
         factor = 0.5 * missing / kinetic
-        for q in range(lanes.v.shape[0]):
-            for x in range(3):
-                lanes.v[q, x, i] += factor * lanes.v[q, x, i]
+        if factor * factor <= _EPS:
+            for q in range(lanes.v.shape[0]):
+                for x in range(3):
+                    lanes.v[q, x, i] += factor * lanes.v[q, x, i]
 
 
 @inlined

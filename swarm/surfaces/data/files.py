@@ -7,8 +7,8 @@ from typing import Any
 from ...checks import closest, listed
 from ...errors import SceneError
 from ..surface import Surface
+from .arrays import read
 from .mesh import from_mesh
-from .sampled import read
 
 _MESH = ("kind", "file", "spacing", "side", "scale", *(one.name for one in fields(Surface)))
 

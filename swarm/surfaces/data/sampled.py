@@ -16,6 +16,7 @@ from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from . import flight as _flight  # noqa: F401
 from . import spline
+from .arrays import read
 from .cells import Cells, cells_of, eigenvalues, least_at_border
 from .numbers import SampledNumbers
 from .spline import Spline
@@ -170,7 +171,7 @@ class Samples:
 
 
 def _spacing(value: Any) -> Vector:
-    if np.ndim(value) == 0 or isinstance(value, str | bytes):
+    if not isinstance(value, (list, tuple)) and getattr(value, "ndim", 0) == 0:
         one = checks.length("spacing", value)
         return one, one, one
     x, y, z = (checks.length(f"spacing[{k}]", part) for k, part in enumerate(checks.vector("spacing", value)))
@@ -181,12 +182,13 @@ def _samples(values: Any) -> Floats:
     """The argument `values`, checked: an array or a path."""
     if isinstance(values, str | Path):
         values = read(values)
-    found = np.ascontiguousarray(checks.array("values", values))
+    found = checks.array("values", values)
     if found.ndim != 3 or min(found.shape) < spline.LEAST:
         raise SceneError(
             f"values must have the shape (nx, ny, nz), {spline.LEAST} samples or more along each axis, got "
             f"{found.shape}"
         )
+    found = np.ascontiguousarray(found)
     wrong = ~np.isfinite(found)
     if wrong.any():
         i, j, k = np.argwhere(wrong)[0]
@@ -229,29 +231,3 @@ def _require_resolved(values: Floats, width: Floats, origin: Floats) -> None:
                     f"{first[at]:.4g} and values{end.tolist()} = {last[at]:.4g}, at ({where}), phi changes its sign "
                     "twice; sample it with a smaller spacing"
                 )
-
-
-# --- Files -----------------------------------------------------------------------------------------------
-
-
-def read(path: str | Path) -> Floats:
-    """The samples in a .npy file, or in the one dataset with three axes of an HDF5 file.
-
-    Raises:
-        SceneError: the file cannot be read, or holds no such array.
-    """
-    path = Path(path)
-    try:
-        if path.suffix.lower() == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        import h5py
-
-        with h5py.File(path, "r") as file:
-            found: list[Any] = []
-            file.visititems(lambda _name, one: found.append(one) if getattr(one, "ndim", 0) == 3 else None)
-            if len(found) != 1:
-                named = checks.listed(one.name for one in found) or "none"
-                raise SceneError(f"{path} must hold one dataset with three axes, got {named}")
-            return np.asarray(found[0][()])
-    except (OSError, ValueError, EOFError) as error:
-        raise SceneError(f"cannot read the samples in {path}: {error}") from error

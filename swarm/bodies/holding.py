@@ -1,0 +1,117 @@
+"""Checks of what holds points of a body: anchors, guides, and the cavities that others carry."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..errors import SceneError
+from ..motion import Motion
+from ..particles import Floats
+from ..surfaces.fields.many import Many
+from ..surfaces.surface import SIDES, Surface
+from .checked import each, entries, point
+
+# How far from its surface a guided point may start, relative to the surface's size.
+_ON_SURFACE = 1e-9
+
+
+def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | None]:
+    """`value` as motions of points."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise SceneError(f"anchors must be a mapping of points to None or a motion, got {type(value).__name__}")
+    for key, motion in value.items():
+        point("a key of anchors", key, count)
+        if motion is not None and not isinstance(motion, Motion):
+            raise SceneError(
+                f"anchors[{key}] must be None, for a point that is fixed, or a Translation, Oscillation or Rotation, "
+                f"got {checks.shown(motion)}"
+            )
+    if len(value) == count:
+        raise SceneError(f"anchors must leave a point that can move, got all {count} points of the body")
+    return {int(key): motion for key, motion in value.items()}
+
+
+def uncoupled(led: Mapping[int, Motion | None], matrix: Floats) -> None:
+    """Raise if a led point has a mass in common with one that can move: its path would push that one."""
+    for number, motion in led.items():
+        coupled = np.flatnonzero(matrix[number])
+        if motion is not None and not set(coupled.tolist()) <= set(led):
+            raise SceneError(
+                f"anchors[{number}] must be None, fixed in space, or its point have no mass coupling with points that "
+                f"can move, got {motion} and a mass_matrix with couplings of point {number} to points "
+                f"{coupled.tolist()}"
+            )
+
+
+def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tuple[tuple[int, Surface], ...]:
+    """`rows` as (point, surface), each point on its surface."""
+    held = set(anchored)
+    result = []
+    for k, row in each("guides", rows, "rows (point, surface)"):
+        given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
+        number = point(f"guides[{k}][0]", given[0], len(places))
+        surface = _smooth(f"guides[{k}][1]", given[1])
+        if surface.friction > 0.0:
+            raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
+        if number in held:
+            raise SceneError(f"guides[{k}] must hold a point that can move, got {number}, which is anchored")
+        on_surface(f"guides[{k}]: point {number}", surface, places[number, :, None])
+        result.append((number, surface))
+    return tuple(result)
+
+
+def on_surface(name: str, surface: Surface, places: Floats) -> None:
+    """Raise unless places (3, N) are on the surface."""
+    slopes = np.sqrt((surface.gradient(places) ** 2).sum(axis=0))
+    values = surface.phi(places)
+    off = np.abs(values) / np.maximum(slopes, np.finfo(np.float64).tiny)
+    room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
+    for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
+        which = f" of copy {i}" if places.shape[1] > 1 else ""
+        raise SceneError(
+            f"{name}{which} must start on its surface, within {_ON_SURFACE:g} of its size, got "
+            f"{places[:, i].tolist()}, where phi of {surface!r} is {values[i]:.3g}"
+        )
+
+
+def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
+    """`rows` as (surface, carrier, point), each point on the admissible side."""
+    result = []
+    for k, row in each("cavities", rows, "rows (surface, carrier, point)"):
+        given = entries(f"cavities[{k}]", row, 3, "values (surface, carrier, point)")
+        surface = _smooth(f"cavities[{k}][0]", given[0])
+        carrier, held = (point(f"cavities[{k}][{n}]", given[n], len(places)) for n in (1, 2))
+        if carrier == held:
+            raise SceneError(f"cavities[{k}] must name a carrier and another point, got {carrier} for both")
+        gap = SIDES[getattr(surface, "side", "inside")] * surface.phi((places[held] - places[carrier])[:, None])[0]
+        if not gap <= 0.0:
+            raise SceneError(
+                f"cavities[{k}]: point {held} must start on the admissible side of its surface, got a gap of "
+                f"{gap:.3g}; the surface's origin is point {carrier}"
+            )
+        result.append((surface, carrier, held))
+    return tuple(result)
+
+
+def _smooth(name: str, surface: Any) -> Surface:
+    if not isinstance(surface, Surface):
+        raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {checks.shown(surface)}")
+    if isinstance(surface, Many):
+        raise SceneError(f"{name} must be one surface, got a field of {len(surface)}; give one of them by itself")
+    walls = len(surface.walls())
+    if walls > 1:
+        raise SceneError(
+            f"{name} must be a surface without edges, got {surface!r} of {walls} walls; give one for each wall"
+        )
+    if surface.temperature is not None:
+        raise SceneError(f"{name}.temperature must be None with bodies, got {surface.temperature:g}")
+    if surface.motion is not None or surface.reacts() or surface.openings:
+        raise SceneError(
+            f"{name} must have no motion, mass, inertia or openings, got {surface!r}; a cavity moves with its carrier, "
+            "and anchors lead points"
+        )
+    return surface

@@ -1,0 +1,30 @@
+"""How large a body may be: its matrices are full, so its size counts squared."""
+
+from .. import checks
+from ..errors import SceneError
+
+# Bytes of the matrices of one body: of a chain, 3200 points. More would take minutes before the first step.
+_MOST = 1_000_000_000
+# Of a machine's memory, what one body may take: a run has copies of some of the matrices.
+_SHARE = 0.25
+_NUMBER = 8
+
+
+def require(points: int, ties: int = 0, contacts: int = 0, edges: int = 0) -> None:
+    """Raise a `SceneError` where the matrices of a body do not fit, before any of them is made.
+
+    These are, of P points, T ties (links, springs, edges of a strain, guides and cavities), K contact points and E
+    edges of a strain: masses and their inverse (P, P), contact points and how they give way (K, P), the couplings of
+    ties and contact points (T + K, the same), the system of ties (T, T), and stiffness and compliance (E, E).
+    """
+    # What float() can convert.
+    p, t, k, e = (min(count, 10**100) for count in (points, ties, contacts, edges))
+    size = _NUMBER * (2 * p * p + 2 * k * p + (t + k) ** 2 + t * t + 2 * e * e)
+    most = min(_MOST, _SHARE * checks.memory())
+    if size > most:
+        held = {"points": p, "ties": t, "contact points": k}
+        said = ", ".join(f"{count:.6g} {name}" for name, count in held.items() if count)
+        raise SceneError(
+            f"a body must fit in {checks.in_bytes(most)}, got {said}, whose matrices of masses, ties and contacts are "
+            f"full and take {checks.in_bytes(size)}; use fewer points, or several bodies"
+        )
