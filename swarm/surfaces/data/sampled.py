@@ -41,6 +41,7 @@ class Sampled(Surface):
         side: "inside" or "outside", the admissible part.
         rotation: about the middle of the grid.
         mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
+        mesh_weld: the distance within which corners of that mesh were joined [m]; None: none were.
 
     Where the surface reaches the border of the grid, other surfaces must keep particles in the grid.
 
@@ -62,6 +63,7 @@ class Sampled(Surface):
     origin: Vector
     side: str = "inside"
     mesh_error: float | None = field(default=None, kw_only=True)
+    mesh_weld: float | None = field(default=None, kw_only=True)
     # What is made of the samples, also for a copy with another side or place.
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
@@ -78,7 +80,7 @@ class Sampled(Surface):
         shape = " x ".join(map(str, self.values.shape))
         parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
         named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]
-        own = [one for one in fields(self) if one.name in ("side", "mesh_error")]
+        own = [one for one in fields(self) if one.name in ("side", "mesh_error", "mesh_weld")]
         said = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
         return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in said)])})"
 
