@@ -77,10 +77,7 @@ def from_mesh(
     layers = max(1, int(_TOGETHER / (counts[1] * counts[2])))
     parts = [_distance([axes[0][i : i + layers], *axes[1:]], mesh) for i in range(0, len(axes[0]), layers)]
     values = np.concatenate(parts)
-    try:
-        made = Sampled(values, spacing, tuple(origin.tolist()), side)
-    except SceneError as error:
-        raise SceneError(f"spacing must resolve the mesh {path}, got {spacing:g} m: {error}") from None
+    made = Sampled(values, spacing, tuple(origin.tolist()), side, mesh_error=0.0)
     corners = mesh.vertices[mesh.triangles]
     sides = 0.5 * (corners + corners[:, [1, 2, 0]])
     points = np.concatenate([mesh.vertices, corners.mean(axis=1), sides.reshape(-1, 3)])
