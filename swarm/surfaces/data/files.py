@@ -51,4 +51,8 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
     except SceneError as error:
         raise SceneError(f"{where}.{error}") from None
     samples = {name: getattr(made, name) for name in ("values", "spacing", "origin", "mesh_error", "mesh_weld")}
-    return {**{key: value for key, value in given.items() if key not in ("scale", "weld")}, "kind": "sampled", **samples}
+    return {
+        **{key: value for key, value in given.items() if key not in ("scale", "weld")},
+        "kind": "sampled",
+        **samples,
+    }

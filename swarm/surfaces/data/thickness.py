@@ -36,6 +36,9 @@ _WEDGE = np.sin(np.radians(5.0))
 _ROUND = 2.0
 # Of the way to the edge of a wedge, how far around its middle the surface is looked at.
 _AROUND = 0.6
+# Balls to look at, of the radius that should do: where a ball comes through the three edges of a corner but leaves out
+# the corner, there is a hole, and in another one there is none.
+_BALLS = (1.0, 1.5)
 # Of a distance, more than round-off.
 _CLOSE = 1e-6
 # Steps from a first ball to the one that touches both sides; none is needed where these are parallel.
@@ -84,11 +87,13 @@ def _down(value: float) -> float:
 def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
     """The thinnest place that samples this far apart do not resolve."""
     found = np.flatnonzero(thin.thickness < RESOLVED * spacing)
+    # Of each cell one place is enough: that whose sides are most parallel, as those of a wall are.
+    facing = (surface.normals[thin.at[found]] * surface.normals[thin.to[found]]).sum(axis=1)
+    found = found[np.argsort(facing, kind="stable")]
+    cells = np.column_stack([np.floor(thin.point[found] / spacing), thin.gap[found]])
+    found = found[np.unique(cells, axis=0, return_index=True)[1]]
     found = found[np.argsort(thin.thickness[found], kind="stable")]
-    # One of each cell is enough, the thinnest.
-    cells = np.floor(thin.point[found] / spacing)
-    first = np.sort(np.unique(np.column_stack([cells, thin.gap[found]]), axis=0, return_index=True)[1])
-    return next((int(i) for i in found[first] if not surface.is_fold(thin, i, spacing)), None)
+    return next((int(i) for i in found if not surface.is_fold(thin, i, spacing)), None)
 
 
 # --- Where it is thin ------------------------------------------------------------------------------------
@@ -142,7 +147,7 @@ def _touching(
     # |way|^2 = 2 r (way . toward): the ball through both points, with its centre along `toward`
     height = (way * toward).sum(axis=1)
     met = np.sqrt(squares) < radius * (1.0 - _CLOSE)
-    touching = np.where(met, 0.5 * (way**2).sum(axis=1) / np.where(met, height, 1.0), radius)
+    touching = np.where(met, 0.5 * (way**2).sum(axis=1) / np.where(met & (height > 0.0), height, 1.0), radius)
     return met & ((normals[to] * normals[at]).sum(axis=1) < -_FACING), touching, other, to
 
 
@@ -172,7 +177,7 @@ class _Surface:
             way = -((p - q) @ m) / sine**2 * across
             reach = max(reach, _AROUND * float(np.linalg.norm(way)) + spacing)
             middle = middle + 0.5 * way
-        return self._is_disc(middle, reach, int(thin.at[i]), int(thin.to[i]))
+        return any(self._is_disc(middle, k * reach, int(thin.at[i]), int(thin.to[i])) for k in _BALLS)
 
     def _is_disc(self, centre: Floats, reach: float, first: int, last: int) -> bool:
         """Whether two triangles are in one part of the surface in a ball, and that part is a disc."""
