@@ -49,7 +49,7 @@ def from_mesh(
 
     Returns:
         The surface; its `mesh_error` is the largest distance [m] from it to the vertices, the middles of the edges and
-        of the triangles of the mesh, and its `mesh_weld` the distance within which corners were joined; None: none was.
+        of the triangles of the mesh, and its `mesh_weld` how far a corner was moved at most to close seams; None: none.
 
     Raises:
         SceneError: the file is missing or holds no mesh, the mesh is not closed or its parts intersect, an argument is
@@ -82,8 +82,10 @@ def from_mesh(
     sides = 0.5 * (corners + corners[:, [1, 2, 0]])
     points = np.concatenate([mesh.vertices, corners.mean(axis=1), sides.reshape(-1, 3)])
     off = max(np.abs(made.phi(points[i : i + _BATCH].T)).max() for i in range(0, len(points), _BATCH))
-    said = {"mesh_error": float(off), "mesh_weld": mesh.weld or None}
-    return Sampled(values, spacing, made.origin, side, **said, _made=made._made, **common)
+    welded = mesh.weld or None
+    return Sampled(
+        values, spacing, made.origin, side, mesh_error=float(off), mesh_weld=welded, _made=made._made, **common
+    )
 
 
 def _distance(axes: list[Floats], mesh: triangles.Mesh) -> Floats:

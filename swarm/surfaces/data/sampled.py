@@ -44,7 +44,7 @@ class Sampled(Surface):
         side: "inside" or "outside", the admissible part.
         rotation: about the middle of the grid.
         mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
-        mesh_weld: the distance within which corners of that mesh were joined [m]; None: none were.
+        mesh_weld: how far corners of that mesh were moved at most to close its seams [m]; None: none were.
 
     Where the surface reaches the border of the grid, other surfaces must keep particles in the grid.
 

@@ -1,7 +1,7 @@
 """Whether samples resolve the walls and the gaps of a mesh.
 
 The signed distance is -t/2 in the middle of a wall of thickness t and rises by 1 to both sides. Where no sample is in
-the wall, the spline through the samples may be above 0 in it: the wall leaks. By the largest value that the spline of
+the wall, the spline through the samples may be above 0 in it: particles leak. By the largest value that the spline of
 the distance from a plane takes on that plane, 0.3415 h for samples h apart (planes halfway between samples along an
 axis), a flat wall is whole from t = 0.683 h on. Walls and gaps that alternate, each t thick, are a wave of the length
 2 t, which samples resolve for t > h. RESOLVED leaves a quarter of that for walls that are bent.
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...extras import needed_by
-from .triangles import Floats, Indices, Mesh, shown
+from .triangles import Floats, Indices, Mesh, components, neighbours, shown
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25
@@ -71,10 +71,10 @@ def require_resolved(path: Path, mesh: Mesh, spacing: float) -> None:
         enough = float(thin.thickness[worst]) / RESOLVED * (1.0 - _CLOSE)
     if first is not None:
         middle = 0.5 * (thin.point[first] + thin.other[first])
-        what, does = ("gap", "close") if thin.gap[first] else ("wall", "leak")
         raise SceneError(
-            f"spacing must resolve the mesh {path}, got {spacing:g} m: a {what} of {thin.thickness[first]:.3g} m at "
-            f"{shown(middle)} is thinner than {RESOLVED:g} spacings and would {does}; spacing = {_down(enough):g} would do"
+            f"spacing must resolve the mesh {path}, got {spacing:g} m: a {'gap' if thin.gap[first] else 'wall'} of "
+            f"{thin.thickness[first]:.3g} m at {shown(middle)} is thinner than {RESOLVED:g} spacings, so that samples "
+            f"may miss it; spacing = {_down(enough):g} would do"
         )
 
 
@@ -93,7 +93,7 @@ def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
     cells = np.column_stack([np.floor(thin.point[found] / spacing), thin.gap[found]])
     found = found[np.unique(cells, axis=0, return_index=True)[1]]
     found = found[np.argsort(thin.thickness[found], kind="stable")]
-    return next((int(i) for i in found if not surface.is_fold(thin, i, spacing)), None)
+    return next((int(i) for i in found if not surface.is_fold(thin, int(i), spacing)), None)
 
 
 # --- Where it is thin ------------------------------------------------------------------------------------
@@ -159,10 +159,7 @@ class _Surface:
 
     def __init__(self, mesh: Mesh, normals: Floats) -> None:
         self.mesh, self.normals = mesh, normals
-        edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        order = np.lexsort(edges.T)
-        # A closed mesh: each edge is there twice.
-        self.edges, self.sides = edges[order[::2]], (order // 3).reshape(-1, 2)
+        self.edges, self.sides = neighbours(mesh.triangles)
         ends = mesh.vertices[self.edges]
         self.low, self.high = ends.min(axis=1), ends.max(axis=1)
 
@@ -181,9 +178,6 @@ class _Surface:
 
     def _is_disc(self, centre: Floats, reach: float, first: int, last: int) -> bool:
         """Whether two triangles are in one part of the surface in a ball, and that part is a disc."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         near = np.flatnonzero(((self.low <= centre + reach) & (self.high >= centre - reach)).all(axis=1))
         start, end = np.moveaxis(self.mesh.vertices[self.edges[near]], 1, 0)
         way = end - start
@@ -193,8 +187,7 @@ class _Surface:
         sides = sides.reshape(-1, 2)
         if not np.isin([first, last], triangles).all():
             return False
-        n = len(triangles)
-        label = connected_components(coo_matrix((np.ones(len(sides)), sides.T), shape=(n, n)), directed=False)[1]
+        label = components(sides, len(triangles))
         of_first, of_last = label[np.searchsorted(triangles, [first, last])]
         if of_first != of_last:
             return False

@@ -17,8 +17,8 @@ from ...extras import needed_by
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Corners of open edges are joined within this part of the diagonal of the mesh, ten thousand times what float32 rounds,
-# and within this part of the shortest open edge, so that no edge vanishes.
+# Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times what float32 rounds, and
+# within this part of the shortest open edge, so that no edge vanishes.
 _WELD, _OF_EDGE = 1e-5, 0.25
 # Of the square of its longest edge, the area of a triangle that has none: round-off of float64.
 _NO_AREA = 1e-14
@@ -32,7 +32,7 @@ class Mesh(NamedTuple):
     Attributes:
         vertices: (V, 3) [m].
         triangles: (T, 3) their corners, counter-clockwise seen from outside.
-        weld: the distance within which corners of open edges were joined [m]; 0: there was none.
+        weld: how far a corner was moved at most to close seams [m].
     """
 
     vertices: Floats
@@ -54,14 +54,14 @@ def read(path: Path, scale: float, weld: float | None) -> Mesh:
     """
     vertices, triangles = _joined(*_loaded(path, scale))
     edges, counts = _edges(triangles)
-    welded = 0.0
-    if (counts == 1).any() and weld != 0.0:
-        open_edges = edges[counts == 1]
+    moved = 0.0
+    if (counts == 1).any():
+        rims = edges[counts == 1]
         if weld is None:
-            lengths = np.linalg.norm(np.diff(vertices[open_edges], axis=1)[:, 0], axis=1)
-            weld = float(min(_WELD * np.linalg.norm(np.ptp(vertices, axis=0)), _OF_EDGE * lengths.min()))
-        vertices, triangles = _welded(vertices, triangles, np.unique(open_edges), weld)
-        welded = weld
+            lengths = np.linalg.norm(np.diff(vertices[rims], axis=1)[:, 0], axis=1)
+            size = float(np.linalg.norm(np.ptp(vertices[triangles], axis=(0, 1))))
+            weld = min(_WELD * size, _OF_EDGE * float(lengths.min()))
+        triangles, moved = _welded(vertices, triangles, np.unique(rims), weld)
         edges, counts = _edges(triangles)
     if (counts != 2).any():
         # A triangle along an edge, of no area, that closes nothing
@@ -70,10 +70,10 @@ def read(path: Path, scale: float, weld: float | None) -> Mesh:
         if len(kept) and (_edges(kept)[1] == 2).all():
             triangles = kept
         else:
-            _refuse_open(path, vertices, edges, counts, welded)
+            _refuse_open(path, vertices, edges, counts, weld)
     _require_turned(path, vertices, triangles)
     used, turned = np.unique(_outward(path, vertices, triangles), return_inverse=True)
-    return Mesh(vertices[used], turned.reshape(-1, 3), welded)
+    return Mesh(vertices[used], turned.reshape(-1, 3), moved)
 
 
 # --- Corners ---------------------------------------------------------------------------------------------
@@ -122,19 +122,17 @@ def _proper(triangles: Indices) -> Indices:
     return np.asarray(found[np.sort(which)])
 
 
-def _welded(vertices: Floats, triangles: Indices, of: Indices, weld: float) -> tuple[Floats, Indices]:
-    """The mesh with these corners joined where they are within a distance."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+def _welded(vertices: Floats, triangles: Indices, of: Indices, weld: float) -> tuple[Indices, float]:
+    """The triangles with these corners joined where they are within a distance, and how far one was moved."""
     from scipy.spatial import KDTree
 
     pairs = KDTree(vertices[of]).query_pairs(weld, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(of), len(of)))
-    group = connected_components(graph, directed=False)[1]
+    group = components(pairs, len(of))
     # The first of a group, in the order of their coordinates, stands for all.
     place = np.arange(len(vertices))
     place[of] = of[np.unique(group, return_index=True)[1][group]]
-    return vertices, _proper(place[triangles])
+    moved = np.linalg.norm(vertices[place[of]] - vertices[of], axis=1)
+    return _proper(place[triangles]), float(moved.max())
 
 
 # --- Whether it is closed --------------------------------------------------------------------------------
@@ -154,21 +152,23 @@ def _sizes(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
     return areas, np.linalg.norm(sides, axis=2).max(axis=1)
 
 
-def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, weld: float) -> None:
+def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, weld: float | None) -> None:
     """Raise the error of a mesh that is not closed."""
     said = []
     rims = edges[counts == 1]
     if len(rims):
-        holes = [vertices[np.unique(rims[which])] for which in _parts(rims)]
+        corners, ends = np.unique(rims, return_inverse=True)
+        holes = [vertices[corners[which]] for which in _groups(ends.reshape(-1, 2), len(corners))]
         sizes = [float(np.linalg.norm(np.ptp(hole, axis=0))) for hole in holes]
         largest = int(np.argmax(sizes))
-        others = f" and {len(holes) - 1} other places; the largest hole" if len(holes) > 1 else "; the hole"
+        others = f" and {len(holes) - 1} more place{'s' if len(holes) > 2 else ''}; the largest hole"
+        others = others if len(holes) > 1 else "; the hole"
         said.append(f"open at {shown(holes[largest].mean(axis=0))}{others} is {sizes[largest]:.3g} m across")
     many = edges[counts > 2]
     if len(many):
-        said.append(f"of more than two at {shown(vertices[many[0]].mean(axis=0))}")
-    if weld:
-        said.append(f"corners of open edges within {weld:.3g} m are joined, or within what weld = ... gives")
+        said.append(f"three or more triangles meet at {shown(vertices[many[0]].mean(axis=0))}")
+    if weld is not None:
+        said.append(f"corners of open edges within weld = {weld:.3g} m of each other are joined")
     raise SceneError(
         f"the mesh {path} must be closed (watertight), with two triangles at each edge, got {len(rims)} edges of one "
         f"triangle and {len(many)} of more than two: {'; '.join(said)}; close its holes, for example with "
@@ -176,17 +176,27 @@ def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, 
     )
 
 
-def _parts(cells: Indices) -> list[Indices]:
-    """Which cells (C, k) hang together, by their corners."""
-    from scipy.sparse import coo_matrix
+def _groups(pairs: Indices, count: int) -> list[Indices]:
+    """Which of so many hang together, by these pairs (P, 2)."""
+    label = components(pairs, count)
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def components(pairs: Indices, count: int) -> Indices:
+    """Of so many, by these pairs (P, 2), the number of the group that each is in."""
+    from scipy.sparse import coo_matrix  # libigl needs it, so it is there
     from scipy.sparse.csgraph import connected_components
 
-    n = int(cells.max()) + 1
-    first, other = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()
-    label = connected_components(coo_matrix((np.ones(len(first)), (first, other)), shape=(n, n)), directed=False)[1]
-    of = label[cells[:, 0]]
-    order = np.argsort(of, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(of[order])) + 1)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def neighbours(triangles: Indices) -> tuple[Indices, Indices]:
+    """The edges (E, 2) of a closed mesh, each once, and the two triangles (E, 2) of each."""
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    return edges[order[::2]], (order // 3).reshape(-1, 2)
 
 
 # --- Which side is outside -------------------------------------------------------------------------------
@@ -205,8 +215,8 @@ def _require_turned(path: Path, vertices: Floats, triangles: Indices) -> None:
 
 
 def _outward(path: Path, vertices: Floats, triangles: Indices) -> Indices:
-    """The triangles seen from outside: a part within an odd number of others is a cavity, whichever way it is turned."""
-    parts = [triangles[which] for which in _parts(triangles)]
+    """The triangles seen from outside: a part within an odd number of others is a cavity, however it is turned."""
+    parts = [triangles[which] for which in _groups(neighbours(triangles)[1], len(triangles))]
     for k, part in enumerate(parts):
         a, b, c = np.moveaxis(vertices[part] - vertices[part[0, 0]], 1, 0)
         if (a * np.cross(b, c)).sum() < 0.0:
