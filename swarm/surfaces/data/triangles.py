@@ -17,8 +17,8 @@ from ...extras import needed_by
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times what float32 rounds, and
-# within this part of the shortest open edge, so that no edge vanishes.
+# Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times what float32 rounds,
+# and within this part of the shortest open edge, so that no edge vanishes.
 _WELD, _OF_EDGE = 1e-5, 0.25
 # Of the square of its longest edge, the area of a triangle that has none: round-off of float64.
 _NO_AREA = 1e-14
