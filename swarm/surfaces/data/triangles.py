@@ -97,8 +97,8 @@ def _loaded(path: Path, scale: float) -> tuple[Floats, Indices]:
         more = len(np.unique(wrong[:, 0])) - 1
         raise SceneError(
             f"the mesh {path} must hold triangles with finite corners, got {shown(vertices[triangles[which, corner]])} "
-            f"as corner {corner} of triangle {which}{f' and {more} more such triangles' if more else ''}, counted from "
-            "0; remove them and close the holes that they leave"
+            f"as corner {corner} of triangle {which}, counted from 0, and {more} more like it; remove them and close "
+            "the holes that they leave"
         )
     return vertices, triangles
 
