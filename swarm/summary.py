@@ -91,6 +91,7 @@ def of_result(result: Result, volume: float | None) -> dict[str, str]:
     rate = seen["impacts"][-1] / result.wall_time
     return {
         **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
+        **facts.of_meshes(result.scene),
         **facts.of_run(seen),
         "wall time": f"{result.wall_time:.2f} s, {rate:.3g} impacts/s",
         "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",

@@ -70,6 +70,10 @@ def test_early_motion_has_all_digits():
         (lambda: swarm.Oscillation(0.1, 1.0), ["amplitude", "three numbers"]),
         (lambda: swarm.Oscillation((0.1, 0.0, 0.0), 0.0), ["frequency", "above 0"]),
         (lambda: swarm.Oscillation((0.1, 0.0, 0.0), 1.0, math.inf), ["phase", "finite"]),
+        (
+            lambda: swarm.Oscillation((0.1, 0.0, 0.0), 1.0, -1e300),
+            ["phase must be from -1e+09 to 1e+09 rad", "got -1e+300", "take it modulo 2 pi"],
+        ),
         (lambda: swarm.Rotation((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0)), ["axis", "direction"]),
         (lambda: swarm.Rotation((0.0, 0.0, 1.0), "fast", (0.0, 0.0, 0.0)), ["rate", "'fast'"]),
         (lambda: swarm.Rotation((0.0, 0.0, 1.0), 1.0, None), ["center", "three numbers"]),

@@ -17,6 +17,9 @@ from ..errors import SceneError
 
 Floats = NDArray[np.float64]
 
+# The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; of far larger ones a sine is chance.
+LARGEST_ANGLE = 1e9
+
 
 class Led(NamedTuple):
     """The path of one point.
@@ -94,7 +97,7 @@ class Oscillation(Given):
     Args:
         amplitude: three numbers, each from -1e100 to 1e100 [m].
         frequency: above 0 [1/s].
-        phase: the angle at time 0 [rad].
+        phase: the angle at time 0, from -1e9 to 1e9 [rad].
 
     Raises:
         SceneError: an argument is out of its range.
@@ -112,7 +115,13 @@ class Oscillation(Given):
         frequency = checks.positive("frequency", self.frequency)
         checks.magnitude("frequency", frequency)
         object.__setattr__(self, "frequency", frequency)
-        object.__setattr__(self, "phase", checks.number("phase", self.phase))
+        phase = checks.number("phase", self.phase)
+        if abs(phase) > LARGEST_ANGLE:
+            raise SceneError(
+                f"phase must be from {-LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad, got {phase:g}, next to which float64 "
+                f"numbers are {math.ulp(phase):.1g} rad apart; take it modulo 2 pi"
+            )
+        object.__setattr__(self, "phase", phase)
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -205,6 +214,22 @@ Motion = Translation | Oscillation | Rotation
 def led(motion: Motion | None, start: ArrayLike) -> Led:
     """The path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
     return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
+
+
+def require_angles(name: str, motion: Any, until: float) -> None:
+    """Raise a `SceneError` where a motion, called `name`, turns so often until a time [s] that no angle is known."""
+    for one in parts_of(motion):
+        oscillates = isinstance(one, Oscillation)
+        if not oscillates and not isinstance(one, Rotation):
+            continue
+        rate = 2.0 * math.pi * one.frequency if oscillates else abs(one.rate)
+        if rate * until > LARGEST_ANGLE:
+            key, value, unit = ("frequency", one.frequency, "1/s") if oscillates else ("rate", one.rate, "rad/s")
+            raise SceneError(
+                f"{name}.{key} must be such that the angle is at most {LARGEST_ANGLE:g} rad at the end, where float64 "
+                f"numbers are {math.ulp(LARGEST_ANGLE):.1g} rad apart, got {value:g} {unit} and thus "
+                f"{rate * until:.3g} rad at {until:g} s"
+            )
 
 
 def unit_axis(rotation: Any) -> Floats:

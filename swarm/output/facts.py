@@ -47,9 +47,22 @@ def of_scene(scene: Any) -> dict[str, str]:
     """The surfaces of a `Scene`, gravity, and its period."""
     return {
         "surfaces": _call(", ".join(shortened(scene.surfaces))),
+        **of_meshes(scene),
         "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
         **_period(scene.period),
     }
+
+
+def of_meshes(scene: Any) -> dict[str, str]:
+    """How far the surfaces of a `Scene` are from the meshes that they were made from; nothing where none was."""
+    surfaces = () if scene is None else scene.surfaces
+    made = {i: one for i, one in enumerate(surfaces) if getattr(one, "mesh_error", None) is not None}
+    said = [
+        f"surfaces[{i}] within {one.mesh_error:.2g} m of its mesh"
+        + (f", whose corners were moved by up to {one.mesh_weld:.1e} m to close seams" if one.mesh_weld else "")
+        for i, one in made.items()
+    ]
+    return {"mesh error": "\n".join(said)} if said else {}
 
 
 def of_run(seen: dict[str, Any]) -> dict[str, str]:

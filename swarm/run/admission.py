@@ -8,6 +8,7 @@ from ..methods import AugmentedLagrangian, Impact, Penalty
 from ..methods.base import Method, check_laws, check_surfaces
 from ..methods.fixed_step import check_solids
 from ..motion import Path, parts_of
+from ..motion.given import require_angles
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
@@ -16,6 +17,8 @@ from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
+# A time this many runs ago leaves float64 a ten-thousandth of the run.
+_LONG_AGO = 1e12
 
 
 def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Task:
@@ -52,7 +55,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     assert times.every is not None
     method.span("until", times.until)
     method.span("every", times.every)
-    _require_paths(scene, times.until)
+    _require_motions(scene, times.until)
     _require_inside(scene, particles)
     workload.check(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
@@ -88,6 +91,8 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
         )
+    for point, motion in bodies.body.anchors.items():
+        require_angles(f"anchors[{point}]", motion, options.times.until)
     assert method.dt is not None  # type: ignore[attr-defined]
     passing.check(scene, bodies.body)
     workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
@@ -148,14 +153,22 @@ def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLa
             raise SceneError(f"cavities[{k}] must be elastic with {name}, got {surface}; use Impact(dt=...)")
 
 
-def _require_paths(scene: Scene, until: float) -> None:
-    """Raise a `SceneError` where the path of a wall does not last for the whole run."""
+def _require_motions(scene: Scene, until: float) -> None:
+    """Raise a `SceneError` where the motion of a wall is not known for the whole run."""
     for i, surface in enumerate(scene.surfaces):
+        require_angles(f"surfaces[{i}].motion", surface.motion, until)
         for one in parts_of(surface.motion):
             if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
                     f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
+                )
+            # A piece knows the time since its start: of a start long ago, no digits of this run are left.
+            if isinstance(one, Path) and max(t for t in one.times if t <= 0.0) < -_LONG_AGO * until:
+                raise SceneError(
+                    f"surfaces[{i}].motion.times must have one at 0 s or at most {_LONG_AGO:g} times the length of the "
+                    f"run before it, {until:g} s, so that the time since then has digits, got {one.times[0]:g} s; add "
+                    "the time 0"
                 )
 
 

@@ -75,7 +75,8 @@ class Result:
     def _repr_html_(self) -> str:
         what = {"particles": f"{len(self.particles)}"} if self.bodies is None else {"bodies": repr(self.bodies)}
         times = self.observables["time"]
-        rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s", **facts.of_run(self.observables)}
+        rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s"}
+        rows |= facts.of_meshes(self.scene) | facts.of_run(self.observables)
         rows |= {"wall time": f"{self.wall_time:.2f} s", "trajectory": str(self.trajectory or "none")}
         return notebook.table("Result", rows.items())
 

@@ -447,6 +447,29 @@ WRONG = {
         r"surfaces\[0\].motion.times must cover the run from 0 to 1 s, got 0 to 0.5",
     ),
     "starts late": (lambda: started(swarm.Path((0.1, 2.0), ((0, 0, 0), UP))), "must cover the run from 0 to 1 s"),
+    "starts long ago": (
+        lambda: started(swarm.Path((-1e17, 1e17), ((0, 0, 0), UP))),
+        r"surfaces\[0\].motion.times must have one at 0 s or at most 1e\+12 times .*, got -1e\+17 s; add the time 0",
+    ),
+    "swings too often": (
+        lambda: started(swarm.Oscillation(UP, 2e8) + TURN),
+        r"surfaces\[0\].motion.frequency must be such .* at most 1e\+09 rad .*, got 2e\+08 1/s and thus 1.26e\+09",
+    ),
+    "turns too often": (
+        lambda: started(swarm.Rotation(UP, -1e8, (0.0, 0.0, 0.0)), until=20.0),
+        r"surfaces\[0\].motion.rate must be .* apart, got -1e\+08 rad/s and thus 2e\+09 rad at 20 s",
+    ),
+    "a point is led too often": (
+        lambda: swarm.simulate(
+            swarm.Scene([swarm.Sphere(5.0)]),
+            swarm.Bodies(
+                swarm.Body([(0, 0, 0), (1, 0, 0)], 1.0, [(0, 1)], anchors={0: swarm.Rotation(UP, 1e10, (0, 0, 0))}),
+                [[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]], np.zeros((3, 2)),
+            ),
+            swarm.Impact(dt=1e-3), until=1.0, compile="never",
+        ),
+        r"anchors\[0\].rate must be such that",
+    ),
     "multipliers": (
         lambda: started(SWING, swarm.AugmentedLagrangian(dt=1e-3, penalty=1e4, adaptive=True)), r"surfaces\[0\].motion"
     ),

@@ -10,7 +10,7 @@ from ..surface import Surface
 from .arrays import read
 from .mesh import from_mesh
 
-_MESH = ("kind", "file", "spacing", "side", "scale", *(one.name for one in fields(Surface)))
+_MESH = ("kind", "file", "spacing", "side", "scale", "weld", *(one.name for one in fields(Surface)))
 
 
 def samples_of(table: Any, where: str, path: Path) -> Any:
@@ -42,9 +42,17 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
         if "spacing" not in table:
             raise SceneError("spacing: expected a number, got nothing; add spacing = ...")
         made = from_mesh(
-            path.parent / name, table["spacing"], table.get("side", "inside"), scale=table.get("scale", 1.0)
+            path.parent / name,
+            table["spacing"],
+            table.get("side", "inside"),
+            scale=table.get("scale", 1.0),
+            weld=table.get("weld"),
         )
     except SceneError as error:
         raise SceneError(f"{where}.{error}") from None
-    samples = {"values": made.values, "spacing": made.spacing, "origin": made.origin, "mesh_error": made.mesh_error}
-    return {**{key: value for key, value in given.items() if key != "scale"}, "kind": "sampled", **samples}
+    samples = {name: getattr(made, name) for name in ("values", "spacing", "origin", "mesh_error", "mesh_weld")}
+    return {
+        **{key: value for key, value in given.items() if key not in ("scale", "weld")},
+        "kind": "sampled",
+        **samples,
+    }

@@ -4,14 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import checks
 from ...errors import SceneError
 from ...extras import needed_by
+from . import triangles
 from .sampled import Sampled
-
-Floats = NDArray[np.float64]
+from .thickness import require_resolved
+from .triangles import Floats
 
 # Samples beyond the mesh on each side, in cells: the surface must not reach the border of the grid.
 _MARGIN = 3.0
@@ -23,33 +23,46 @@ _TOGETHER = 4_000_000
 _BATCH = 65_536
 
 
-def from_mesh(path: str | Path, spacing: float, side: str = "inside", *, scale: float = 1.0, **common: Any) -> Sampled:
+def from_mesh(
+    path: str | Path,
+    spacing: float,
+    side: str = "inside",
+    *,
+    scale: float = 1.0,
+    weld: float | None = None,
+    **common: Any,
+) -> Sampled:
     """A surface from a closed mesh of triangles in a file (.stl, .obj, .ply, .off, ...): its sampled signed distance.
 
     In a scene file: kind = "mesh" and file = "part.stl", relative to the scene file. Needs the extra `mesh`.
 
     Args:
-        path: of the mesh. Its triangles must enclose a volume, without a hole or an edge of three triangles.
-        spacing: between samples [m]. Edges of the mesh become round within about one, and a wall or a gap thinner than
-            about two is not resolved.
+        path: of the mesh. Its triangles must enclose a volume, without a hole or an edge of three triangles. A part
+            within an odd number of others is a cavity, whichever way its triangles are turned.
+        spacing: between samples [m], at most 0.8 of the thinnest wall or gap of the mesh. Edges of the mesh become
+            round within about one, and folds such as an engraved letter or the tip of a blade where they are thinner.
         side: "inside" or "outside" of the mesh, the admissible part.
         scale: what a unit of the file is in metres, 0.001 for millimetres.
+        weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
+            of the mesh, or a quarter of the shortest open edge if that is less.
         common: rotation, restitution, and what else every surface takes.
 
     Returns:
         The surface; its `mesh_error` is the largest distance [m] from it to the vertices, the middles of the edges and
-        of the triangles of the mesh.
+        of the triangles of the mesh, and its `mesh_weld` how far a corner was moved at most to close seams; None: none.
 
     Raises:
-        SceneError: the file is missing or holds no mesh, the mesh is not closed, an argument is out of its range, the
-            spacing is too large for the mesh, or too small for the memory, or a package is missing.
+        SceneError: the file is missing or holds no mesh, the mesh is not closed or its parts intersect, an argument is
+            out of its range, the spacing is too large for the walls and gaps of the mesh, or too small for the memory,
+            or a package is missing.
 
     Cost: 100 000 triangles on 64^3 samples take some seconds; `python -m bench fields`.
     """
     spacing, scale = checks.length("spacing", spacing), checks.length("scale", scale)
-    vertices, triangles = _read(Path(path))
-    vertices = scale * vertices
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if weld is not None:
+        weld = checks.magnitude("weld", weld)
+    mesh = triangles.read(Path(path), scale, weld)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     counts = np.ceil((high - low) / spacing) + 2.0 * _MARGIN + 1.0
     size = float(counts.prod()) * _SAMPLE
     if size > checks.memory():
@@ -58,58 +71,29 @@ def from_mesh(path: str | Path, spacing: float, side: str = "inside", *, scale: 
             f"{' x '.join(f'{x:.4g}' for x in high - low)} m: {' x '.join(f'{x:.0f}' for x in counts)} samples take "
             f"{checks.in_bytes(size)}; this machine has {checks.in_bytes(checks.memory())}"
         )
+    require_resolved(Path(path), mesh, spacing)
     origin = 0.5 * (low + high) - 0.5 * spacing * (counts - 1.0)
     axes = [start + spacing * np.arange(int(count)) for start, count in zip(origin, counts, strict=True)]
     layers = max(1, int(_TOGETHER / (counts[1] * counts[2])))
-    parts = [
-        _distance([axes[0][i : i + layers], *axes[1:]], vertices, triangles) for i in range(0, len(axes[0]), layers)
-    ]
+    parts = [_distance([axes[0][i : i + layers], *axes[1:]], mesh) for i in range(0, len(axes[0]), layers)]
     values = np.concatenate(parts)
-    try:
-        made = Sampled(values, spacing, tuple(origin.tolist()), side)
-    except SceneError as error:
-        raise SceneError(f"spacing must resolve the mesh {path}, got {spacing:g} m: {error}") from None
-    corners = vertices[triangles]
+    made = Sampled(values, spacing, tuple(origin.tolist()), side, mesh_error=0.0)
+    corners = mesh.vertices[mesh.triangles]
     sides = 0.5 * (corners + corners[:, [1, 2, 0]])
-    points = np.concatenate([vertices, corners.mean(axis=1), sides.reshape(-1, 3)])
+    points = np.concatenate([mesh.vertices, corners.mean(axis=1), sides.reshape(-1, 3)])
     off = max(np.abs(made.phi(points[i : i + _BATCH].T)).max() for i in range(0, len(points), _BATCH))
-    return Sampled(values, spacing, made.origin, side, mesh_error=float(off), _made=made._made, **common)
+    welded = mesh.weld or None
+    return Sampled(
+        values, spacing, made.origin, side, mesh_error=float(off), mesh_weld=welded, _made=made._made, **common
+    )
 
 
-def _read(path: Path) -> tuple[Floats, NDArray[np.int64]]:
-    """The vertices (V, 3) and triangles (T, 3) of a mesh, turned so that they are seen from outside."""
-    with needed_by("from_mesh", "mesh"):
-        import trimesh
-    try:
-        mesh = trimesh.load_mesh(str(path))
-        vertices = np.ascontiguousarray(mesh.vertices, np.float64)
-        triangles = np.ascontiguousarray(mesh.faces, np.int64)
-    except Exception as error:  # what readers of a dozen formats raise
-        raise SceneError(f"cannot read the mesh {path}: {error or type(error).__name__}") from error
-    if not len(triangles) or not np.isfinite(vertices).all():
-        raise SceneError(f"the mesh {path} must hold triangles with finite corners, got {len(triangles)} triangles")
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    counts = np.unique(edges, axis=0, return_counts=True)[1]
-    if (counts != 2).any():
-        raise SceneError(
-            f"the mesh {path} must be closed (watertight), with two triangles at each edge, got "
-            f"{np.count_nonzero(counts == 1)} edges of one triangle and {np.count_nonzero(counts > 2)} of more than "
-            "two; close its holes, for example with trimesh.repair or MeshLab"
-        )
-    if not mesh.is_winding_consistent:
-        raise SceneError(
-            f"the mesh {path} must have all triangles turned the same way, got some that are not; turn them, for "
-            "example with trimesh.repair.fix_winding"
-        )
-    return vertices, triangles if mesh.volume > 0.0 else np.ascontiguousarray(triangles[:, ::-1])
-
-
-def _distance(axes: list[Floats], vertices: Floats, triangles: NDArray[np.int64]) -> Floats:
+def _distance(axes: list[Floats], mesh: triangles.Mesh) -> Floats:
     """The signed distance from the mesh on a grid."""
     with needed_by("from_mesh", "mesh"):
         import igl
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     # By the angle-weighted normal of what is nearest, which is right for every closed mesh; winding numbers summed
     # over a tree are wrong by 0.01 R next to a ring of 10^5 triangles.
-    found = igl.signed_distance(points, vertices, triangles, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL)[0]
+    found = igl.signed_distance(points, mesh.vertices, mesh.triangles, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL)[0]
     return np.asarray(found).reshape([len(axis) for axis in axes])

@@ -26,6 +26,9 @@ Floats = NDArray[np.float64]
 # A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a
 # cell where it does most, has a feature that the samples do not resolve; by less, as next to an edge, it is a ripple.
 _RIPPLE = 0.1
+# Of what phi changes in a cell where it does most: a sample that is nearer to 0 is on the surface, whatever sign its
+# round-off has. That of meshes in float32 is 1e-7 of their size.
+_ON = 1e-4
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -42,6 +45,7 @@ class Sampled(Surface):
         side: "inside" or "outside", the admissible part.
         rotation: about the middle of the grid.
         mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
+        mesh_weld: how far corners of that mesh were moved at most to close its seams [m]; None: none were.
 
     Where the surface reaches the border of the grid, other surfaces must keep particles in the grid.
 
@@ -63,6 +67,7 @@ class Sampled(Surface):
     origin: Vector
     side: str = "inside"
     mesh_error: float | None = field(default=None, kw_only=True)
+    mesh_weld: float | None = field(default=None, kw_only=True)
     # What is made of the samples, also for a copy with another side or place.
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
@@ -72,14 +77,17 @@ class Sampled(Surface):
         object.__setattr__(self, "origin", checks.vector("origin", self.origin))
         if self._made is None or self._made.values is not self.values or self._made.spacing != self.spacing:
             object.__setattr__(self, "values", _samples(self.values))
-            object.__setattr__(self, "_made", Samples(self.values, self.spacing, self.origin))
+            if self.mesh_error is None:
+                # What is thin in a mesh is looked up in the mesh; next to its edges a spline has larger ripples.
+                _require_resolved(self.values, np.array(self.spacing), np.array(self.origin))
+            object.__setattr__(self, "_made", Samples(self.values, self.spacing))
 
     def __repr__(self) -> str:
         """How many samples there are, and where."""
         shape = " x ".join(map(str, self.values.shape))
         parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
         named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]
-        own = [one for one in fields(self) if one.name in ("side", "mesh_error")]
+        own = [one for one in fields(self) if one.name in ("side", "mesh_error", "mesh_weld")]
         said = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
         return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in said)])})"
 
@@ -131,11 +139,10 @@ class Sampled(Surface):
 class Samples:
     """What is made of the samples of a surface, once."""
 
-    def __init__(self, values: Floats, spacing: Vector, origin: Vector) -> None:
+    def __init__(self, values: Floats, spacing: Vector) -> None:
         self.values, self.spacing = values, spacing
         width = np.array(spacing)
         self.widths = (np.array(values.shape) - 1.0) * width
-        _require_resolved(values, width, np.array(origin))
         self.coefficients = spline.coefficients(values)
         self.steepness = float(max(np.abs(np.diff(values, axis=k)).max() / width[k] for k in range(3)))
 
@@ -213,10 +220,11 @@ def _require_resolved(values: Floats, width: Floats, origin: Floats) -> None:
         first, last = f[:-1], f[1:]
         # The Bernstein coefficients of an edge, between which a cubic is
         second, third = (4.0 * c[1:-2] + 2.0 * c[2:-1]) / 6.0, (2.0 * c[1:-2] + 4.0 * c[2:-1]) / 6.0
-        ripple = _RIPPLE * np.abs(np.diff(f, axis=0)).max()
+        most = np.abs(np.diff(f, axis=0)).max()
+        ripple, on = _RIPPLE * most, _ON * most
         sign = np.where(first > 0.0, 1.0, -1.0)
         turned = np.minimum(sign * second, sign * third) < -ripple
-        for place in np.argwhere((sign * last > 0.0) & (first != 0.0) & turned):
+        for place in np.argwhere((sign * last > on) & (np.abs(first) > on) & turned):
             at = tuple(place)
             s = np.linspace(0.0, 1.0, 65)[1:-1]
             r = 1.0 - s
