@@ -131,7 +131,7 @@ def _is_same_along(surface: Surface, k: int, period: Lengths) -> bool:
 
 
 def _require_place(surface: Surface, period: Lengths, name: str) -> None:
-    """Raise a `SceneError` if a surface does not stay where it is along the period."""
+    """Raise a `SceneError` if a surface does not stay where it is along the period, or what it is."""
     if surface.reacts():
         raise SceneError(
             f"{name}.mass and inertia must be None where the scene has a period, got {surface}: impacts would move it "
@@ -139,15 +139,26 @@ def _require_place(surface: Surface, period: Lengths, name: str) -> None:
         )
     for one in parts_of(surface.motion):
         for k, length in enumerate(period):
-            if length is not None and _moves_along(one, k, surface):
+            if length is not None and _moves_along(one, k, surface, period):
                 raise SceneError(
                     f"{name}.motion must leave the surface where it is along {'xyz'[k]}, where period[{k}] is "
-                    f"{length:g}, got {one}; move it across the period only"
+                    f"{length:g}, got {one}; move it across the period, or as it "
+                    "stays what it is (a plane in itself)"
                 )
 
 
-def _moves_along(motion: Any, k: int, surface: Surface) -> bool:
-    """Whether a part of a motion moves a surface along an axis."""
+def _moves_along(motion: Any, k: int, surface: Surface, period: Lengths) -> bool:
+    """Whether a part of a motion moves a surface along an axis, other than in itself."""
+    return _goes_along(motion, k, surface) and (isinstance(motion, Rotation) or not _slides(surface, k, period))
+
+
+def _slides(surface: Surface, k: int, period: Lengths) -> bool:
+    """Whether a surface that goes along an axis stays what it is, as a belt does."""
+    return not isinstance(surface, Many) and _is_same_along(surface, k, period)
+
+
+def _goes_along(motion: Any, k: int, surface: Surface) -> bool:
+    """Whether a part of a motion moves the points of a surface along an axis."""
     if isinstance(motion, Rotation):
         x, y, z = unit_axis(motion).tolist()
         return not (abs((x, y, z)[k]) == 1.0 or surface.is_unturned_by((x, y, z), motion.center))
