@@ -22,7 +22,7 @@ def fill(
     mass: ArrayLike = 1.0,
     seed: int = 0,
     exact: bool = False,
-    radius: None = None,
+    radius: object = None,
 ) -> Particles:
     """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
 

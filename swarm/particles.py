@@ -46,7 +46,7 @@ class Particles:
         velocity: ArrayLike,
         mass: ArrayLike = 1.0,
         image: ArrayLike | None = None,
-        radius: None = None,
+        radius: object = None,
     ) -> None:
         checks.no_radius(radius)
         checked = _checked(position, velocity, mass)
