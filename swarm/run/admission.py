@@ -16,6 +16,8 @@ from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
+# Images beyond this are no whole numbers of floats, which files and `Particles` hold.
+_MOST_CELLS = 2.0**53
 
 
 def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Task:
@@ -42,7 +44,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         )
     _require_instants(scene, particles, method, options)
     # The arrays of Particles may have been changed since it checked them.
-    particles = _in_the_cell(scene, particles.copy())
+    particles = _in_the_cell(scene, particles.copy(), options.times.until)
     _require_period(scene, method)
     check_surfaces(method, scene)
     if options.compile != "never":
@@ -176,7 +178,7 @@ def _lead(bodies: Bodies) -> None:
             raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
 
 
-def _in_the_cell(scene: Scene, particles: Particles) -> Particles:
+def _in_the_cell(scene: Scene, particles: Particles, until: float) -> Particles:
     """The particles, with their positions in the cell and their images where the scene repeats."""
     if scene.period is None:
         if particles.image is not None:
@@ -185,9 +187,26 @@ def _in_the_cell(scene: Scene, particles: Particles) -> Particles:
                 "scene the period that they are of"
             )
         return particles
+    _require_countable(scene, particles, until)
     particles.position, images = scene.wrapped(particles.position)
     particles.image = images if particles.image is None else images + particles.image
     return particles
+
+
+def _require_countable(scene: Scene, particles: Particles, until: float) -> None:
+    """Raise a `SceneError` where a particle may come through more cells than a file can count."""
+    for k, length in enumerate(scene.period or ()):
+        if length is None:
+            continue
+        pull = 0.0 if scene.gravity is None else abs(scene.gravity[k])
+        reach = float(abs(particles.position[k]).max()) + until * (particles.fastest() + 0.5 * pull * until)
+        before = 0 if particles.image is None else int(abs(particles.image[k]).max())
+        if not reach / length + before <= _MOST_CELLS:
+            raise SceneError(
+                f"period[{k}] must be so long that particles come through at most 2**53 cells, got {length:g} m, for "
+                f"particles that may be {reach / length + before:.3g} cells away at {until:g} s; give a longer period, "
+                "or a shorter run"
+            )
 
 
 def _require_period(scene: Scene, method: Method) -> None:

@@ -5,12 +5,13 @@ is no wall that has images, and what flies there, however far along the other ax
 all along the period. And what flies along an axis and passes all walls of a cell passes those of every cell.
 """
 
+import math
 from collections.abc import Sequence
 
 from ..kernel.vector import Vec
 from .fields.many import Many
 from .images import Lengths, body_of, is_same_along
-from .period import Free, Gap, Gaps, Period
+from .period import Beside, Free, Gap, Gaps, Period
 from .surface import Surface
 
 # Of the period, the room that a gap leaves to the walls beside it, and the narrowest one that is worth a look.
@@ -45,11 +46,19 @@ def _gaps(period: Lengths, surfaces: Sequence[Surface], across: Sequence[int]) -
     if any(one.motion is not None for one in repeated):
         return None
     boxes = [(body_of(one) if one.is_solid() else one).bounds() for one in repeated]
+    ends = [[(low[k], high[k]) for low, high in boxes] for k in range(3)]
     x, y, z = (
-        _gap([(low[k], high[k]) for low, high in boxes], length) if k in across and length else None
+        _beside(ends[k]) if length is None else _gap(ends[k], length) if k in across else None
         for k, length in enumerate(period)
     )
     return Gaps(x, y, z, 1.0 if len(repeated) < len(surfaces) else None)
+
+
+def _beside(ends: Sequence[tuple[float, float]]) -> Beside | None:
+    """The places below and above intervals that do not repeat, or None."""
+    low, high = min(low for low, _high in ends), max(high for _low, high in ends)
+    room = _ROOM * (high - low)
+    return Beside(low - room, high + room) if math.isfinite(room) else None
 
 
 def _gap(ends: Sequence[tuple[float, float]], length: float) -> Gap | None:

@@ -43,6 +43,13 @@ class Gap(NamedTuple):
     high: float
 
 
+class Beside(NamedTuple):
+    """The coordinates below and above which no wall is that has images, along an axis that does not repeat."""
+
+    low: float
+    high: float
+
+
 class Gaps(NamedTuple):
     """The gap along each axis, None where there is none; and whether there are walls without images, None for no."""
 
@@ -145,7 +152,7 @@ def _(length, x, v, pull):
     return _time_beyond(pull, length, x, v)
 
 
-_time_to_leave.register(Free, lambda length, x, v, pull: _time_beyond(pull, _CELLS * length.length, x, v))
+_time_to_leave.register(Free, lambda length, x, v, pull: _time_far(length, x, v, pull))
 
 
 @by_type
@@ -175,6 +182,25 @@ def _(gap, length, x, v, pull):
     return select((x > gap.low) & (x < gap.high), _time_out(pull, gap, x, v), 0.0)
 
 
+@_time_in.register(Beside)
+def _(gap, length, x, v, pull):
+    below, above = x < gap.low, x > gap.high
+    # Below is what is above of -x.
+    far, towards = select(below, x - gap.low, gap.high - x), select(below, v, -v)
+    return select(below | above, _time_to_reach(pull, far, towards, below), 0.0)
+
+
+@by_type
+def _time_to_reach(pull, far, v, below):
+    """When a coordinate so far below 0 reaches it, without gravity."""
+    return select(v > 0.0, -far / v, math.inf)
+
+
+@_time_to_reach.register(float)
+def _(pull, far, v, below):
+    return rise_time(far, 0.5 * v, select(below, 0.5 * pull, -0.5 * pull))
+
+
 @by_type
 def _time_out(pull, gap, x, v):
     """When a coordinate that is in a gap leaves it, without gravity."""
@@ -191,7 +217,8 @@ def _(pull, gap, x, v):
 @by_type
 def _time_far(length, x, v, pull):
     """When a coordinate is as many cells away as a flight may go."""
-    return _time_beyond(pull, _CELLS * length_of(length), x, v)
+    far = _CELLS * length_of(length)
+    return _time_out(pull, Gap(-far, far), x, v)
 
 
 _time_far.register(Nothing, lambda length, x, v, pull: math.inf)
@@ -320,10 +347,10 @@ def _(period, gravity, motion, left, hit):
     r, v = motion
     x, y = _time_to_leave(period.x, r.x, v.x, _along_x(gravity)), _time_to_leave(period.y, r.y, v.y, _along_y(gravity))
     z = _time_to_leave(period.z, r.z, v.z, _along_z(gravity))
-    first, hit = _over_faces(period.gaps, period, gravity, motion, (_least(x, y, z), hit))
+    late = _EPSILON * left
+    first, hit = _over_faces(period.gaps, period, gravity, motion, (_least(x, y, z), hit, 2.0 * late))
     # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
     # ends a little later, after a time that leaves exactly what it is rounded to.
-    late = _EPSILON * left
     exact = left - (left - (first + late))
     short = _is_short(period.x, v.x, _along_x(gravity), first, late)
     short &= _is_short(period.y, v.y, _along_y(gravity), first, late)
@@ -341,18 +368,22 @@ def _least(x, y, z):
 
 @by_type
 def _over_faces(gaps, period, gravity, motion, ends):
-    """When a flight leaves the cell, or the gap in which it goes on over faces; and its hit."""
-    return ends
+    """When a flight leaves the cell, or the gap in which it goes on over faces; and its hit.
+
+    `ends` are the first of these, the hit, and by how much the flight may end later.
+    """
+    first, hit, _late = ends
+    return first, hit
 
 
 @_over_faces.register(Gaps)
 def _(gaps, period, gravity, motion, ends):
-    (r, v), (leaves, hit) = motion, ends
+    (r, v), (leaves, hit, late) = motion, ends
     x = _time_in(gaps.x, period.x, r.x, v.x, _along_x(gravity))
     y = _time_in(gaps.y, period.y, r.y, v.y, _along_y(gravity))
     z = _time_in(gaps.z, period.z, r.z, v.z, _along_z(gravity))
     longest = select(x > y, x, y)
-    longest = select(longest > z, longest, z)
+    longest = select(longest > z, longest, z) - late
     longest = select(_is_line(gravity, period, motion, hit.time), math.inf, longest)
     x, y = _time_far(period.x, r.x, v.x, _along_x(gravity)), _time_far(period.y, r.y, v.y, _along_y(gravity))
     z = _time_far(period.z, r.z, v.z, _along_z(gravity))
