@@ -7,7 +7,7 @@ from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined
 from ..kernel.vector import Vec, column, dot, put
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
-from ..surfaces.period import Period, has_left, into, is_elsewhere, length_of
+from ..surfaces.period import Period, has_left, into, keeps_walls, length_of
 from . import arrays, compose
 from .marks import marked_lanes
 
@@ -33,7 +33,8 @@ def _(period, state, lanes, live):
         put(rows, arrays.R, lane, back.r)
         _count(period, state, p, back.images)
         rows[arrays.OWN, lane] = _twice(period.fall, state.energy[p], before, rows[arrays.OWN, lane])
-        lanes.wall[lane] = -1.0 if is_elsewhere(period, r) else lanes.wall[lane]
+        if not keeps_walls(period, r):
+            lanes.wall[lane] = -1.0
 
 
 @inlined

@@ -96,16 +96,20 @@ length_of.register(Nothing, lambda length: 0.0)
 @by_type
 def _image_of(length, x):
     """How many lengths to the cell a coordinate is."""
+    # Below 0 by so little that the other face is what it rounds to: there it is on this one.
+    n = select(x >= length_of(length), 1.0, select((x < 0.0) & (x + length_of(length) < length_of(length)), -1.0, 0.0))
+    if -length_of(length) < x < 2.0 * length_of(length):
+        return n
     return _whole_lengths(length_of(length), x)
 
 
 _image_of.register(Nothing, lambda length, x: 0.0)
 
 
-@inlined
+@outlined
 def _whole_lengths(length, x):
     n = np.floor(x / length)
-    # The quotient is rounded. Below 0 by so little that the other face is what it rounds to: there it is on this one.
+    # The quotient is rounded.
     back = x - n * length
     n = n + select(back >= length, 1.0, select(back < 0.0, -1.0, 0.0))
     # And so is the product, where there are many.
@@ -113,14 +117,14 @@ def _whole_lengths(length, x):
 
 
 @by_type
-def _inside(length, x):
-    """The coordinate of the same place in the cell."""
+def _inside(length, x, n):
+    """The coordinate of the same place in the cell, which is so many lengths away."""
     # One length beyond the face the difference is exact.
-    back = x - _image_of(length, x) * length_of(length)
+    back = x - n * length_of(length)
     return select(back < 0.0, 0.0, back)
 
 
-_inside.register(Nothing, lambda length, x: x)
+_inside.register(Nothing, lambda length, x, n: x)
 
 
 @by_type
@@ -133,12 +137,12 @@ _is_out.register(Nothing, lambda length, x: False)
 
 
 @by_type
-def _is_elsewhere(length, x):
-    """Whether a coordinate is where other images of the walls are than in the cell."""
+def _is_free(length):
+    """Whether all walls are the same along an axis: a constant for the compiler."""
     return False
 
 
-_is_elsewhere.register(float, lambda length, x: _is_out(length, x))
+_is_free.register(Free, lambda length: True)
 
 
 @by_type
@@ -159,7 +163,8 @@ _time_to_leave.register(Free, lambda length, x, v, pull: _time_far(length, x, v,
 def _time_beyond(pull, length, x, v):
     """The same without gravity."""
     edge = select(v > 0.0, length + _BEYOND * length, -_BEYOND * length)
-    return select(v != 0.0, (edge - x) / v, math.inf)
+    # Divisions are what a pass takes here: one an axis, which gaps ask for again.
+    return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
 
 
 @_time_beyond.register(float)
@@ -193,7 +198,7 @@ def _(gap, length, x, v, pull):
 @by_type
 def _time_to_reach(pull, far, v, below):
     """When a coordinate so far below 0 reaches it, without gravity."""
-    return select(v > 0.0, -far / v, math.inf)
+    return select(v > 0.0, -far * (1.0 / v), math.inf)
 
 
 @_time_to_reach.register(float)
@@ -205,7 +210,7 @@ def _(pull, far, v, below):
 def _time_out(pull, gap, x, v):
     """When a coordinate that is in a gap leaves it, without gravity."""
     edge = select(v > 0.0, gap.high, gap.low)
-    return select(v != 0.0, (edge - x) / v, math.inf)
+    return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
 
 
 @_time_out.register(float)
@@ -299,8 +304,8 @@ def into(period, r):
 
 @into.register(Period)
 def _(period, r):
-    images = Vec(_image_of(period.x, r.x), _image_of(period.y, r.y), _image_of(period.z, r.z))
-    return Return(Vec(_inside(period.x, r.x), _inside(period.y, r.y), _inside(period.z, r.z)), images)
+    n = Vec(_image_of(period.x, r.x), _image_of(period.y, r.y), _image_of(period.z, r.z))
+    return Return(Vec(_inside(period.x, r.x, n.x), _inside(period.y, r.y, n.y), _inside(period.z, r.z, n.z)), n)
 
 
 @by_type
@@ -315,14 +320,13 @@ def _(period, r):
 
 
 @by_type
-def is_elsewhere(period, r):
-    """Whether other images of the walls are at a position than where it is in the cell."""
-    return False
-
-
-@is_elsewhere.register(Period)
-def _(period, r):
-    return _is_elsewhere(period.x, r.x) | _is_elsewhere(period.y, r.y) | _is_elsewhere(period.z, r.z)
+def keeps_walls(period, r):
+    """Whether the walls at a position outside the cell are those of its place in the cell, not images of others."""
+    x = _is_free(period.x) | (not _is_out(period.x, r.x))
+    y = _is_free(period.y) | (not _is_out(period.y, r.y))
+    z = _is_free(period.z) | (not _is_out(period.z, r.z))
+    # The first is a constant, without which this would cost 13 ns a face.
+    return (_is_free(period.x) | _is_free(period.y) | _is_free(period.z)) & x & y & z
 
 
 @by_type
@@ -385,12 +389,23 @@ def _(gaps, period, gravity, motion, ends):
     longest = select(x > y, x, y)
     longest = select(longest > z, longest, z) - late
     longest = select(_is_line(gravity, period, motion, hit.time), math.inf, longest)
-    x, y = _time_far(period.x, r.x, v.x, _along_x(gravity)), _time_far(period.y, r.y, v.y, _along_y(gravity))
-    z = _time_far(period.z, r.z, v.z, _along_z(gravity))
-    far = _least(x, y, z)
+    far = _far(gravity, period, motion, leaves)
     longest = select(longest < far, longest, far)
     goes_on = longest > leaves
     return select(goes_on, longest, leaves), _hit_in(gaps.walls, goes_on, hit)
+
+
+@by_type
+def _far(gravity, period, motion, leaves):
+    """When a flight is surely no more cells away than it may go; `leaves` is when it leaves this one."""
+    return _CELLS * leaves
+
+
+@_far.register(Gravity)
+def _(gravity, period, motion, leaves):
+    r, v = motion
+    x, y = _time_far(period.x, r.x, v.x, gravity.x), _time_far(period.y, r.y, v.y, gravity.y)
+    return _least(x, y, _time_far(period.z, r.z, v.z, gravity.z))
 
 
 @by_type
