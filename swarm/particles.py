@@ -25,13 +25,14 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
         image: (3, N) whole numbers, or None: in a scene with a period, how many cells away each particle is.
+        radius: None: particles are points and do not meet one another.
 
     The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Arrays that are
     assigned later are checked and converted in the same way when a run starts.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass not from 1e-100 to
-            1e100.
+            1e100, a radius.
 
     >>> len(Particles([[0.0, 0.1], [0.0, 0.0], [0.0, 0.0]], np.ones((3, 2))))
     2
@@ -40,8 +41,14 @@ class Particles:
     volume: float | None = None
 
     def __init__(
-        self, position: ArrayLike, velocity: ArrayLike, mass: ArrayLike = 1.0, image: ArrayLike | None = None
+        self,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        mass: ArrayLike = 1.0,
+        image: ArrayLike | None = None,
+        radius: object = None,
     ) -> None:
+        checks.no_radius(radius)
         checked = _checked(position, velocity, mass)
         self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
         self.image = None if image is None else _images(image, len(self))

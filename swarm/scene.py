@@ -24,6 +24,7 @@ from .surfaces.fields.grouped import Order, chain_in, order_of
 from .surfaces.fields.many import Many, members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
+from .surfaces.free import cell_in
 from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
 from .surfaces.instant import box_of, gaps_of, gradient_of, planes_of
 from .surfaces.moving import Carried, carried
@@ -195,7 +196,7 @@ class Scene:
             return None
         pulls = self.gravity or (0.0, 0.0, 0.0)
         falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
-        return Period(*self.period, Vec(*falls) if any(falls) else None)
+        return cell_in(self.period, self.surfaces, not self._has_fields(), Vec(*falls) if any(falls) else None)
 
     def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""
@@ -264,6 +265,9 @@ class Scene:
         """Those that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
         return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
+
+    def _has_fields(self) -> bool:
+        return bool(self.order.fields or self.order.groups)
 
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""

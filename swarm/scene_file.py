@@ -38,6 +38,7 @@ class ParticlesTable:
     temperature: float | None = None
     mass: float | None = None
     seed: int | None = None
+    exact: bool | None = None
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 
@@ -100,6 +101,7 @@ class Job:
                 temperature=table.temperature,
                 mass=1.0 if table.mass is None else table.mass,
                 seed=table.seed or 0,
+                exact=bool(table.exact),
             )
         file = self.start_file()
         assert file is not None
@@ -239,8 +241,12 @@ def _body(table: Any) -> "BodiesFile | Made":
 
 
 def _particles(given: Any) -> ParticlesTable:
+    if isinstance(given, dict) and "radius" in given:
+        raise SceneError(
+            "particles.radius: must not be given: particles are points and do not meet one another; remove it"
+        )
     table = tables.convert(given, ParticlesTable, "particles")
-    filled = ("count", "speed", "temperature", "mass", "seed")
+    filled = ("count", "speed", "temperature", "mass", "seed", "exact")
     if table.source is None:
         if table.frame is not None:
             raise SceneError('particles.frame: needs from = "FILE.h5"')

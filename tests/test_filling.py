@@ -67,6 +67,25 @@ def test_temperature_is_maxwellian_for_every_mass():
         assert (scaled**4).mean(axis=1) == pytest.approx([6.75] * 3, abs=40.0 * FEW)
 
 
+@pytest.mark.parametrize("n", [1, 2, 10, 1000])
+def test_an_exact_temperature_is_that_of_these_particles(n):
+    """The mean of m v^2/2 is 3/2 T to round-off, for one seed as for any; the directions stay as they were drawn."""
+    mass = np.linspace(0.5, 2.0, n)
+    for seed in range(5):
+        drawn, exact = (swarm.fill(SPHERE, n, temperature=0.7, mass=mass, seed=seed, exact=e) for e in (False, True))
+        kinetic = 0.5 * exact.mass * (exact.velocity**2).sum(axis=0)
+        assert kinetic.mean() == pytest.approx(1.5 * 0.7, rel=1e-14)
+        ratio = exact.velocity / drawn.velocity
+        np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-14)
+
+
+def test_the_temperature_of_few_is_off_by_what_the_docstring_says():
+    """A relative standard deviation of sqrt(2/(3 n)), over 400 seeds to 5 standard errors."""
+    n = 10
+    means = [(swarm.fill(SPHERE, n, temperature=1.0, seed=seed).velocity ** 2).sum() / (3 * n) for seed in range(400)]
+    assert np.std(means) == pytest.approx(math.sqrt(2.0 / (3.0 * n)), rel=5.0 / math.sqrt(2 * 400))
+
+
 def test_velocity_does_not_know_the_position():
     particles = swarm.fill(SPHERE, N, temperature=1.0, seed=6)
     centred = particles.position - particles.position.mean(axis=1, keepdims=True)
@@ -97,6 +116,9 @@ def test_nothing_moves_at_zero(keyword):
         ({"n": 10, "speed": math.nan}, ["speed", "finite", "nan"]),
         ({"n": 10, "temperature": -1.0}, ["temperature must be 0 or more", "got -1"]),
         ({"n": 10, "speed": 1.0, "seed": -1}, ["seed must be 0 or more", "got -1"]),
+        ({"n": 10, "speed": 1.0, "exact": True}, ["exact must be False with speed", "got True"]),
+        ({"n": 10, "temperature": 1.0, "exact": 1}, ["exact must be true or false", "got 1"]),
+        ({"n": 10, "speed": 1.0, "radius": 0.1}, ["radius must be None, got 0.1", "points", "do not meet"]),
         ({"n": 10, "speed": 1.0, "mass": 0.0}, ["mass", "above 0"]),
         ({"n": 10, "speed": 1.0, "mass": [1.0, 2.0]}, ["mass", "(10,)", "(2,)"]),
     ],

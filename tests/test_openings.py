@@ -147,6 +147,73 @@ def test_what_several_walls_hold_leaves_where_one_of_them_is_open():
         assert 0.5 < held.state.position[1, 1] < 0.501
 
 
+# --- Two walls at one place ------------------------------------------------------------------------------
+
+RIM, OTHER_RIM = swarm.Sphere(0.3, center=(0.5, 0.0, 0.0)), swarm.Sphere(0.3, center=(0.5, 0.3, 0.0))
+ROUND = swarm.Slab((0, 1, 0), 1.0), swarm.Slab((0, 0, 1), 1.0), swarm.Plane((-1, 0, 0), 1.0)
+
+
+def two_planes(gap, *openings):
+    return [swarm.Plane((1, 0, 0), 0.5 + at, openings=given) for at, given in zip((0.0, gap), openings, strict=True)]
+
+
+def two_balls(gap, *openings):
+    return [swarm.Sphere(0.5 + at, openings=given) for at, given in zip((0.0, gap), openings, strict=True)]
+
+
+def box_and_plane(gap, *openings):
+    return [swarm.Box((0.5, 1.0, 1.0), openings=openings[0]), swarm.Plane((1, 0, 0), 0.5 + gap, openings=openings[1])]
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-16, -1e-16, 1e-12, -1e-12])
+@pytest.mark.parametrize("pair", [two_planes, two_balls, box_and_plane])
+def test_a_closed_wall_closes_the_opening_of_another_at_its_place(pair, gap):
+    """Whichever comes first in the list; what both let out they let out at the same time."""
+    random = np.random.default_rng(1)
+    start = swarm.Particles(random.uniform(-0.25, 0.25, (3, 40)), random.normal(size=(3, 40)))
+    cases = {"closed": ([RIM], []), "either": ([], [RIM]), "both": ([RIM], [RIM]), "partly": ([RIM], [OTHER_RIM])}
+    times = {}
+    for case, openings in cases.items():
+        walls = pair(gap, *openings)
+        found, turned = (run(swarm.Scene([*order, *ROUND]), start, 6.0, 1) for order in (walls, walls[::-1]))
+        for name in ("position", "velocity"):
+            one, other = getattr(found.particles, name), getattr(turned.particles, name)
+            np.testing.assert_allclose(one, other, atol=1e-10, err_msg=case)
+        np.testing.assert_allclose(found.escape_time, turned.escape_time, rtol=1e-11, err_msg=case)
+        assert (found.impacts_per_particle == turned.impacts_per_particle).all()
+        assert found.observables["max_penetration"].max() <= 1e-15
+        times[case] = found.escape_time
+        out = found.particles.position[:, ~np.isnan(found.escape_time)]
+        for volumes in openings:
+            assert all((volume.phi(out) <= 1e-11).all() for volume in volumes)
+    assert np.isnan(times["closed"]).all()
+    assert np.isnan(times["either"]).all()
+    assert 0 < (~np.isnan(times["partly"])).sum() < (~np.isnan(times["both"])).sum()
+
+
+def test_at_the_edge_of_an_open_and_a_closed_wall_order_does_not_count():
+    """The way goes right into the edge: it bounces off the closed wall, and leaves through the open one."""
+    walls = [swarm.Plane((1, 0, 0), 0.5, openings=[RIM]), swarm.Plane((0, 1, 0), 0.0)]
+    start = thrown([(0.25, -0.25, 0.0)], [(1.0, 1.0, 0.0)])
+    found = [run(swarm.Scene([*order, *ROUND]), start, 1.0, 1) for order in (walls, walls[::-1])]
+    for one in found:
+        assert one.escape_time[0] == 0.25
+        assert one.particles.velocity[:, 0].tolist() == [1.0, -1.0, 0.0]
+        assert one.impacts_per_particle.tolist() == [1]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_slide_goes_over_an_opening_that_another_wall_closes(order):
+    """Along a floor of two walls with openings from x = 0.5 and from x = 0.6: it leaves where both are open."""
+    floors = [
+        swarm.Plane((0, 0, -1), 0.5, openings=[swarm.Sphere(0.5, center=(at + 0.5, 0.0, -0.5))]) for at in (0.5, 0.6)
+    ]
+    scene = swarm.Scene([*floors[::order], swarm.Sphere(10.0)], gravity=(0.0, 0.0, -1.0))
+    found = run(scene, thrown([(0.0, 0.0, -0.5)], [(1.0, 0.0, 0.0)]), 1.0, 2)
+    assert found.escape_time[0] == pytest.approx(0.6, abs=1e-10)
+    assert found.particles.position[:, 0] == pytest.approx([0.6, 0.0, -0.5], abs=1e-10)
+
+
 # --- What openings are of, and what covers them ----------------------------------------------------------
 
 

@@ -104,6 +104,33 @@ REFUSED = {
 }
 
 
+SLIDING = {
+    "a belt": swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.2, motion=swarm.Translation((0.5, 0.0, 0.0))),
+    "to and fro": swarm.Plane((0, 0, -1), 0.0, friction=0.2, motion=swarm.Oscillation((0.2, 0.1, 0.0), 3.0)),
+    "a path": swarm.Plane(
+        (0, 0, -1), 0.0, friction=0.2, motion=swarm.Path((0, 1, 3), ((0, 0, 0), (1, 1, 0), (0, 0, 0)))
+    ),
+    "a rod": swarm.Cylinder(
+        0.2, (1, 0, 0), center=(0.0, 0.5, 0.0), side="outside", friction=0.2, motion=swarm.Translation((0.5, 0.0, 0.0))
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SLIDING)
+def test_what_slides_in_itself_along_the_period_is_what_it_is(name):
+    """It is accepted, and moves particles by its friction as without a period."""
+    walls = [SLIDING[name], swarm.Plane((0, 0, -1), 0.01), CEILING, swarm.Slab((0, 1, 0), 0.5, (0.0, 0.5, 0.0))]
+    start = swarm.Particles([[0.3, 0.9], [0.5, 0.45], [0.5, 0.6]], [[0.4, -0.3], [0.1, 0.02], [-1.5, -1.1]])
+    found, whole = (
+        swarm.simulate(swarm.Scene(walls, period=period), start, swarm.Impact(), until=3.0, compile="never")
+        for period in ((1.0, None, None), None)
+    )
+    assert found.observables["impacts"][-1] > 4
+    assert abs(found.particles.velocity[0] - start.velocity[0]).min() > 0.01
+    unwrapped = found.particles.position + found.particles.image * np.array([[1.0], [0.0], [0.0]])
+    np.testing.assert_allclose(unwrapped, whole.particles.position, atol=1e-12)
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_does_not_go_with_a_period(name):
     surfaces, period, sentence = REFUSED[name]

@@ -258,6 +258,9 @@ def test_shipped_scenes_are_read(path):
         ),
         (SPHERE, formula("x**2 + y**2 + zz**2 - 1"), r"surface\[0\]\.phi has an unknown name 'zz'"),
         (SPHERE, formula("open(x) - 1"), r"surface\[0\]\.phi must call only sqrt"),
+        ("speed = 0.5", "speed = 0.5\nradius = 0.1", r"particles\.radius: .*particles are points and do not meet"),
+        ("speed = 0.5", "speed = 0.5\nexact = true", r"\[particles\]: exact must be False with speed"),
+        ("speed = 0.5", "temperature = 0.5\nexact = 1", r"particles\.exact"),
         (SPHERE, formula("x.real - 1"), r"surface\[0\]\.phi must not have an attribute"),
         (SPHERE, formula("import os"), r"surface\[0\]\.phi is not a formula"),
         (SPHERE, formula("(x**2 + y**2 + z**2 - 0.25)**3"), r"surface\[0\]\.phi .* gradient"),
@@ -272,6 +275,11 @@ def test_bad_input_names_the_key(tmp_path, old, new, message):
     assert old in GOOD
     with pytest.raises(swarm.SceneError, match=message):
         read(tmp_path, GOOD.replace(old, new)).start()
+
+
+def test_an_exact_temperature(tmp_path):
+    particles = read(tmp_path, GOOD.replace("speed = 0.5", "temperature = 0.5\nexact = true")).start()
+    assert 0.5 * (particles.velocity**2).sum() / 10 == pytest.approx(0.75, rel=1e-14)
 
 
 def test_particles_from_files(tmp_path):

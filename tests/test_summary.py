@@ -52,6 +52,18 @@ def test_sliding_and_wall_heat_are_told(path):
     assert told["energy_drift"] == 0.0
 
 
+def test_what_is_dissipated_is_beside_kinetic_energies(tmp_path):
+    """Potential energy has no zero: a fall that begins near it dissipates more than the total energy at the start."""
+    scene = swarm.Scene([swarm.Plane((0, 0, -1), 3.0, restitution=0.5)], gravity=(0, 0, -10.0))
+    start = swarm.Particles([[0.0], [0.0], [0.0]], [[0.0], [0.0], [1.0]], 2.0)
+    file = tmp_path / "fall.h5"
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, trajectory=file, compile="never")
+    seen = result.observables
+    assert seen["dissipated_energy"][-1] > 10.0 * seen["total_energy"][0]
+    told = f"{seen['dissipated_energy'][-1]:.4g} J; the kinetic energy: 1 J, then {seen['kinetic_energy'][-1]:.4g} J"
+    assert summary.of_trajectory(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == told
+
+
 def test_the_work_of_walls_is_told(tmp_path, path):
     """A piston that comes with u gives a particle of mass m and speed v the work 2 m u (v + u)."""
     assert summary.numbers(path)["wall_work"] == []

@@ -1,44 +1,96 @@
-"""Where a particle that slides, or that several walls hold, comes into an opening of its wall."""
+"""Where a particle comes into an opening of its wall, and closed walls at the same place, which close it."""
 
 import math
 
 import numpy as np
 
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch, select
-from ..kernel.vector import norm
+from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch
+from ..kernel.vector import cross, dot, norm, square
 from ..surfaces import fold as walls
 from ..surfaces import near as near_walls
 from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.openings import Openings, is_open, outside
+from . import laws as wall_laws
 from .crossing import at_part, block_of_path
+from .events import TOUCH
 from .hold import second
+from .reflection import relative, wall_velocity
 
 # Places of a step between which the distance to an opening has one least value, and steps of the search for that value
 # and for the place where the opening begins.
 _PLACES, _HALVINGS, _THIRDS = 16, 60, 80
+# The sine of the angle between walls that hold a particle as one.
+_PARALLEL = 1e-7
 
 
-@inlined
-def open_wall_of(openings, held, r, near):
-    """The wall of those that hold a particle that is open at its place, or nearer to that than `near`; or -1."""
-    first = is_open(openings, held.first, r, near)
-    return select(first, held.first, select(is_open(openings, second(held), r, near), second(held), -1.0))
+@outlined
+def _lets_out(openings, rules, chain, wall, r, near):
+    """Whether a wall that a particle is on lets it out: it is open there, and no closed wall lies on it."""
+    if not is_open(openings, wall, r, near):
+        return False
+    return not _is_covered(openings, rules, chain, wall, r, near)
+
+
+@outlined
+def _is_covered(openings, rules, chain, wall, r, near):
+    """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
+    count, touch, n = near_walls.count_near(chain, r), TOUCH * rules.size + near, walls.unit_normal(chain, wall, r)
+    number = scratch(count, np.float64)
+    near_walls.list_near(chain, 0, 0.0, r, number)
+    for i in range(count):
+        m = walls.unit_normal(chain, number[i], r)
+        alike = dot(n, m) > 0.0 and square(cross(n, m)) <= _PARALLEL * _PARALLEL
+        here = alike and abs(walls.distance(chain, number[i], r)) <= touch
+        if here and number[i] != wall and not is_open(openings, number[i], r, near):
+            return True
+    return False
+
+
+@outlined
+def hit_wall(openings, rules, chain, motion, wall, near):
+    """The wall that a particle (r, v) hits that has reached this one: where this is open, a closed one at the place.
+
+    Of several closed ones it is the one that it reaches first.
+    """
+    r, v = motion
+    if not is_open(openings, wall, r, near):
+        return wall
+    moving, touch = wall_laws.moving(rules.laws), TOUCH * rules.size + near
+    count, found, soonest = near_walls.count_near(chain, r), wall, math.inf
+    number = scratch(count, np.float64)
+    near_walls.list_near(chain, 0, 0.0, r, number)
+    for i in range(count):
+        w = relative(wall_velocity(moving, chain, number[i], r), v)
+        towards, distance = dot(walls.unit_normal(chain, number[i], r), w), walls.distance(chain, number[i], r)
+        # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
+        here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
+        if here and -distance < soonest * towards and not is_open(openings, number[i], r, near):
+            found, soonest = number[i], max(-distance, 0.0) / towards
+    return found
+
+
+@outlined
+def open_wall_of(openings, rules, chain, held, r, near):
+    """The wall of those that hold a particle that lets it out at its place, or nearer to that than `near`; or -1."""
+    if _lets_out(openings, rules, chain, held.first, r, near):
+        return held.first
+    return second(held) if _lets_out(openings, rules, chain, second(held), r, near) else -1.0
 
 
 @by_type_outlined
-def open_wall_at(openings, chain, r, touch, near):
-    """A wall within the distance `touch` of a place that is open there, or -1."""
+def open_wall_at(openings, rules, chain, r, near):
+    """A wall at a place that lets out there, or -1."""
     return -1.0
 
 
 @open_wall_at.register(Openings)
-def _(openings, chain, r, touch, near):
-    count = near_walls.count_near(chain, r)
+def _(openings, rules, chain, r, near):
+    count, touch = near_walls.count_near(chain, r), TOUCH * rules.size
     number = scratch(count, np.float64)
     near_walls.list_near(chain, 0, 0.0, r, number)
     for i in range(count):
-        if walls.distance(chain, number[i], r) >= -touch and is_open(openings, number[i], r, near):
+        if walls.distance(chain, number[i], r) >= -touch and _lets_out(openings, rules, chain, number[i], r, near):
             return number[i]
     return -1.0
 
@@ -106,14 +158,35 @@ def _may_enter_one(members, path, reach):
 
 
 @by_type
-def part_until_open(openings, held, path, near):
-    """The part of a step after which a wall that holds the particle is open, deeper than `near`; else infinite."""
+def part_until_open(openings, rules, chain, held, path, near):
+    """The part of a step after which a wall that holds the particle lets it out, deeper than `near`; else infinite."""
     return math.inf
 
 
 @part_until_open.register(Openings)
-def _(openings, held, path, near):
-    return min(_part(openings, held.first, path, near), _part(openings, second(held), path, near))
+def _(openings, rules, chain, held, path, near):
+    first = _part_uncovered(openings, rules, chain, held.first, path, near)
+    return min(first, _part_uncovered(openings, rules, chain, second(held), path, near))
+
+
+@outlined
+def _part_uncovered(openings, rules, chain, wall, path, near):
+    """The same of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
+    low = _part(openings, wall, path, near)
+    if not low < math.inf or not _is_covered(openings, rules, chain, wall, at_part(path, low), near):
+        return low
+    for k in range(1, _PLACES + 1):
+        high = k / _PLACES
+        if high > low and _lets_out(openings, rules, chain, wall, at_part(path, high), near):
+            for _half in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                if _lets_out(openings, rules, chain, wall, at_part(path, middle), near):
+                    high = middle
+                else:
+                    low = middle
+            return high
+        low = max(low, high)
+    return math.inf
 
 
 @by_type

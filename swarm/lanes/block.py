@@ -176,7 +176,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
     return_lanes(lanes.period, share.state, lanes, live)
-    let_out_lanes(share.state.openings, share, lanes, live)
+    let_out_lanes(share.state.openings, method, chain, share, lanes, live)
     unknown = methods.solves(method)
     solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
     impact_log.keep_before(share.log, lanes, live)

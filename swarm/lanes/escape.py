@@ -1,9 +1,10 @@
 """Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
 
-from ..contact import crossing, events, hold
-from ..contact.passing import open_wall_at, open_wall_of
+from ..contact import crossing, hold
+from ..contact.passing import hit_wall, open_wall_at, open_wall_of
 from ..kernel.jit import by_type, by_type_outlined, index, inlined
 from ..kernel.vector import column, put
+from ..surfaces.moving import at
 from ..surfaces.openings import Openings, is_open
 from . import compose
 from . import log as impact_log
@@ -19,18 +20,22 @@ def _escape(share, p, wall, r, v, left):
 
 
 @by_type
-def let_out_lanes(openings, share, lanes, live):
-    """The lanes whose flight has ended on a wall where it is open."""
+def let_out_lanes(openings, method, chain, share, lanes, live):
+    """The lanes whose flight has ended on a wall where it is open, if no closed one is at the same place."""
 
 
 @let_out_lanes.register(Openings)
-def _(openings, share, lanes, live):
+def _(openings, method, chain, share, lanes, live):
     rows = lanes.rows
     for i in range(index(live)):
         lanes.marked[i] = is_open(openings, lanes.wall[i], column(rows, R, i), 0.0)
     for k in range(marked_lanes(lanes, live)):
         lane = index(lanes.order[k])
         r, v = column(rows, R, lane), column(rows, V, lane)
+        wall = hit_wall(openings, method, at(chain, rows[LEFT, lane]), (r, v), lanes.wall[lane], 0.0)
+        if not is_open(openings, wall, r, 0.0):
+            lanes.wall[lane] = wall
+            continue
         _escape(share, index(lanes.particle[lane]), lanes.wall[lane], r, v, rows[LEFT, lane])
         rows[LEFT, lane], lanes.wall[lane] = 0.0, -1.0
 
@@ -45,13 +50,24 @@ def is_at_opening(openings, kind, method, chain, state, lanes, i):
 def _(openings, kind, method, chain, state, lanes, i):
     rows, r = lanes.rows, column(lanes.rows, compose.R, i)
     held = hold.of_lane(kind, rows[compose.WALL, i], rows[compose.WALL + 1, i])
-    wall = open_wall_of(openings, held, r, crossing.near(method, r))
+    wall = open_wall_of(openings, method, chain, held, r, crossing.near(method, r))
     if wall < 0.0:
         return False
     state.contacts.met[lanes.particle[i]] = wall
     put(rows, compose.V, i, compose.with_kept(kind, chain, lanes, i))
     rows[compose.KEEP, i] = 0.0
     return True
+
+
+@by_type_outlined
+def met_wall(openings, method, chain, wall, r, v):
+    """The wall that a particle meets that is at this one: where this is open, a closed one at the same place."""
+    return wall
+
+
+@met_wall.register(Openings)
+def _(openings, method, chain, wall, r, v):
+    return hit_wall(openings, method, chain, (r, v), wall, crossing.near(method, r))
 
 
 @by_type_outlined
@@ -76,7 +92,7 @@ def let_out_at(openings, method, chain, share, p, r, left):
 
 @let_out_at.register(Openings)
 def _(openings, method, chain, share, p, r, left):
-    wall = open_wall_at(openings, chain, r, events.TOUCH * method.size, crossing.near(method, r))
+    wall = open_wall_at(openings, method, chain, r, crossing.near(method, r))
     if wall < 0.0:
         return False
     _escape(share, p, wall, r, column(share.state.velocity, 0, p), left)

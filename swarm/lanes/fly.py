@@ -185,7 +185,7 @@ def _flight(method, chain, gravity, lanes, i, hit):
     """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lane_of(method, lanes.rows, i)
     if methods.lands(method):
-        end = methods.land(method, chain, gravity, lane, cut(lanes.period, gravity, lane.r, lane.v, hit))
+        end = methods.land(method, chain, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.left, hit))
     else:
         end = methods.flight(method, chain, gravity, lane)
     put_end(lanes, i, end)

@@ -22,7 +22,7 @@ from .accounts import book, book_step, book_work, lose
 from .arrays import LANES, booked, following_particle, speed2_scale
 from .arrays import heat as book_heat
 from .carried import NOT_CARRIED, carry, is_carried
-from .escape import let_out_at, let_out_of
+from .escape import let_out_at, let_out_of, met_wall
 from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
@@ -56,10 +56,11 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    carried, chain = chain, at(chain, left)
+    contacts.met[i] = met_wall(state.openings, method, chain, contacts.met[i], r, v)
     if let_out_of(state.openings, method, share, i, contacts.met[i], r, left):
         _leave(share, i)
         return True
-    carried, chain = chain, at(chain, left)
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0

@@ -296,7 +296,9 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
     if event & (LEAVES | PASSES):
         path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
         cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
-        cut = min(cut, part_until_open(lanes.openings, held, path, crossing.near(method, r)))
+        cut = min(
+            cut, part_until_open(lanes.openings, method, at(chain, rows[LEFT, i]), held, path, crossing.near(method, r))
+        )
     if not cut < 1.0:
         # It passes near a wall.
         return _take(kind, method, chain, gravity, state, lanes, i)

@@ -7,7 +7,7 @@ from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined
 from ..kernel.vector import Vec, column, dot, put
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
-from ..surfaces.period import Period, has_left, into
+from ..surfaces.period import Period, has_left, into, keeps_walls, length_of
 from . import arrays, compose
 from .marks import marked_lanes
 
@@ -28,11 +28,13 @@ def _(period, state, lanes, live):
     for k in range(marked_lanes(lanes, live)):
         lane = index(lanes.order[k])
         p = index(lanes.particle[lane])
-        back, before = into(period, column(rows, arrays.R, lane)), state.energy[p]
+        r, before = column(rows, arrays.R, lane), state.energy[p]
+        back = into(period, r)
         put(rows, arrays.R, lane, back.r)
         _count(period, state, p, back.images)
         rows[arrays.OWN, lane] = _twice(period.fall, state.energy[p], before, rows[arrays.OWN, lane])
-        lanes.wall[lane] = -1.0
+        if not keeps_walls(period, r):
+            lanes.wall[lane] = -1.0
 
 
 @inlined
@@ -130,12 +132,4 @@ def _is_there(chain, wall, r, back, near):
 
 @inlined
 def _length(period):
-    return _or_none(period.x) + _or_none(period.y) + _or_none(period.z)
-
-
-@by_type
-def _or_none(length):
-    return 0.0
-
-
-_or_none.register(float, lambda length: length)
+    return length_of(period.x) + length_of(period.y) + length_of(period.z)

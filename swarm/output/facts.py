@@ -69,7 +69,9 @@ def of_run(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that show whether a run went well."""
     escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
     lost = seen.get("dissipated_energy", [0.0])[-1]
-    dissipated = {"dissipated": f"{lost:.4g} J of {seen['total_energy'][0]:.4g} J"} if lost else {}
+    # Not of the total energy: the zero of the potential one is arbitrary.
+    kinetic = [f"{seen['kinetic_energy'][k]:.4g} J" for k in (0, -1)]
+    dissipated = {"dissipated": f"{lost:.4g} J; the kinetic energy: {kinetic[0]}, then {kinetic[1]}"} if lost else {}
     slid = seen.get("sliding_time", [0.0])[-1]
     sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
     heats, works = (

@@ -19,6 +19,8 @@ from .options import RunOptions, Task
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 # A time this many runs ago leaves float64 a ten-thousandth of the run.
 _LONG_AGO = 1e12
+# Images beyond this are no whole numbers of floats, which files and `Particles` hold.
+_MOST_CELLS = 2.0**53
 
 
 def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Task:
@@ -45,7 +47,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         )
     _require_instants(scene, particles, method, options)
     # The arrays of Particles may have been changed since it checked them.
-    particles = _in_the_cell(scene, particles.copy())
+    particles = _in_the_cell(scene, particles.copy(), options.times.until)
     _require_period(scene, method)
     check_surfaces(method, scene)
     if options.compile != "never":
@@ -172,7 +174,7 @@ def _require_motions(scene: Scene, until: float) -> None:
                 )
 
 
-def _in_the_cell(scene: Scene, particles: Particles) -> Particles:
+def _in_the_cell(scene: Scene, particles: Particles, until: float) -> Particles:
     """The particles, with their positions in the cell and their images where the scene repeats."""
     if scene.period is None:
         if particles.image is not None:
@@ -181,9 +183,26 @@ def _in_the_cell(scene: Scene, particles: Particles) -> Particles:
                 "scene the period that they are of"
             )
         return particles
+    _require_countable(scene, particles, until)
     particles.position, images = scene.wrapped(particles.position)
     particles.image = images if particles.image is None else images + particles.image
     return particles
+
+
+def _require_countable(scene: Scene, particles: Particles, until: float) -> None:
+    """Raise a `SceneError` where a particle may come through more cells than a file can count."""
+    for k, length in enumerate(scene.period or ()):
+        if length is None:
+            continue
+        pull = 0.0 if scene.gravity is None else abs(scene.gravity[k])
+        reach = float(abs(particles.position[k]).max()) + until * (particles.fastest() + 0.5 * pull * until)
+        before = 0 if particles.image is None else int(abs(particles.image[k]).max())
+        if not reach / length + before <= _MOST_CELLS:
+            raise SceneError(
+                f"period[{k}] must be so long that particles come through at most 2**53 cells, got {length:g} m, for "
+                f"particles that may be {reach / length + before:.3g} cells away at {until:g} s; give a longer period, "
+                "or a shorter run"
+            )
 
 
 def _require_period(scene: Scene, method: Method) -> None:

@@ -40,10 +40,10 @@ def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
     _require_place(surface, period, name)
     if isinstance(surface, Many):
         return [_many_images(surface, period, name)]
-    low, high = _body(surface).bounds() if surface.is_solid() else surface.bounds()
+    low, high = body_of(surface).bounds() if surface.is_solid() else surface.bounds()
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
     for k, length in enumerate(period):
-        if length is not None and not _is_same_along(surface, k, period):
+        if length is not None and not is_same_along(surface, k, period):
             shifts[k] = _shifts(surface, (low[k], high[k]), length, f"{name} ({type(surface).__name__})", k)
     found = [_shifted(surface, shift) for shift in itertools.product(*shifts)]
     if len(found) > 1 and any(isinstance(one, Rotation) for one in parts_of(surface.motion)):
@@ -110,7 +110,7 @@ def _shifts(surface: Surface, ends: tuple[float, float], length: float, name: st
     return [n * length for n in range(first, last + 1)]
 
 
-def _body(surface: Surface) -> Surface:
+def body_of(surface: Surface) -> Surface:
     """What a solid fills, as the cavity of the same shape."""
     return replace(surface, side="inside", motion=None)  # type: ignore[call-arg]
 
@@ -119,19 +119,19 @@ def _shifted(surface: Surface, shift: Sequence[float]) -> Surface:
     return surface.shifted(tuple(shift)) if any(shift) else surface  # type: ignore[arg-type]
 
 
-def _is_same_along(surface: Surface, k: int, period: Lengths) -> bool:
-    """Whether a surface has no slope along an axis, at points all around."""
+def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_SLOPE) -> bool:
+    """Whether a surface has no slope along an axis, at points all around; `least` is the part of it that is none."""
     reach = 2.0 * surface.extent() or 1.0
     cells = np.array([[-reach, reach] if length is None else [0.0, length] for length in period])
     points = cells[:, :1] + (cells[:, 1:] - cells[:, :1]) * np.random.default_rng(0).random((3, _POINTS))
     slopes = surface.gradient(points)
     good = np.isfinite(slopes).all(axis=0)
     slopes = slopes[:, good]
-    return bool(good.any() and (np.abs(slopes[k]) <= _NO_SLOPE * np.abs(slopes).max(axis=0)).all())
+    return bool(good.any() and (np.abs(slopes[k]) <= least * np.abs(slopes).max(axis=0)).all())
 
 
 def _require_place(surface: Surface, period: Lengths, name: str) -> None:
-    """Raise a `SceneError` if a surface does not stay where it is along the period."""
+    """Raise a `SceneError` if a surface does not stay where it is along the period, or what it is."""
     if surface.reacts():
         raise SceneError(
             f"{name}.mass and inertia must be None where the scene has a period, got {surface}: impacts would move it "
@@ -139,15 +139,26 @@ def _require_place(surface: Surface, period: Lengths, name: str) -> None:
         )
     for one in parts_of(surface.motion):
         for k, length in enumerate(period):
-            if length is not None and _moves_along(one, k, surface):
+            if length is not None and _moves_along(one, k, surface, period):
                 raise SceneError(
                     f"{name}.motion must leave the surface where it is along {'xyz'[k]}, where period[{k}] is "
-                    f"{length:g}, got {one}; move it across the period only"
+                    f"{length:g}, got {one}; move it across the period, or as it "
+                    "stays what it is (a plane in itself)"
                 )
 
 
-def _moves_along(motion: Any, k: int, surface: Surface) -> bool:
-    """Whether a part of a motion moves a surface along an axis."""
+def _moves_along(motion: Any, k: int, surface: Surface, period: Lengths) -> bool:
+    """Whether a part of a motion moves a surface along an axis, other than in itself."""
+    return _goes_along(motion, k, surface) and (isinstance(motion, Rotation) or not _slides(surface, k, period))
+
+
+def _slides(surface: Surface, k: int, period: Lengths) -> bool:
+    """Whether a surface that goes along an axis stays what it is, as a belt does."""
+    return not isinstance(surface, Many) and is_same_along(surface, k, period)
+
+
+def _goes_along(motion: Any, k: int, surface: Surface) -> bool:
+    """Whether a part of a motion moves the points of a surface along an axis."""
     if isinstance(motion, Rotation):
         x, y, z = unit_axis(motion).tolist()
         return not (abs((x, y, z)[k]) == 1.0 or surface.is_unturned_by((x, y, z), motion.center))
