@@ -90,7 +90,7 @@ def _hint(header: list[str]) -> str:
     if not header:
         return ": the file is empty"
     got = f" in the first row, {','.join(header)!r:.60}"
-    if len(header) == 1 and (re.search(r"[;\t]", header[0]) or len(header[0].split()) > 3):
+    if len(header) == 1 and re.search(r"[;\t ]", header[0]) and not header[0].startswith("#"):
         return f"{got}; write commas between columns, and points in numbers"
     if all(_NUMBER.fullmatch(name) for name in header):
         return f"{got}; write the names of the columns above the numbers"

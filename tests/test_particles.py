@@ -135,7 +135,10 @@ HEAD, ROW = "x,y,z,vx,vy,vz\n", "1,2,3,4,5,6\n"
 
 @pytest.mark.parametrize(
     "text",
-    ["\n\n" + HEAD + ROW, HEAD + "   \n" + ROW, '"x", "y", "z", "vx", "vy", "vz"\n' + ROW, (HEAD + ROW).replace("\n", "\r")],
+    [
+        "\n\n" + HEAD + ROW, HEAD + "   \n" + ROW, '"x", "y", "z", "vx", "vy", "vz"\n' + ROW,
+        (HEAD + ROW).replace("\n", "\r"),
+    ],
     ids=["blank lines above", "a line of blanks", "blanks before quotes", "lines of old Macs"],
 )  # fmt: skip
 def test_what_editors_and_other_programs_do(table, text):
