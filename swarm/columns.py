@@ -1,6 +1,7 @@
 """Columns of numbers, by their names: from a CSV file, and of observables."""
 
 import csv
+import io
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -60,22 +61,40 @@ def read_columns(
             and column.
     """
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            table = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = Path(path).read_bytes()
+        table = list(csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""), skipinitialspace=True))
+    except UnicodeDecodeError as error:
+        row = text[: error.start].count(b"\n") + 1
+        raise SceneError(
+            f"cannot read {path}, row {row}: expected text in UTF-8, got the byte 0x{text[error.start]:02x}"
+        ) from error
+    except (OSError, csv.Error) as error:
         raise SceneError(f"cannot read {path}: {error}") from error
-    header = [name.strip() for name in table[0]] if table else []
+    rows = [(number, cells) for number, cells in enumerate(table, start=1) if any(cells) or len(cells) > 1]
+    header = [name.strip() for name in rows[0][1]] if rows else []
     missing = [name for name in needed if name not in header]
     unknown = [name for name in header if name not in (*needed, *optional)]
     if missing or unknown or len(set(header)) < len(header):
         problem = f"column {missing[0]!r} is missing" if missing else f"columns are {', '.join(header)}"
         more = f" and optionally {', '.join(optional)}" if optional else ""
-        raise SceneError(f"{path}: expected the columns {', '.join(needed)}{more}; {problem}")
-    rows = [(number, cells) for number, cells in enumerate(table[1:], start=2) if cells]
-    if not rows:
+        hint = _hint(header) if missing else ""
+        raise SceneError(f"{path}: expected the columns {', '.join(needed)}{more}; {problem}{hint}")
+    if len(rows) < 2:
         raise SceneError(f"{path}: expected at least one {what} below the header, got none")
-    values = np.array([_row(path, number, header, cells) for number, cells in rows])
+    values = np.array([_row(path, number, header, cells) for number, cells in rows[1:]])
     return dict(zip(header, values.T, strict=True))
+
+
+def _hint(header: list[str]) -> str:
+    """What a header without the columns may be."""
+    if not header:
+        return ": the file is empty"
+    got = f" in the first row, {','.join(header)!r:.60}"
+    if len(header) == 1 and re.search(r"[;\t ]", header[0]) and not header[0].startswith("#"):
+        return f"{got}; write commas between columns, and points in numbers"
+    if all(_NUMBER.fullmatch(name) for name in header):
+        return f"{got}; write the names of the columns above the numbers"
+    return f"{got}; write the names as they are here, without units, and nothing above them"
 
 
 def _row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:

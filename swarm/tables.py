@@ -83,9 +83,17 @@ def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:
 
 
 def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
-    """A surface's table with the long arrays that it names."""
+    """A surface's table with the long arrays that it names.
+
+    Raises:
+        SceneError: it names a file, as no trajectory does: to read it would open any file of the machine.
+    """
     named = {key for key, value in table.items() if isinstance(value, str) and value.startswith(_ARRAY)}
     held = {key: np.asarray(arrays[value]) if key in named else value for key, value in table.items()}
+    if isinstance(held.get("values"), str):
+        raise SceneError(
+            f"surface.values: expected the samples, got {held['values']!r:.80}; a trajectory names no file"
+        )
     if "openings" in held:
         held["openings"] = [with_arrays(opening, arrays) for opening in held["openings"]]
     return held

@@ -131,6 +131,46 @@ def test_errors_name_file_row_and_column(table, text, parts):
     assert all(part in str(caught.value) for part in ["start.csv", *parts]), str(caught.value)
 
 
+HEAD, ROW = "x,y,z,vx,vy,vz\n", "1,2,3,4,5,6\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n\n" + HEAD + ROW, HEAD + "   \n" + ROW, '"x", "y", "z", "vx", "vy", "vz"\n' + ROW,
+        (HEAD + ROW).replace("\n", "\r"),
+    ],
+    ids=["blank lines above", "a line of blanks", "blanks before quotes", "lines of old Macs"],
+)  # fmt: skip
+def test_what_editors_and_other_programs_do(table, text):
+    assert table(text).velocity[:, 0].tolist() == [4.0, 5.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("x;y;z;vx;vy;vz\n0,1;0;0;1,5;0;0\n", "'x;y;z;vx;vy;vz'; write commas between columns, and points in numbers"),
+        ("x\ty\tz\tvx\tvy\tvz\n", "write commas between columns"),
+        ("x y z vx vy vz\n", "write commas between columns"),
+        (ROW, "'1,2,3,4,5,6'; write the names of the columns above the numbers"),
+        ("X,Y,Z,VX,VY,VZ\n" + ROW, "'X,Y,Z,VX,VY,VZ'; write the names as they are here"),
+        ("x [m],y [m],z [m],vx,vy,vz\n" + ROW, "without units"),
+        ("# made by hand\n" + HEAD + ROW, "'# made by hand'; write the names as they are here"),
+        ("\n\n", "the file is empty"),
+    ],
+)
+def test_a_header_that_is_none_is_told_how_to_mend(table, text, hint):
+    with pytest.raises(swarm.SceneError, match=r"start\.csv: expected the columns x, y, z") as caught:
+        table(text)
+    assert hint in str(caught.value)
+
+
+def test_bytes_of_another_code_are_named_with_their_row(tmp_path):
+    (tmp_path / "start.csv").write_bytes((HEAD + 3 * ROW).encode() + "1,2,3,4,5,6é\n".encode("latin-1"))
+    with pytest.raises(swarm.SceneError, match=r"start\.csv, row 5: expected text in UTF-8, got the byte 0xe9"):
+        swarm.Particles.from_csv(tmp_path / "start.csv")
+
+
 def test_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
     for path in (tmp_path / "none.csv", tmp_path, tmp_path / "binary.csv"):

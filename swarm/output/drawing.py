@@ -21,6 +21,8 @@ MAP = ListedColormap(colours.table(), name="swarm")
 BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _FEW_WIRES = 300
+# A direction in which a picture extends by less than this part of its widest one is drawn as flat.
+_FLAT = 1e-9
 _DPI = 100
 # Matplotlib leaves room around 3-D axes: with this zoom a cube fills its cell, seen from where it is by default.
 _ZOOM, _AZIMUTH, _ELEVATION = 1.15, math.radians(-60.0), math.radians(30.0)
@@ -98,7 +100,7 @@ def particles(
         axes.add_collection3d(drawn[-1], autolim=False)
     dot = size * float(np.clip(3e4 / len(points), 0.3, 1000.0)) ** 0.5
     dots = axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
-    low, high = around(points, wires) if box is None else box
+    low, high = _roomy(*(around(points, wires) if box is None else box))
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
         axis.set_pane_color((0.0, 0.0, 0.0, 0.0))
         axis.line.set_color(LIGHT)
@@ -123,6 +125,16 @@ def around(points: Floats, wires: list[tuple[bool, list[Floats]]]) -> tuple[Floa
     """The corners of the box around points (N, 3) and wires."""
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
     return corners.min(axis=0), corners.max(axis=0)
+
+
+def _roomy(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """The box, with room in directions in which it has none: axes between equal limits cannot be drawn."""
+    low, high = low.astype(np.float64), high.astype(np.float64)
+    wide, far = high - low, max(abs(low).max(), abs(high).max())
+    # All at one point: the room is as large as its distance from the origin, so that round-off does not take it.
+    room = wide.max() if wide.max() > _FLAT * far else far or 1.0
+    flat = np.where(wide <= _FLAT * room, 0.5 * room, 0.0)
+    return low - flat, high + flat
 
 
 def colour_bar(figure: Any, axes: Any, quantity: str, low: float, high: float) -> None:

@@ -23,8 +23,9 @@ from .shapes import shapes_of, since_start
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
 _LEAST, _MOST = 64, 8192
-# Pixels an inch, in which letters have the size of those of a plot.
-_DPI = 120
+# Pixels an inch, in which letters have the size of those of a plot; fewer where a side has less than these pixels: the
+# letters would leave no room for the axes.
+_DPI, _ROOM = 120, 240
 # Hundredths of a second, in which a GIF counts; viewers take less than 2 for 10.
 _HUNDREDTHS, _FASTEST = 100.0, 50.0
 
@@ -72,7 +73,7 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     film = _Film(trajectory, numbers, pixels, shown)
     part = paths.part_of(target)
     try:
-        with matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), _DPI):
+        with matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), film.picture.dpi):
             for k in numbers:
                 film.show(k)
                 writer.grab_frame()
@@ -128,8 +129,9 @@ class _Film:
         self._walls = [(shape.solid, shape.wires) for shape in self._shapes]
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, start)
         # With half a pixel round-off takes none away.
-        self.picture = drawing.picture((pixels[0] + 0.5) / _DPI, (pixels[1] + 0.5) / _DPI)
-        self.picture.set_dpi(_DPI)
+        dpi = _DPI * min(1.0, min(pixels) / _ROOM)
+        self.picture = drawing.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)
+        self.picture.set_dpi(dpi)
         self._canvas: Any = FigureCanvasAgg(self.picture)
         self.picture.set_facecolor(drawing.BACKGROUND)
         self._axes = self.picture.add_subplot(projection="3d")

@@ -42,6 +42,8 @@ _AT_ONCE = 10  # frames of a trajectory
 _ROWS, _PATIENCE = 50, 0.5
 # Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
+# Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
+_LATEST = 9.2e9
 
 _LINES, _MESH = "/scene/bodies/lines", "/scene/bodies/mesh"
 _BACKGROUND = (24, 24, 27)
@@ -263,7 +265,10 @@ class RecordingWriter:
         self._due = time.monotonic() + _PATIENCE
 
     def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
-        indexes = [rr.TimeColumn("frame", sequence=numbers), rr.TimeColumn("sim_time", duration=times)]
+        indexes = [
+            rr.TimeColumn("frame", sequence=numbers),
+            rr.TimeColumn("sim_time", duration=np.clip(times, -_LATEST, _LATEST)),
+        ]
         self.stream.send_columns(path, indexes, columns)
 
 

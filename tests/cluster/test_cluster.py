@@ -8,6 +8,7 @@ import time
 from typing import NamedTuple
 
 import numpy as np
+import psutil
 import pytest
 
 import swarm
@@ -35,6 +36,19 @@ def client():
 @pytest.fixture(autouse=True)
 def quick_looks(monkeypatch):
     monkeypatch.setattr(of_client, "_FOLLOWS", 0.05)
+
+
+def test_a_local_cluster_is_reached_from_this_machine_only(client):
+    """Scheduler, workers, their nannies and Dask's dashboard; at ports that the system chose, as two clusters need."""
+    found = [
+        (process.pid, one.laddr)
+        for process in psutil.Process().children(recursive=True)
+        for one in process.net_connections()
+        if one.status == psutil.CONN_LISTEN
+    ]
+    assert len({pid for pid, _address in found}) >= 3
+    assert {address.ip for _pid, address in found} == {"127.0.0.1"}
+    assert 8787 not in {address.port for _pid, address in found}
 
 
 def cavity():

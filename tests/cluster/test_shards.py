@@ -1,9 +1,14 @@
 """Shards against the single run, bit for bit. They run here, one after the other, as they would on workers."""
 
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import swarm
+from swarm.output import paths
 from swarm.run import machine
 from swarm.run.admission import task_of
 from swarm.run.cluster import Sharded, joined, shards, worker
@@ -171,3 +176,61 @@ def require_same_file(one, other):
     assert mine.keys() == its.keys()
     for name, values in mine.items():
         assert the_same(values, its[name]), name
+
+
+KILLED = """
+import os, signal, sys
+import numpy as np, swarm
+from swarm.run.cluster import joined, shards, worker
+from swarm.run.cluster.sharded import Sharded
+from swarm.run.options import RunOptions
+from swarm.run.admission import task_of
+
+path, resume, dies = sys.argv[1], sys.argv[2] == "resume", int(sys.argv[3])
+joined._AT_ONCE = 2
+real = joined._joined
+told = []
+
+def one(*about):
+    told.append(1)
+    if len(told) == dies:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return real(*about)
+
+joined._joined = one
+scene = swarm.Scene([swarm.Sphere(0.5)])
+start = swarm.fill(scene, 300, speed=1.0, seed=1)  # two chunks
+options = RunOptions(
+    until=1.0, every=0.1, compile="never", cluster="local:1", shards=2, checkpoint=60.0, trajectory=path, resume=resume
+)
+session, task = Sharded(options), task_of(scene, start, swarm.Impact(), options)
+with session:
+    session.prepare_shards(task)
+    folder, bounds = session.begin(task, 2)
+    for k in range(2):
+        assert worker.advance(folder, k) == ("complete", "")
+    joined.write(folder, task, bounds, session.identity)
+    session.finish()
+"""
+
+
+def test_a_kill_in_the_middle_of_a_join_leaves_no_half_of_a_trajectory(tmp_path):
+    """The checkpoint that holds the shards stays, the run is resumed, and of what was begun nothing is left."""
+    path = tmp_path / "run.h5"
+
+    def session(*how):
+        done = subprocess.run([sys.executable, "-c", KILLED, str(path), *how], capture_output=True, text=True)
+        return done.returncode, done.stderr
+
+    assert session("begin", "7") == (-signal.SIGKILL, "")
+    assert not path.exists()
+    assert paths.checkpoint_of(path).exists()
+    assert session("resume", "0") == (0, "")
+    with swarm.load(path) as trajectory:
+        assert len(trajectory) == 11
+        alone = swarm.simulate(
+            trajectory.scene, trajectory.frame(0), swarm.Impact(), until=1.0, every=0.1, compile="never"
+        )
+        assert the_same(trajectory.frame(-1).position, alone.particles.position)
+        assert the_same(trajectory.observables["impacts"], alone.observables["impacts"])
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.h5", "run.shards"]

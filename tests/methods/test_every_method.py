@@ -22,3 +22,12 @@ def test_impulses_and_momentum_agree(name, gravity):
     assert given[0] > 1.9
     assert passes[-1].velocity - start == pytest.approx(fallen + np.array([0.0, 0.0, given[0]]), abs=1e-12)
     assert sum(one.hits for one in passes) == 1
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if not METHODS[name].has_multipliers()])
+def test_a_particle_at_rest_in_the_middle_stays_there(name):
+    """There the distance has no gradient: plain Python raised for the 1/0 that a kernel carries on with."""
+    cavity = swarm.Scene([swarm.Sphere(0.5)])
+    result = swarm.simulate(cavity, swarm.Particles([0.0] * 3, [0.0] * 3), METHODS[name], until=1.0, compile="never")
+    assert not result.particles.position.any()
+    assert not result.particles.velocity.any()

@@ -152,6 +152,13 @@ STRANGE = {
     "scene is no TOML": (replaced("parameters/scene", "surface = ["), "its scene"),
     "scene is no table": (replaced("parameters/scene", "surface = 1"), "its scene"),
     "scene is too deep": (replaced("parameters/scene", f"surface = {'[' * 5000}"), "its scene"),
+    # A file, a pipe or a device of the machine of who reads the trajectory would be opened.
+    "scene names a file": (
+        replaced(
+            "parameters/scene", '[[surface]]\nkind = "sampled"\nvalues = "a.h5"\nspacing = 1.0\norigin = [0, 0, 0]'
+        ),
+        "its scene: surface.values: expected the samples, got 'a.h5'",
+    ),
     "method is unknown": (replaced("parameters/method", 'kind = "magic"'), "its method: method.kind must be one of"),
     "a seed is text": (replaced("parameters/seed", b"one"), "parameters/seed must hold numbers"),
     "particles are many": (replaced("parameters/particles", np.zeros(3, int)), "parameters/particles must have"),

@@ -6,6 +6,7 @@ It is read as that of one run. The shards are named relative to it: it can be mo
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,11 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 class JoinedWriter(TrajectoryWriter):
-    """A writer whose particles are those of the shards; it writes only what is not of particles."""
+    """A writer whose particles are those of the shards; it writes only what is not of particles.
+
+    Its file takes its name when it is whole: to a session after a kill in between, a part of the frames would be a run
+    that cannot go on. The checkpoint, which holds the shards, is left to the session.
+    """
 
     def __init__(self, folder: Path, task: Task, bounds: list[int], frames: int, identity: dict[str, Any]) -> None:
         assert task.options.trajectory is not None
@@ -78,6 +83,17 @@ class JoinedWriter(TrajectoryWriter):
             task.options.trajectory, task.options.storage, task.scene, task.method, task.bodies or task.particles,
             task.options.scene_text, identity,
         )  # fmt: skip
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.sync()
+            self._grown.take_name()
+        super().__exit__(kind, error, trace)
+
+    def _take_name(self) -> None:
+        """Not yet."""
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
         import h5py

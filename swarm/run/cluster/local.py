@@ -18,6 +18,8 @@ from ...errors import RunError
 _ROOT = Path(__file__).parents[3]
 # Seconds until its processes have ended by themselves.
 _ENDS = 10.0
+# Who reaches a scheduler can run any code: it listens where only this machine does, whatever Dask's default is.
+_HERE = "127.0.0.1"
 
 
 @contextmanager
@@ -63,8 +65,8 @@ def main() -> None:
     from distributed import LocalCluster
 
     with LocalCluster(
-        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
-        silence_logs=logging.CRITICAL, worker_dashboard_address=None,
+        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, memory_limit=0, host=_HERE,
+        dashboard_address=f"{_HERE}:0", worker_dashboard_address=None, silence_logs=logging.CRITICAL,
     ) as cluster:  # fmt: skip
         print(cluster.scheduler_address, flush=True)
         sys.stdin.read()

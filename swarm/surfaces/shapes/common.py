@@ -34,9 +34,10 @@ def _gradient(surface, r):
 
 
 def _gap_slope(surface, q0, q1):
-    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1))
-    root1 = math.sqrt(q1)
-    slope = 1.0 / (math.sqrt(q0) + root1)
+    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), by NumPy's roots: those of math raise for 1/0, at the
+    # centre, where plain Python must give what kernels do.
+    root1 = np.sqrt(q1)
+    slope = 1.0 / (np.sqrt(q0) + root1)
     return surface.side * slope, -0.5 * surface.side * slope * slope / root1
 
 
