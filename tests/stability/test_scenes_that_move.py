@@ -81,7 +81,77 @@ def require_kept(result, scene):
     assert np.isfinite(result.particles.velocity).all()
 
 
-@pytest.mark.parametrize("seed", range(int(__import__("os").environ.get("A","0")),int(__import__("os").environ.get("B","40"))))
+# Scenes that went round and round without time passing, in which a velocity became no number, or of each kind one.
+SOON = [0, 3, 4, 10, 12, 18, 25, 29, 51]
+
+
+@pytest.mark.parametrize("seed", SOON)
 def test_contact_ends(seed):
     scene, particles = scene_of(seed)
     require_kept(run(scene, particles), scene)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [seed for seed in range(240) if seed not in SOON])
+def test_contact_ends_in_many_scenes(seed):
+    scene, particles = scene_of(seed)
+    require_kept(run(scene, particles), scene)
+
+
+def test_a_particle_as_fast_as_a_wall_far_away_does_not_meet_it():
+    """Friction at the ceiling gives it the velocity of the box, with which the side walls move too."""
+    box = swarm.Box((1.0, 0.8, 0.7), friction=0.3, motion=swarm.Oscillation((0.0, 0.05, 0.0), 2.0))
+    start = swarm.Particles((-0.03, 0.02, 0.2), (0.06, -0.72, 1.87))
+    result = run(swarm.Scene([box]), start, 1.0)
+    # From z = 0.2 to the ceiling, and to and fro between it and the floor
+    assert result.observables["impacts"][-1] == 1 + int((1.87 - 0.5) / 1.4)
+    assert result.particles.velocity[0, 0] == 0.0
+
+
+def test_what_lies_at_a_wall_that_moves_along_itself_stays_there(bounded):
+    """Nothing presses it to the wall, and nothing takes it away: the wall is met once."""
+    box = swarm.Box((1.0, 1.0, 1.0), restitution=0.0, motion=swarm.Oscillation((0.0, 0.05, 0.0), 2.0))
+    result = run(swarm.Scene([box]), swarm.Particles((0.0, 0.0, 0.9), (0.1, 0.0, 0.5)), 5.0)
+    assert result.particles.position[:, 0] == pytest.approx((0.5, 0.0, 1.0), abs=1e-13)
+    assert result.observables["impacts"][-1] == 1
+    assert len(bounded) < 10
+
+
+# --- What is counted -------------------------------------------------------------------------------------
+
+SHAKEN = {
+    "up and down": ((0.0, 0.0, -0.01), 5.0, 0.5, PULLS[1]),
+    "askew": ((0.0, -0.015, -0.023), 0.5, 0.5, PULLS[1]),
+    "to and fro": ((-0.06, 0.076, 0.005), 5.0, 0.5, None),
+    "elastic": ((0.02, 0.1, -0.09), 0.5, 1.0, PULLS[1]),
+    "dead": ((0.0, 0.0, 0.05), 2.0, 0.0, PULLS[1]),
+}
+
+
+@pytest.mark.parametrize("name", SHAKEN)
+def test_impacts_do_not_depend_on_where_frames_end(name):
+    amplitude, frequency, restitution, pull = SHAKEN[name]
+    motion = swarm.Oscillation(amplitude, frequency)
+    walls = [
+        swarm.Box((0.3, 0.3, 0.5), restitution=restitution, motion=motion),
+        swarm.Sphere(0.1, side="outside", restitution=restitution),
+    ]
+    scene = swarm.Scene(walls, pull)
+    particles = swarm.fill(scene, 2, speed=1.0, seed=4)
+    require_same_counts(scene, particles)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9])
+def test_impacts_on_walls_at_rest_do_not_either(restitution):
+    tilted = swarm.Plane((0.3, -0.2, -1.0), 0.0, restitution=restitution)
+    start = swarm.Particles(np.full((3, 4), 0.3), 0.4 * np.random.default_rng(1).standard_normal((3, 4)))
+    counts = require_same_counts(swarm.Scene([tilted], PULLS[1]), start)
+    assert restitution > 0.0 or counts[-1] == 4
+
+
+def require_same_counts(scene, particles, ends=np.linspace(0.05, 1.0, 20)):
+    """The counts at the ends of frames, which are those of runs that end there."""
+    counts = run(scene, particles, ends[-1], every=0.05).observables["impacts"][1:]
+    assert [int(run(scene, particles, end).observables["impacts"][-1]) for end in ends] == counts.tolist()
+    assert (np.diff(counts) >= 0).all()
+    return counts
