@@ -35,7 +35,9 @@ def bounded(monkeypatch):
 def motion(random, can_turn):
     """An oscillation, a translation or a rotation, along and about axes or not."""
     some = random.normal(size=3) * random.integers(0, 2, 3)
-    oscillation = swarm.Oscillation(tuple(0.04 * some), float(random.choice([0.5, 2.0, 5.0])), random.choice([0.0, 1.0]))
+    oscillation = swarm.Oscillation(
+        tuple(0.04 * some), float(random.choice([0.5, 2.0, 5.0])), random.choice([0.0, 1.0])
+    )
     axis = [(0, 0, 1), (0, 1, 0), (1, 1, 0.5)][random.integers(3)]
     rotation = swarm.Rotation(axis, float(random.choice([-2.0, 0.05, 8.0])), (0.0, 0.0, 0.0))
     kind = random.integers(4)
@@ -47,7 +49,8 @@ def motion(random, can_turn):
 def scene_of(seed):
     """A cavity of one of four kinds, in which a ball may be, and three particles."""
     random = np.random.default_rng(seed)
-    laws = {"friction": float(random.choice([0.0, 0.3, 0.8])), "restitution": float(random.choice([1.0, 0.9, 0.5, 0.0]))}
+    friction, restitution = random.choice([0.0, 0.3, 0.8]), random.choice([1.0, 0.9, 0.5, 0.0])
+    laws = {"friction": float(friction), "restitution": float(restitution)}
     kind, widths = seed % 4, tuple(random.choice([0.3, 0.5, 0.8], 3).tolist())
     moves = motion(random, kind != 2)
     if kind == 0:
