@@ -143,7 +143,8 @@ def enter(rules, chain, gravity, wall, p):
     slip = relative(u, along)
     e, speed = wall_laws.restitution_of(rules.laws, wall), norm(slip)
     spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
-    faster = along + (spared / speed) * slip if speed > spared else along
+    # `away` may be below 0 by round-off, and what friction has stopped has no direction.
+    faster = along + (spared / speed) * slip if speed > abs(spared) else along
     twice += square(faster) - square(v) if wall_laws.moves(rules.laws) else square(faster) - square(along) - away * away
     return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
