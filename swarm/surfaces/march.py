@@ -31,7 +31,7 @@ def _(surface, r, v, pull):
 
 @contract.bend.implies(contract.safe_time)
 def _(surface, r, v, pull):
-    level, _half, step, _way = _safe_step(surface, r, v, pull)
+    level, _half, step, _way, _steepness = _safe_step(surface, r, v, pull, 0.0)
     return select(level > 0.0, 0.0, step)
 
 
@@ -42,15 +42,21 @@ def march(surface, r, v, pull):
     t, before = 0.0, 0.0
     for i in range(_MARCH if straight else _FALLING_MARCH):
         p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-        level, half, step, way = _safe_step(surface, p, w, pull)
+        level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
         if level > 0.0 and half > 0.0 and i > 0:
             # Past the wall by round-off, or because the surface bends more than its file says.
             return bisected(surface, r, v, pull, before, t), True
+        room = 2.0 * _EPSILON * total(absolute(p))
+        slack = room * steepness
+        if lets_go(level, half, step, slack):
+            _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
+            before, t = t, t + step
+            continue
         if not step < math.inf or (straight and contract.passed(surface, p, w)):
             return math.inf, True
         before, t = t, t + step
         # At t = 0 the sign of the approach decides, which rise_time has seen to.
-        if (i > 0 or step == 0.0) and way <= 2.0 * _EPSILON * total(absolute(p)):
+        if (i > 0 or step == 0.0) and way <= room:
             return t, True
     return t, False
 
@@ -69,11 +75,27 @@ def bisected(surface, r, v, pull, low, high):
     return low
 
 
+@inlined
+def lets_go(level, half, step, slack):
+    """Whether a flight leaves a wall so slowly that its safe step is a matter of round-off; `slack` is that of a level.
+
+    A particle that slides lets go where the wall bends neither to it nor away, and flies on along it. A bound of the
+    bend is above 0 there: the step ends where the particle may be back, after 1e-16 of what the bend takes, and the
+    next one too, without end; the time does not change, or the places that these steps are rounded to drift through the
+    wall. By its last digits a place is not told from one on the wall: the step may end as deep outside as that.
+    """
+    return (half < 0.0) & (level >= -slack) & (-half * step <= slack)
+
+
 @outlined
-def _safe_step(surface, r, v, pull):
-    """(level, half its derivative, a time during which the flight stays admissible, how far it goes at most)."""
+def _safe_step(surface, r, v, pull, slack):
+    """(level, half its derivative, a time during which the flight stays admissible, how far it goes at most, |grad q|).
+
+    With a slack the level counts as so much below 0.
+    """
     n = contract.slope(surface, r)
     side, level = surface.side, contract.level_of(surface, contract.inner(surface, r))
+    level = select(slack > 0.0, min(level, -slack), level)
     half = 0.5 * side * dot(n, v)
     most, magnitude, reach = contract.bend(surface, r)
     speed2 = square(v)
@@ -95,7 +117,7 @@ def _safe_step(surface, r, v, pull):
     clear = contract.clearance(surface, r)
     if clear > 0.0:
         step = max(step, _time_to_travel(speed, g, clear))
-    return level, half, step, _travelled(speed, g, step)
+    return level, half, step, _travelled(speed, g, step), norm(n)
 
 
 @inlined

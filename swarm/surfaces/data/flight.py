@@ -14,7 +14,7 @@ from ...kernel.jit import index, inlined, outlined, select
 from ...kernel.vector import ZERO, Symmetric, Vec, dot, lowest, norm, square, times, total
 from .. import contract
 from ..course import rise_time
-from ..march import bisected
+from ..march import bisected, lets_go
 from . import spline as splines
 from .cells import SPREAD
 from .numbers import SampledNumbers, coordinates
@@ -185,10 +185,9 @@ def march(surface, r, v, pull):
                 return t, True
             return bisected(surface, r, v, pull, before, t), True
         step, out, bent = _safe_step(surface, cell, Near(level, half, n), p, w, pull)
-        if half <= 0.0 and half * half <= bent.most * room * norm(n):
-            # See `slack` in march.py.
-            near = Near(min(level, -room * norm(n)), half, n)
-            step, _out, _bent_there = _safe_step(surface, cell, near, p, w, pull)
+        slack = room * norm(n)
+        if lets_go(level, half, step, slack):
+            step, _out, _bent_there = _safe_step(surface, cell, Near(-slack, half, n), p, w, pull)
             before, t = t, t + step
             continue
         before, t = t, t + step
