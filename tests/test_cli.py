@@ -335,7 +335,9 @@ def test_what_compiles_is_said(folder):
             cwd=folder, capture_output=True, text=True, timeout=600, env=environment,
         )  # fmt: skip
         assert done.returncode == 0
-        assert ("compiling kernels for this scene, once: advance_block" in done.stderr) == expected
+        assert (
+            "compiling the kernel of flights and impacts (1 of 2) for this kind of scene, once" in done.stderr
+        ) == expected
 
 
 def test_another_word_for_when_to_compile_is_refused(folder):

@@ -586,7 +586,7 @@ def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypa
         first = _jit.kernel(one_more)
         assert first(1.0) == first(1.0) == 2.0
         numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
-    sentence = "compiling kernels for this scene, once: one_more"
+    sentence = "compiling a kernel, once: one_more"
     assert told == caplog.messages == [sentence]
     first(1)  # no observer
     with cache.kernels_compiled(told.append):

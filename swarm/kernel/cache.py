@@ -22,7 +22,7 @@ from .once import held, is_held
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
 _LOCK = ".lock"
-_COMPILING = "compiling kernels for this scene, once: {}"
+_COMPILING = "compiling a kernel, once: {}"
 _kernels: list[Any] = []
 _compiling = threading.local()
 
@@ -201,15 +201,16 @@ def is_being_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
 
 
 @contextlib.contextmanager
-def kernels_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """Report every kernel that is compiled in this context to the logger and to `tell`, in a sentence."""
+def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None) -> Iterator[None]:
+    """Report every kernel that is compiled in this context to the logger and to `tell`, in its `sentence`."""
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, compiled: Any) -> None:
-            if compiled.data["dispatcher"] in _kernels:
-                sentence = _COMPILING.format(compiled.data["dispatcher"].__name__)
-                _LOG.info(sentence)
-                tell(sentence)
+            kernel = compiled.data["dispatcher"]
+            if kernel in _kernels:
+                said = _COMPILING.format(kernel.__name__) if sentence is None else sentence(kernel)
+                _LOG.info(said)
+                tell(said)
 
         def on_end(self, compiled: Any) -> None:
             pass

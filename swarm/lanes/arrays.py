@@ -26,6 +26,9 @@ _LINE, EIGHT = 64, 8
 # 1e9 passes, and is given up if it got nowhere.
 LOOK, _MOVED = 1024, 1e-6
 R, V, LEFT, OWN, HITS, ROWS = 0, 3, 6, 7, 10, 11
+# After them there is room for 6 rows of `seek`, and for what a lane was when all were looked at: particle, time left
+# and impacts. As an array of its own that made the impacts in an ellipsoid twice as dear.
+LOOKED = ROWS + 6
 
 with_distances = spaced(STRIDE)
 
@@ -33,7 +36,7 @@ with_distances = spaced(STRIDE)
 class Lanes(NamedTuple):
     """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
 
-    rows: Array  # (ROWS + 6, stride) position, velocity, time left, constants, impacts; room for 6 rows of `seek`
+    rows: Array  # (LOOKED + 3, stride) position, velocity, time left, constants, impacts; what follows is no part of it
     impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
     wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
@@ -47,7 +50,6 @@ class Lanes(NamedTuple):
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
     some: Array  # int64, those `eights` of which one is marked
     order: Array  # int64, the lanes that are marked
-    before_look: Array  # (3, stride) particle, time left and impacts when all lanes were looked at last
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
     period: Any = None  # the cell where it repeats
     before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
@@ -98,7 +100,7 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
     """Lanes for one block, with so many rows of what walls give."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
-        rows=table(ROWS + 6),
+        rows=table(LOOKED + 3),
         impulse=table(rows),
         wall=table(1)[0],
         kappa=table(1)[0],
@@ -112,7 +114,6 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
-        before_look=table(3),
         left_behind=table(ROWS + rows),
         period=period,
     )

@@ -26,6 +26,7 @@ from .arrays import (
     LANES,
     LEFT,
     LOOK,
+    LOOKED,
     OWN,
     R,
     V,
@@ -79,7 +80,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if following == stop:
             break
         load(method, chain, lanes, index(live), share, following)
-        lanes.before_look[0, live] = -1.0
+        lanes.rows[LOOKED, live] = -1.0
         following += 1
         live += 1
     while live > 0:
@@ -136,19 +137,19 @@ def _look(method, chain, state, lanes, live):
 
     The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
     """
-    rows, before = lanes.rows, lanes.before_look
+    rows = lanes.rows
     for i in range(live):
         status, p, left = Status.DONE.value, float(lanes.particle[i]), rows[LEFT, i]
-        still = goes_on_by(method, column(rows, V, i), left) >= before[1, i] - left
+        still = goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left
         if methods.holds(method) and rows[HITS, i] > _most_hits(chain):
             status = Status.STALLED.value
-        elif before[0, i] == p and still and before[2, i] == rows[HITS, i]:
+        elif rows[LOOKED, i] == p and still and rows[LOOKED + 2, i] == rows[HITS, i]:
             status = Status.TIMELESS.value
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], column(rows, R, i))
             _keep_left(state.contacts, lanes, i)
             return status, i
-        before[0, i], before[1, i], before[2, i] = p, left, rows[HITS, i]
+        rows[LOOKED, i], rows[LOOKED + 1, i], rows[LOOKED + 2, i] = p, left, rows[HITS, i]
     return Status.DONE.value, 0
 
 

@@ -103,7 +103,7 @@ class BodyRun:
         self._bodies.energy[:] = self._start
         self._seen: dict[str, Any] = {}
         self._sums = np.zeros((0, 0))
-        self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
+        self._tier.choose(self.calls())
         if not self._tier.is_plain and lanes == 1:
             self._rule = self._rule._replace(lanes=most)
 
@@ -118,6 +118,10 @@ class BodyRun:
         """Make every kernel call of this frame return after so many passes; 0: at once."""
         np.minimum(self._halt, passes, out=self._halt)
 
+    def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
+        """The kernel of a frame, with arguments of the types that it is called with."""
+        return [(advance_bodies, self._arguments(np.zeros(1, np.int64)))]
+
     def _arguments(self, ticket: NDArray[np.int64]) -> tuple[Any, ...]:
         both = self._ties, self._touching
         return both, self._chains, self._rule, self._bodies, ticket, self._size, self._halt
@@ -129,7 +133,7 @@ class BodyRun:
         self._rule = self._rule._replace(end=moment)
         if self._tier.is_plain and self._tier.left < math.inf:
             self._tier.left = 0.0
-            self._tier.choose([(advance_bodies, self._arguments(np.zeros(1, np.int64)))])
+            self._tier.choose(self.calls())
         ticket = np.zeros(1, np.int64)
         kernel = self._tier.kernel(advance_bodies)
         threads = 1 if self._tier.is_plain else self._threads

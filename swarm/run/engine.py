@@ -299,7 +299,7 @@ class Run:
         """Arguments of `observe`."""
         return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
 
-    def _calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         """Every kernel of a frame, with arguments of the types that it is called with from now on."""
         draws, mine = self._drawing(), self._empty_lanes()
         share = self._shared(0.0, draws)
@@ -311,7 +311,7 @@ class Run:
             yield observables.count_escaped, self._escaping
 
     def _choose_tier(self) -> None:
-        if self._tier.choose(self._calls()):
+        if self._tier.choose(self.calls()):
             self._pace = math.inf
 
     def _keep(self, left_behind: list[lanes.Halted]) -> None:

@@ -13,6 +13,7 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
+from .compiling import Compilations
 from .impacts import Impacts, log_of
 from .options import Task
 from .outputs import recorder_of, writer_of
@@ -57,12 +58,18 @@ def carry_out(task: Task, session: Session) -> End:
         for one in runs:
             one.halt()
 
-    shown = display(task.options.progress)
-    with session, interrupt.taken_by(stop), shown as show, kernels_compiled(show.compiling):
+    shown, compilations = display(task.options.progress), Compilations()
+    with (
+        session,
+        interrupt.taken_by(stop),
+        shown as show,
+        kernels_compiled(show.compiling, compilations.sentence),
+    ):
         session.prepare(task, log)
         _require_room(task, session)
         run = run_of(task, Watched(log, tally))
         runs.append(run)
+        compilations.calls = run.calls
         session.restore(run)
         writer = writer_of(task, session, recorder, log)
         history = _frames(task, session, run, writer, show, log)

@@ -78,7 +78,7 @@ class ReactingRun:
         self._cut_short = False
         self._start = math.nan
         self._tier = Tier(compile, (self._scenery, self._gravity), n)
-        self._tier.choose(self._calls(0.0))
+        self._tier.choose(self.calls())
 
     def __enter__(self) -> "ReactingRun":
         return self
@@ -97,7 +97,7 @@ class ReactingRun:
         rule = Rule(span, self._halt)
         if self._tier.is_plain:
             if self._tier.left <= 0.0:
-                self._tier.choose(self._calls(span))
+                self._tier.choose(self.calls())
             latest = min(latest, time.monotonic() + self._tier.left)
         began = time.perf_counter()
         if not self._cut_short:
@@ -177,15 +177,15 @@ class ReactingRun:
             "of which some react"
         )
 
-    def _calls(self, span: float) -> Any:
+    def calls(self) -> Any:
         """Every kernel of a frame, with arguments of the types that it is called with."""
-        rule, part = Rule(span, self._halt), (0, 0)
+        rule, part = Rule(0.0, self._halt), (0, 0)
         moving = self._freedoms, self._queue, self._clock, rule
         yield events.lease, (self._scenery, self._freedoms, self._clock)
         yield events.predict, (self._scenery, *moving, *part)
         yield events.take, (self._scenery, *moving)
         yield events.arrive, (self._scenery, self._queue, rule, *part)
-        yield events.settle, (self._scenery, self._freedoms, span)
+        yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing(chain_now(self._scene, self._scenery, self._freedoms))
 
     # --- What is observed --------------------------------------------------------------------------------

@@ -12,8 +12,12 @@ import psutil
 import pytest
 
 import swarm
+from swarm.run import machine
+from swarm.run.admission import task_of
 from swarm.run.cluster import client as of_client
-from swarm.run.cluster import connection, local, shards
+from swarm.run.cluster import connection, local, shards, worker
+from swarm.run.options import RunOptions
+from swarm.run.progress import lines
 
 N = 600
 SCENE = """
@@ -263,3 +267,22 @@ def test_storage_that_is_not_shared_is_named(client, tmp_path, monkeypatch):
         connection.require_shared(Elsewhere(), tmp_path)
     connection.require_shared(client, tmp_path)
     assert not list(tmp_path.glob(".swarm-storage.*"))
+
+
+def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
+    swarm.simulate(
+        *cavity(), until=4.0, every=0.5, compile="never", trajectory=tmp_path / "run.h5", cluster=client,
+        progress=lines(0.0),
+    )  # fmt: skip
+    told = capsys.readouterr().err.splitlines()
+    assert told
+    assert all("%  " in line and "/4 s" in line for line in told)
+
+
+def test_what_a_worker_compiles_is_told(tmp_path, monkeypatch):
+    told, path = [], tmp_path / "run.h5"
+    monkeypatch.setattr(shards, "task_of", lambda folder, k: (task_of(*cavity(), RunOptions(1.0, trajectory=path)), 1))
+    monkeypatch.setattr(machine, "carry_out", lambda task, session: task.options.progress.compiling("compiling it"))
+    monkeypatch.setattr(shards, "write_end", lambda path, end: None)
+    assert worker.advance(tmp_path, 0, compiling=told.append) == ("complete", "")
+    assert told == ["compiling it"]

@@ -105,6 +105,7 @@ class _Run:
         self._task, self._session, self._client, self._stopped, self._show = task, session, client, stopped, show
         self._token = secrets.token_hex(8)
         self._shares: dict[int, float] = {}
+        self._said: list[str] = []  # of what shards compile
         self._seen, self._read, self._reading = 0, time.monotonic(), 0.0
         threads = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
         self.folder, self.bounds = session.begin(task, task.options.shards or threads)
@@ -119,7 +120,10 @@ class _Run:
     async def _hear(self, event: tuple[float, dict[str, Any]]) -> None:
         """Take a report of a shard, in the thread of the client."""
         _when, said = event
-        self._shares[said["shard"]] = said["share"]
+        if "compiling" in said:
+            self._said.append(said["compiling"])
+        else:
+            self._shares[said["shard"]] = said["share"]
 
     def wait(self) -> None:
         """Wait for all shards, and join what they have stored, also where they were stopped or one failed."""
@@ -173,6 +177,8 @@ class _Run:
     def _look(self) -> None:
         """Show how far the shards are on average, and now and then the frames that all of them have."""
         until, now = self._task.options.times.until, time.monotonic()
+        while self._said:
+            self._show.compiling(f"{self._said.pop(0)}, on a worker")
         if len(self._shares) == self._count and now - self._read >= max(_FOLLOWS, self._reading / _READING):
             self._follow()
             self._read = time.monotonic()

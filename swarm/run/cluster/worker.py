@@ -27,6 +27,8 @@ _stopped: set[str] = set()
 
 # Time that a shard has reached [s], and the time of the end.
 Report = Callable[[float, float], None]
+# What a shard compiles.
+Tell = Callable[[str], None]
 
 
 def run(folder: str, k: int, token: str) -> tuple[str, str]:
@@ -38,10 +40,19 @@ def run(folder: str, k: int, token: str) -> tuple[str, str]:
     def report(moment: float, until: float) -> None:
         worker.log_event(token, {"shard": k, "share": moment / until})
 
-    return advance(Path(folder), k, token, report)
+    def compiling(sentence: str) -> None:
+        worker.log_event(token, {"compiling": sentence})
+
+    return advance(Path(folder), k, token, report, compiling)
 
 
-def advance(folder: Path, k: int, token: str = "", report: Report = lambda moment, until: None) -> tuple[str, str]:
+def advance(
+    folder: Path,
+    k: int,
+    token: str = "",
+    report: Report = lambda moment, until: None,
+    compiling: Tell = lambda said: None,
+) -> tuple[str, str]:
     """`run`, also without Dask."""
     if shards.end_of(folder, k).exists():
         return "complete", ""
@@ -51,7 +62,7 @@ def advance(folder: Path, k: int, token: str = "", report: Report = lambda momen
     target = task.options.trajectory
     resumes = paths.checkpoint_of(target).exists()
     options = dataclasses.replace(
-        task.options, progress=_reporting(report, count), resume=resumes, overwrite=not resumes, threads=1
+        task.options, progress=_reporting(report, count, compiling), resume=resumes, overwrite=not resumes, threads=1
     )
     session = Session(options)
     _sessions.setdefault(token, set()).add(session)
@@ -68,7 +79,7 @@ def advance(folder: Path, k: int, token: str = "", report: Report = lambda momen
     return "complete", ""
 
 
-def _reporting(report: Report, shards_at_once: int) -> Display:
+def _reporting(report: Report, shards_at_once: int, compiling: Tell) -> Display:
     """A display that reports now and then."""
     every = max(_REPORTS, shards_at_once / _MOST_REPORTS)
     last = -every
@@ -80,7 +91,7 @@ def _reporting(report: Report, shards_at_once: int) -> Display:
             last = now
             report(moment, until)
 
-    return Display(lambda frame: within(frame.time, frame.until), within, _REPORTS)
+    return Display(lambda frame: within(frame.time, frame.until), within, _REPORTS, compiling)
 
 
 def _wait_for(target: Path) -> None:

@@ -1,0 +1,54 @@
+"""What is said while kernels compile, in words for who does not know their names."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from swarm.kernel import cache
+from swarm.run.compiling import Compilations
+
+
+def named(name):
+    return SimpleNamespace(__name__=name)
+
+
+def test_it_says_what_and_how_far(monkeypatch):
+    """What slides on the way needs more kernels than the run knew of."""
+    done = set()
+    monkeypatch.setattr(cache, "is_compiled", lambda kernel, arguments: kernel.__name__ in done)
+    compilations, needed = Compilations(), ["advance_block", "observe"]
+    compilations.calls = lambda: [(named(name), ()) for name in needed]
+    said = []
+    for name in ("advance_block", "observe", "slide_block", "careful_block", "mine"):
+        if name == "slide_block":
+            needed += ["slide_block", "careful_block"]
+        said.append(compilations.sentence(named(name)))
+        done.add(name)
+    assert [sentence.removesuffix(" for this kind of scene, once") for sentence in said] == [
+        "compiling the kernel of flights and impacts (1 of 2)",
+        "compiling the kernel of energies and momenta (2 of 2)",
+        "compiling the kernel of sliding (3 of 4)",
+        "compiling the kernel of corners (4 of 4)",
+        "compiling the kernel mine (5 of 5)",
+    ]
+
+
+@pytest.mark.parametrize("run", ["particles", "bodies", "reacting"])
+def test_every_kernel_of_a_run_has_words(run):
+    import swarm
+    from swarm.run import compiling
+    from swarm.run.admission import task_of
+    from swarm.run.options import RunOptions
+    from swarm.run.runs import run_of
+
+    walls = [swarm.Plane((0.0, 0.0, -1.0), 0.0), swarm.Sphere(0.5)]
+    walls[0] = walls[0] if run != "reacting" else swarm.Plane((0.0, 0.0, -1.0), 0.0, mass=1.0)
+    scene = swarm.Scene(walls, None if run == "reacting" else (0.0, 0.0, -9.81))
+    start, method = swarm.Particles((0.0, 0.0, 0.1), (1.0, 0.0, 0.0)), swarm.Impact()
+    if run == "bodies":
+        start, method = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Impact(dt=1e-2)
+    with run_of(task_of(scene, start, method, RunOptions(until=1.0, compile="never"))) as made:
+        if run == "particles":
+            made._kinds = {1, 2, 4, 5}
+        names = {kernel.__name__ for kernel, _arguments in made.calls()}
+    assert names <= compiling._WORDS.keys()
