@@ -13,7 +13,10 @@ from conftest import METHODS, SURFACES, every_surface
 import swarm
 from swarm.kernel import cache
 from swarm.run import tiers
+from swarm.run.admission import task_of
+from swarm.run.bodies import BodyRun
 from swarm.run.engine import Run
+from swarm.run.options import RunOptions
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: there is one tier")
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
@@ -88,6 +91,22 @@ def test_the_tier_at_the_start(monkeypatch, compile, found, plain):
     monkeypatch.setattr(cache, "is_compiled", lambda *call: found)
     run = Run(SPHERE, swarm.fill(SPHERE, 20, speed=1.0), swarm.Impact(), 2, None, compile)
     assert run._tier.is_plain == plain
+
+
+@compiled_only
+def test_bodies_that_are_compiled_later_have_as_many_lanes(monkeypatch):
+    """One was left of the start in plain Python: four times the time of a whole run."""
+    bodies = swarm.place(SPHERE, swarm.dumbbell(0.2, 1.0), 40, speed=1.0, seed=1)
+    made, task = [], task_of(SPHERE, bodies, swarm.Impact(dt=0.01), RunOptions(until=1.0))
+    for found in (True, False):
+        monkeypatch.setattr(cache, "is_compiled", lambda *call, found=found: found)
+        made.append(BodyRun(SPHERE, bodies, task.particles, task.method, 1, None, "auto"))
+    compiled, later = made
+    assert (compiled._tier.is_plain, later._tier.is_plain) == (False, True)
+    assert compiled._rule.lanes > later._rule.lanes == 1
+    later._tier.left = 0.0
+    later._choose_tier()
+    assert later._rule.lanes == compiled._rule.lanes
 
 
 @compiled_only

@@ -78,14 +78,13 @@ class BodyRun:
         soft = walls_of(method)
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
-        most = max(1, min(_MOST_LANES, _STACK // per_lane, n))
-        lanes = 1 if self._tier.is_plain else most
+        self._lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
         room = _ROUND_OFF * max(size, scene.extent())
         noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
         gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
         strict = getattr(method, "on_unconverged", "") == "raise"
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
-        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
+        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, self._lanes, soft, contacts, looped, strict)
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
         self._size = max(1, block_size or _AT_ONCE)
@@ -103,9 +102,7 @@ class BodyRun:
         self._bodies.energy[:] = self._start
         self._seen: dict[str, Any] = {}
         self._sums = np.zeros((0, 0))
-        self._tier.choose(self.calls())
-        if not self._tier.is_plain and lanes == 1:
-            self._rule = self._rule._replace(lanes=most)
+        self._choose_tier()
 
     def __enter__(self) -> "BodyRun":
         return self
@@ -126,6 +123,11 @@ class BodyRun:
         both = self._ties, self._touching
         return both, self._chains, self._rule, self._bodies, ticket, self._size, self._halt
 
+    def _choose_tier(self) -> None:
+        self._tier.choose(self.calls())
+        # More gain in a compiled kernel alone.
+        self._rule = self._rule._replace(lanes=1 if self._tier.is_plain else self._lanes)
+
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance every body by `span` [s] and observe it: whether the frame is done, as `engine.Run.advance`."""
         if not self._cut_short:
@@ -133,7 +135,7 @@ class BodyRun:
         self._rule = self._rule._replace(end=moment)
         if self._tier.is_plain and self._tier.left < math.inf:
             self._tier.left = 0.0
-            self._tier.choose(self.calls())
+            self._choose_tier()
         ticket = np.zeros(1, np.int64)
         kernel = self._tier.kernel(advance_bodies)
         threads = 1 if self._tier.is_plain else self._threads

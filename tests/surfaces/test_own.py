@@ -366,15 +366,12 @@ def test_a_constant_that_changes_is_another_surface():
 first_hit_of = numba.njit(error_model="numpy")(lambda surface, r, v: contract.first_hit(surface, r, v))
 
 
-def test_the_class_of_another_process_is_found_by_its_name():
-    name = "Own_0123456789abcdef"
-    kind = getattr(code, name)
-    assert kind is getattr(code, name)
-    assert (kind.__module__, kind.__qualname__) == ("swarm.surfaces.formulas.code", name)
-    assert issubclass(kind, numbers.OwnNumbers)
-    for wrong in ("Own_0123", "Own_0123456789abcdeg", "Own", "Own_0123456789abcdef0"):
-        with pytest.raises(AttributeError):
-            getattr(code, wrong)
+def test_the_class_is_named_by_the_code():
+    """Kernels of another process are found by this name: `kernel/entries.py`."""
+    one, other = (type(ellipsoid(side=side).numbers()) for side in ("inside", "outside"))
+    assert one is other is code._classes[one.__name__]
+    assert (one.__module__, one.__qualname__) == ("swarm.surfaces.formulas.code", one.__name__)
+    assert issubclass(one, numbers.OwnNumbers)
 
 
 # --- The cache, with real processes ----------------------------------------------------------------------

@@ -5,8 +5,6 @@ covers all it refers to: after an edit anywhere, or when a global changes, the c
 """
 
 import collections
-import re
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -23,20 +21,7 @@ from .numbers import OwnNumbers
 
 Function = Callable[..., Any]
 
-_NAME = re.compile(r"Own_[0-9a-f]{16}\Z")
-_registered: set[str] = set()
-
-
-def __getattr__(name: str) -> Any:
-    """The class of a code by its name.
-
-    The index of the kernel cache names the classes of all processes that share it, and loading it asks for them here.
-    """
-    if not _NAME.match(name):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    made = type(name, (OwnNumbers,), {"__module__": __name__, "__qualname__": name, "__slots__": ()})
-    # Two threads that ask at the same time get the same class.
-    return globals().setdefault(name, made)
+_classes: dict[str, Any] = {}
 
 
 def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Function | None = None) -> Any:
@@ -58,11 +43,12 @@ def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Functi
             _check_function(name, function)
             copies.append(frozen.function(function))
     name = f"Own_{frozen.digest()}"
-    kind = getattr(sys.modules[__name__], name)
-    if name not in _registered:
-        _register(kind, names, *copies)
-        _registered.add(name)
-    return kind
+    if name not in _classes:
+        made = type(name, (OwnNumbers,), {"__module__": __name__, "__qualname__": name, "__slots__": ()})
+        _register(made, names, *copies)
+        # Two threads that ask at the same time get the same class.
+        _classes.setdefault(name, made)
+    return _classes[name]
 
 
 def _check_function(name: str, function: Any) -> None:
