@@ -31,7 +31,7 @@ def solve(body, chain, rule, lanes, paces):
     more = guides
     is_rigid = guides == 0 and tied.links == tied.ends.shape[0]
     for i in range(count):
-        brief = is_rigid & (pace.held[i] == 0) & (pace.h[i] < _BRIEF * rule.dt)
+        brief = is_rigid & (pace.held[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
         pace.done[i] = pace.done[i] | brief
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
