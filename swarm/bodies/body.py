@@ -44,7 +44,8 @@ class Body:
         faces: (F, 3) triangles of contact points, for pictures.
 
     Raises:
-        SceneError: an argument is out of its range; a link is redundant; led points leave the reach of their links.
+        SceneError: an argument is out of its range; a link is redundant; led points leave the reach of their links; the
+            matrices of the body, which are full, are too large: some 3000 points of a chain, or 700 elastic ones, fit.
 
     >>> Body([(0, 0, 0), (0, 0, -1), (1, 0, -1)], mass=2.0, links=[(0, 1), (1, 2)], anchors={0: None})
     Body(3 points, 2 links, 1 anchors, 2 contacts)

@@ -45,7 +45,7 @@ def chain(n: int, length: float, mass: float) -> Body:
     """Equal mass points in a line along x, each linked to the next.
 
     Args:
-        n: number of points, 2 or more.
+        n: number of points, from 2 to some 3000: the matrices of a body are full.
         length: of the whole chain, above 0 [m]; each of its n - 1 links is length/(n - 1) long.
         mass: of the whole chain, above 0 [kg]; each point has mass/n.
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -15,11 +14,13 @@ from ..errors import RunError
 from ..kernel.vector import column
 from ..lanes.tied.advance import advance_bodies
 from ..lanes.tied.arrays import BodyState, Rule
+from ..lanes.tied.contacts import MOST_CONTACTS
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Floats, Particles, State
 from ..scene import Scene
 from ..status import Status
+from .stack import threads_with
 from .tiers import Tier
 from .waiting import result_of
 
@@ -27,7 +28,7 @@ from .waiting import result_of
 _ROUND_OFF = 8.0 * np.finfo(np.float64).eps
 # Beyond this part of the scene's size a point outside its walls is an error.
 _OUTSIDE = 1e-9
-# Bytes of the lanes of a thread, which are on its stack, and the most lanes: more gain nothing.
+# Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
 _STACK, _MOST_LANES = 1 << 20, 32
 # Bodies that a thread draws at a time.
 _AT_ONCE = 256
@@ -90,7 +91,7 @@ class BodyRun:
         self._size = max(1, block_size or _AT_ONCE)
         self._halt = np.full(1, _NEVER)
         self._threads = min(threads, math.ceil(n / self._size))
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
+        self._pool = threads_with(self._threads, most * per_lane + _at_once(rows, max(contacts, 3 * MOST_CONTACTS)))
         self._cut_short = False
         pull = math.hypot(*gravity) * self._ties.mass.sum()
         self._led_start, self._start, self._scale = np.zeros((3, n))
@@ -347,3 +348,8 @@ def summed(sums: Floats, owners: list[int], surfaces: int, cavities: int) -> dic
         "work": work,
         **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),
     }
+
+
+def _at_once(rows: int, pressed: int) -> int:
+    """Bytes that a blow, or the solution of contacts, of one body takes: matrices of ties, and of contacts."""
+    return 8 * (rows * rows + pressed * (pressed + 3 * rows))

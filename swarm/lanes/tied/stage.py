@@ -12,6 +12,9 @@ _MOST, _AGAIN = 40, 5
 # After this correction a lane that needs more goes on in the next pass: a step after a blow takes five corrections, and
 # 31 lanes would wait for each. Later corrections are one of 80 in free steps.
 _SOON = 1
+# In a stage this short, as a part of dt, links turn by less than round-off: what a correction would correct is the
+# round-off of places, over h a velocity.
+_BRIEF = 1e-8
 
 
 @inlined
@@ -26,7 +29,10 @@ def solve(body, chain, rule, lanes, paces):
     alone = rule.stages.size == 1 and guides == 0 and not rule.loop
     ties.launch(tied, rule.gravity, lanes, pace)
     more = guides
+    is_rigid = guides == 0 and tied.links == tied.ends.shape[0]
     for i in range(count):
+        brief = is_rigid & (pace.held[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
+        pace.done[i] = pace.done[i] | brief
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
             _turn(body, chain, rule, lanes, paces, i, lanes.ra)
