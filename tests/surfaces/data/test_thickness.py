@@ -160,7 +160,9 @@ THIN = {
 
 @pytest.mark.parametrize("name", FOLDS)
 def test_folds_are_accepted(tmp_path, name):
-    assert swarm.from_mesh(written(tmp_path, FOLDS[name]()), SPACING).mesh_error < SPACING
+    """Where a blade is thinner than samples resolve, the surface does not reach to its edge, and says so."""
+    off = swarm.from_mesh(written(tmp_path, FOLDS[name]()), SPACING).mesh_error
+    assert (off > 2.0 * SPACING) if name == "a sharp blade" else (off < 0.5 * SPACING)
 
 
 @pytest.mark.parametrize("name", THIN)

@@ -125,15 +125,18 @@ def moved(x, radius=0.5, turned=False):
     return ball
 
 
-@pytest.mark.parametrize("turned", [(False, False, False), (True, False, True), (False, True, False)])
+@pytest.mark.parametrize(
+    "turned", [(False, False, False), (True, True, False), (False, True, True), (False, True, False)]
+)
 def test_parts_are_turned_by_where_they_are(tmp_path, turned):
     """A ball in a hole of a ball, and another one beside them."""
     places = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.4), (2.0, 0.5))
     parts = [moved(*place, one) for place, one in zip(places, (*turned, turned[0]), strict=True)]
     mesh = trimesh.util.concatenate(parts)
     surface = swarm.from_mesh(written(tmp_path, mesh.vertices, mesh.faces), 0.09)
-    across = surface.phi([[0.0, 0.55, 0.85, 1.2, 2.0], [0.0] * 5, [0.0] * 5])
-    assert (np.sign(across) == [-1.0, 1.0, -1.0, 1.0, -1.0]).all()
+    # Next to each of the balls, inside and outside
+    across = surface.phi([[0.0, 0.35, 0.45, 0.65, 0.75, 0.95, 1.05, 1.45, 1.55, 2.0], [0.0] * 10, [0.0] * 10])
+    assert (np.sign(across) == [-1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0]).all()
 
 
 # --- What is refused -------------------------------------------------------------------------------------
