@@ -364,6 +364,23 @@ def _(period, gravity, motion, left, hit):
     return Hit(select(leaves, time, hit.time), select(leaves, -1.0, hit.wall))
 
 
+@by_type
+def on_time(period, gravity, v, left, time, room):
+    """When a flight ends that may go on by `room` along each axis after `time`: where it does not repeat, then."""
+    return time
+
+
+@on_time.register(Period)
+def _(period, gravity, v, left, time, room):
+    # As in `cut`: cells of a grid are as many as faces.
+    late = _EPSILON * left
+    exact = left - (left - (time + late))
+    short = 2.0 * _fastest(_along_x(gravity), v.x, time) * late <= room.x
+    short &= 2.0 * _fastest(_along_y(gravity), v.y, time) * late <= room.y
+    short &= 2.0 * _fastest(_along_z(gravity), v.z, time) * late <= room.z
+    return select(short, exact, time)
+
+
 @inlined
 def _least(x, y, z):
     first = select(x < y, x, y)

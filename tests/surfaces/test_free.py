@@ -86,10 +86,14 @@ def test_the_cost_is_that_of_impacts(passes):
     assert unwrapped == pytest.approx([0.1 + 1e7, 0.2 + 3100.0, 0.5], rel=100 * EPSILON)
 
 
+GRID = swarm.Spheres(np.indices((3, 3, 3)).reshape(3, -1).T + 0.5, np.full(27, 0.1))
+
+
 @pytest.mark.parametrize("frames", [1, 7])
-def test_a_time_that_is_rounded_at_each_face_does_not_add_up(frames):
+@pytest.mark.parametrize(("walls", "period"), [([BALL], CELL), ([GRID], (3.0, 3.0, 3.0))], ids=["ball", "field"])
+def test_a_time_that_is_rounded_at_each_face_does_not_add_up(walls, period, frames):
     """Along a diagonal between balls, cell by cell: faces round the position, and not what is left of the frame."""
-    scene = swarm.Scene([BALL], period=CELL)
+    scene = swarm.Scene(walls, period=period)
     for speed in (1.0, 0.7, 3e3):
         r, v, until = (0.1, 0.6, 0.41), (speed, speed, 0.0), 1234.5 / speed
         result = run(scene, r, v, until, every=until / frames)
