@@ -192,7 +192,7 @@ class Scene:
             return None
         pulls = self.gravity or (0.0, 0.0, 0.0)
         falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
-        return cell_in(self.period, self.surfaces, not self._has_fields(), Vec(*falls) if any(falls) else None)
+        return cell_in(self.period, self.surfaces, self._has_fields(), Vec(*falls) if any(falls) else None)
 
     def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""

@@ -146,7 +146,7 @@ def _find_near(members, gravity, lanes, live, seen):
         v = column(lanes.rows, V, i)
         until = until_next(gravity, grid, cell, r, v)
         # Bodies are known twice the margin beyond the cell's wall, and a flight ends one beyond it.
-        until = on_time(lanes.period, gravity, v, lanes.rows[LEFT, i], until, 0.5 * grid.margin)
+        until = on_time(lanes.period, gravity, (r, v), lanes.rows[LEFT, i], until, 0.5 * grid.margin)
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])
