@@ -57,7 +57,8 @@ class Scene:
         period: None, or three lengths (Lx, Ly, Lz) [m] of a cell that repeats without end, None for a direction in
             which it does not: what leaves [0, L) through a face comes back through the other one, and is counted. A
             solid that reaches over a face is there on the other side too; a cavity is within the cell; and any other
-            surface is the same all along the period, as a plane or an endless cylinder along it.
+            surface is the same all along the period, as a plane or an endless cylinder along it, and may move along
+            it. Flights go on over any number of cells where no wall that repeats is in the way.
 
     Raises:
         SceneError: no surface, more than 24 walls with their images, surfaces that leave no volume, or one that does
@@ -196,7 +197,7 @@ class Scene:
             return None
         pulls = self.gravity or (0.0, 0.0, 0.0)
         falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
-        return cell_in(self.period, self.surfaces, not self._has_fields(), Vec(*falls) if any(falls) else None)
+        return cell_in(self.period, self.surfaces, self._has_fields(), Vec(*falls) if any(falls) else None)
 
     def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""

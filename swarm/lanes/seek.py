@@ -15,7 +15,8 @@ from ..surfaces import contract, flights, fold
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, Members, gathered, member, width
-from .arrays import ROWS, STRIDE, R, V
+from ..surfaces.period import on_time
+from .arrays import LEFT, ROWS, STRIDE, R, V
 from .marks import marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.
@@ -142,7 +143,10 @@ def _find_near(members, gravity, lanes, live, seen):
     for i in range(index(live)):
         r = column(lanes.rows, R, i)
         cell = cell_of(grid, r)
-        until = until_next(gravity, grid, cell, r, column(lanes.rows, V, i))
+        v = column(lanes.rows, V, i)
+        until = until_next(gravity, grid, cell, r, v)
+        # Bodies are known twice the margin beyond the cell's wall, and a flight ends one beyond it.
+        until = on_time(lanes.period, gravity, (r, v), lanes.rows[LEFT, i], until, 0.5 * grid.margin)
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])

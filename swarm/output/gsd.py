@@ -2,8 +2,9 @@
 
 Its numbers are float32, and its box is around the origin. Where the scene repeats, that is its cell: positions are less
 the center of the cell, which is log/center. In a direction in which it does not, the box is as wide as the scene, or as
-the particles need, and nothing is shifted: the schema has no box that does not repeat. Frames have the step number, and
-log/time [s], log/particles/id, log/particles/impacts, and log/particles/escape_time where there are openings.
+the particles need, and nothing is shifted but a scene that is far from the origin, whose center is log/center too: the
+schema has no box that does not repeat. Frames have the step number, and log/time [s], log/particles/id,
+log/particles/impacts, and log/particles/escape_time where there are openings. Images are int32.
 """
 
 from collections.abc import Callable
@@ -13,14 +14,18 @@ import gsd.hoomd
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SceneError
 from .exported import Exported, Moment
+from .origin import origin_of
 
 
 def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
     """Write the particles."""
-    low, high = np.array(chosen.trajectory.scene.bounds())
-    center = np.where(chosen.periods > 0.0, 0.5 * (low + high), 0.0)
-    needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low), abs(high)), 0.0)
+    scene = chosen.trajectory.scene
+    low, high = np.array(scene.bounds())
+    far = origin_of(scene, chosen.trajectory.frame(chosen.numbers[0]))
+    center = np.where(chosen.periods > 0.0, 0.5 * (low + high), far)
+    needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low - center), abs(high - center)), 0.0)
     with gsd.hoomd.open(str(path), "w") as file:
         for done, moment in enumerate(chosen.moments()):
             file.append(_frame(chosen, moment, center, needed))
@@ -45,10 +50,21 @@ def _frame(
     of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
     of.mass = chosen.mass.astype(np.float32)
     if "image" in moment.more:
-        of.image = moment.more["image"].astype(np.int32)
+        of.image = _in_32_bits(moment.more["image"], moment.number)
     if len(bonds):
         frame.bonds.N, frame.bonds.types, frame.bonds.group = len(bonds), ["bond"], bonds.astype(np.int32)
         frame.bonds.typeid = np.zeros(len(bonds), np.uint32)
     frame.log = {"time": np.array([moment.time]), "center": center, "particles/id": chosen.ids}
     frame.log |= {f"particles/{name}": column for name, column in moment.more.items() if name != "image"}
     return frame
+
+
+def _in_32_bits(images: NDArray[np.int64], number: int) -> NDArray[np.int32]:
+    """Images as the schema keeps them, which has no others."""
+    most = int(np.abs(images).max(initial=0))
+    if most > np.iinfo(np.int32).max:
+        raise SceneError(
+            f"an export as .gsd must have images within 2**31 - 1, got {most} in frame {number}; choose frames before "
+            "that, or export as .xyz or .vtkhdf, which keep them whole"
+        )
+    return images.astype(np.int32)

@@ -21,7 +21,7 @@ _BODIES = "/scene/bodies/"
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 # Recordings of older versions do not say it.
-_NOUN = "noun"
+_NOUN, _CENTER = "noun", "center"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
 _WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
@@ -38,7 +38,8 @@ class Playback:
         names: path -> name in the legend.
         about: meaning of the colours: quantity, low, high; number of particles or bodies, how many are shown, stride of
             frames; "noun": "particles" or "bodies".
-        wires: of each surface, whether it is a solid and its curves.
+        center: (3,) the origin of the positions in the file [m], which those given here are not less.
+        wires: of each surface, whether it is a solid and its curves, at the start.
 
     Raises:
         SceneError: there is no such file, it is damaged or truncated, or not a recording of swarm.
@@ -68,6 +69,7 @@ class Playback:
         self._walls: list[str] = []  # the entity of each
         self._poses: dict[str, dict[int, tuple[Floats, Floats]]] = {}
         self.about: dict[str, Any] = {_NOUN: "particles"}
+        self.center = np.zeros(3)
         self._triangles = np.zeros((0, 3), np.int64)
         # Of each column, where the row of a frame is.
         self._rows: dict[str, dict[int, tuple[Any, int]]] = {name: {} for name in (_POSITIONS, _STRIPS, _CORNERS)}
@@ -110,6 +112,8 @@ class Playback:
     def _static(self, entity: str, batch: Any, names: list[str]) -> None:
         if "SeriesLines:names" in names:
             self.names[entity] = batch.column("SeriesLines:names")[0].as_py()[0]
+        if entity == "/about" and _CENTER in names:
+            self.center = np.array(batch.column(_CENTER)[0].as_py())
         if entity == "/about":
             self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in (*_ABOUT, _NOUN)}
         if _TRIANGLES in names and entity.startswith(_BODIES):
@@ -125,38 +129,39 @@ class Playback:
         for (solid, curves), entity in zip(self.wires, self._walls, strict=True):
             pose = self._poses.get(entity, {}).get(number)
             moved = curves if pose is None else [curve @ pose[1].T + pose[0] for curve in curves]
-            found.append((solid, moved))
+            found.append((solid, [curve + self.center for curve in moved]))
         return found
 
-    def frame(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    def frame(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
         batch, row = self._rows[_POSITIONS][number]
-        return _points(batch, _POSITIONS, row), _colours(batch, _COLOURS, row)
+        return self._points(batch, _POSITIONS, row), _colours(batch, _COLOURS, row)
 
-    def lines(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    def lines(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
         """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; none where bodies have faces."""
         batch, row = self._rows[_STRIPS].get(number, (None, 0))
         if batch is None or _TINTS not in batch.schema.names:
-            return np.zeros((0, 2, 3), np.float32), np.zeros(0, np.uint32)
+            return np.zeros((0, 2, 3)), np.zeros(0, np.uint32)
         ends = batch.column(_STRIPS)[row].values.flatten().flatten().to_numpy(zero_copy_only=False)
-        return ends.reshape(-1, 2, 3), _colours(batch, _TINTS, row)
+        return ends.reshape(-1, 2, 3) + self.center, _colours(batch, _TINTS, row)
 
-    def faces(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    def faces(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
         """Triangles of bodies (T, 3, 3) and the colours of their corners (T, 3) at a frame."""
         batch, row = self._rows[_CORNERS].get(number, (None, 0))
         if batch is None:
-            return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint32)
-        return _points(batch, _CORNERS, row)[self._triangles], _colours(batch, _PAINT, row)[self._triangles]
+            return np.zeros((0, 3, 3)), np.zeros((0, 3), np.uint32)
+        return self._points(batch, _CORNERS, row)[self._triangles], _colours(batch, _PAINT, row)[self._triangles]
+
+    def _points(self, batch: Any, name: str, row: int) -> Floats:
+        """Positions (n, 3), with the origin of the file."""
+        kept = batch.column(name)[row].values.flatten().to_numpy(zero_copy_only=False).reshape(-1, 3)
+        return np.asarray(kept + self.center)
 
 
 def _numbers(batch: Any, name: str) -> Floats:
     """A column of vectors or matrices, one row a frame."""
     rows = batch.column(name)
     return np.array([np.ravel(row.as_py()[0]) for row in rows])
-
-
-def _points(batch: Any, name: str, row: int) -> NDArray[np.float32]:
-    return np.asarray(batch.column(name)[row].values.flatten().to_numpy(zero_copy_only=False).reshape(-1, 3))
 
 
 def _colours(batch: Any, name: str, row: int) -> NDArray[np.uint32]:

@@ -6,7 +6,9 @@
                               also Transform3D, a frame's, from where it is at the start
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
-/about                        meaning of the colours, as text and as values; static
+/about                        meaning of the colours, as text and as values, and the origin; static
+
+Rerun's positions are float32. Those of a scene that is far from the origin are less its centre, `center` of /about.
 """
 
 import atexit
@@ -30,6 +32,7 @@ from ..particles import Particles
 from ..scene import Scene
 from . import colours, paths, series, viewer
 from .drawn import Drawn
+from .origin import origin_of
 from .shapes import Shape, shapes_of, since_start
 from .writer import WriteFrames, Written, rows
 
@@ -100,7 +103,7 @@ class RecordingWriter:
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body = frames - 1, body
         self._drawn = drawn = Drawn(len(start), body, settings.particles)
-        self._at_start = drawn.points(start.position)
+        self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
         if body is None:
             start = Particles(self._at_start, drawn.points(start.velocity), drawn.points(start.mass[None])[0])
         elif settings.color != "speed":
@@ -169,12 +172,13 @@ class RecordingWriter:
             face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
             if len(shape.vertices):
                 mesh = rr.Mesh3D(
-                    vertex_positions=shape.vertices, triangle_indices=shape.triangles,
+                    vertex_positions=shape.vertices - self._center, triangle_indices=shape.triangles,
                     vertex_normals=shape.normals, albedo_factor=face,
                 )  # fmt: skip
                 log(f"{path}/mesh", mesh, static=True)
             if shape.wires:
-                lines = rr.LineStrips3D(shape.wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
+                wires = [curve - self._center for curve in shape.wires]
+                lines = rr.LineStrips3D(wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
                 log(f"{path}/wires", lines, static=True)
         for colour, line in zip(_cycled(self._series), self._series, strict=True):
             log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
@@ -186,6 +190,9 @@ class RecordingWriter:
             f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
             f"plots {series.NOTHING:g} is the logarithm of 0."
         )
+        if self._center.any():
+            text += f" Positions are less {tuple(self._center.tolist())} m."
+            log("/about", rr.AnyValues(center=self._center), static=True)
         log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         values = rr.AnyValues(
             quantity=scale.quantity, low=scale.low, high=scale.high, particles=drawn.count, shown=shown,
@@ -201,7 +208,7 @@ class RecordingWriter:
         drawn, shown, colour, lines = self._drawn, [], [], []
         for number, moment, state, seen in chosen:
             position, velocity = drawn.points(state.position), drawn.points(state.velocity)
-            shown.append(position)
+            shown.append(position - self._center[:, None])
             colour.append(self._scale.colours(self._values(position, velocity)))
             if len(drawn.lines) and not len(drawn.triangles):
                 middles = drawn.middles(position), drawn.middles(velocity)
@@ -247,6 +254,8 @@ class RecordingWriter:
             if surface.motion is not None or surface.reacts():
                 moves = [since_start(self._scene, i, position[i], turned[i]) for position, turned in walls]
                 turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
+                # From the centre: x1 - c = A (x0 - c) + (b + A c - c)
+                ways = ways + (turns @ self._center - self._center)
                 columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
                 self._send(_path(shape), numbers, times, columns)
 

@@ -9,6 +9,7 @@ from ..methods.base import Method, check_laws, check_surfaces
 from ..methods.fixed_step import check_solids
 from ..motion import Path, parts_of
 from ..motion.given import require_angles
+from ..output.origin import require_near
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
@@ -49,6 +50,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     # The arrays of Particles may have been changed since it checked them.
     particles = _in_the_cell(scene, particles.copy(), options.times.until)
     _require_period(scene, method)
+    _require_precision(scene, particles, options)
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled([one for surface in scene.surfaces for one in (surface, *surface.openings)])
@@ -105,7 +107,9 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         _require_inside(
             scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2)))
         )
-    return Task(scene, bodies.particles(), method, options, bodies)
+    points = bodies.particles()
+    _require_precision(scene, points, options)
+    return Task(scene, points, method, options, bodies)
 
 
 def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
@@ -212,6 +216,12 @@ def _require_period(scene: Scene, method: Method) -> None:
             f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
             f"{scene.period}; use Impact() with contact_step = 0"
         )
+
+
+def _require_precision(scene: Scene, start: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where files that are asked for in float32 would not tell particles apart."""
+    if options.precision == "float32" and (options.trajectory is not None or options.impacts is not None):
+        require_near(scene, start)
 
 
 def _require_instants(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:

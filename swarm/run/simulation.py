@@ -80,7 +80,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         block_size: particles that a thread takes at a time. Results do not depend on it.
         frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
         precision: "float64", or "float32" for frames, and rows of the log of impacts, of half the size; observables,
-            checkpoints and the times of impacts stay exact.
+            checkpoints and the times of impacts stay exact. Far from the origin "float32" is refused.
         compression: of the frames, "none", "gzip" or "lzf".
         checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none. It is the
             file TRAJECTORY.checkpoint, until the run is complete.

@@ -364,6 +364,52 @@ def _(period, gravity, motion, left, hit):
     return Hit(select(leaves, time, hit.time), select(leaves, -1.0, hit.wall))
 
 
+@by_type
+def on_time(period, gravity, motion, left, time, room):
+    """When a flight (r, v) among bodies ends that is free until `time`, and may go on by `room` along each axis.
+
+    Where nothing repeats that is then.
+    """
+    return time
+
+
+@on_time.register(Period)
+def _(period, gravity, motion, left, time, room):
+    _r, v = motion
+    # As in `cut`: cells of a grid are as many as faces.
+    late = _EPSILON * left
+    exact = left - (left - (time + late))
+    short = 2.0 * _fastest(_along_x(gravity), v.x, time) * late <= room.x
+    short &= 2.0 * _fastest(_along_y(gravity), v.y, time) * late <= room.y
+    short &= 2.0 * _fastest(_along_z(gravity), v.z, time) * late <= room.z
+    return _longer(period.gaps, period, gravity, motion, (select(short, exact, time), 2.0 * late))
+
+
+@by_type
+def _longer(gaps, period, gravity, motion, ends):
+    """The first of `ends`, or when the gap ends in which it flies, less the second."""
+    time, _late = ends
+    return time
+
+
+@_longer.register(Gaps)
+def _(gaps, period, gravity, motion, ends):
+    time, late = ends
+    longest = _time_in_gaps(gaps, period, gravity, motion) - late
+    return select(longest > time, longest, time)
+
+
+@inlined
+def _time_in_gaps(gaps, period, gravity, motion):
+    """How long a flight stays in a gap."""
+    r, v = motion
+    x = _time_in(gaps.x, period.x, r.x, v.x, _along_x(gravity))
+    y = _time_in(gaps.y, period.y, r.y, v.y, _along_y(gravity))
+    z = _time_in(gaps.z, period.z, r.z, v.z, _along_z(gravity))
+    longest = select(x > y, x, y)
+    return select(longest > z, longest, z)
+
+
 @inlined
 def _least(x, y, z):
     first = select(x < y, x, y)
@@ -382,12 +428,8 @@ def _over_faces(gaps, period, gravity, motion, ends):
 
 @_over_faces.register(Gaps)
 def _(gaps, period, gravity, motion, ends):
-    (r, v), (leaves, hit, late) = motion, ends
-    x = _time_in(gaps.x, period.x, r.x, v.x, _along_x(gravity))
-    y = _time_in(gaps.y, period.y, r.y, v.y, _along_y(gravity))
-    z = _time_in(gaps.z, period.z, r.z, v.z, _along_z(gravity))
-    longest = select(x > y, x, y)
-    longest = select(longest > z, longest, z) - late
+    leaves, hit, late = ends
+    longest = _time_in_gaps(gaps, period, gravity, motion) - late
     longest = select(_is_line(gravity, period, motion, hit.time), math.inf, longest)
     far = _far(gravity, period, motion, leaves)
     longest = select(longest < far, longest, far)

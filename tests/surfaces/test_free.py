@@ -5,14 +5,16 @@ import pytest
 
 import swarm
 from swarm.lanes import block
-from swarm.surfaces import free
-from swarm.surfaces.period import Beside, Free, Gap
+from swarm.surfaces.period import Beside, Free, Gap, Period
 
 EPSILON = float(np.finfo(np.float64).eps)
 CELL = (1.0, 1.0, 1.0)
 BALL = swarm.Sphere(0.1, (0.5, 0.5, 0.5), "outside")
+CORNER = swarm.Sphere(0.1, (0.0, 0.0, 0.0), "outside")
 ROD = swarm.Cylinder(0.1, (1.0, 0.0, 0.0), center=(0.0, 0.5, 0.5), side="outside")
+GRID = swarm.Spheres(np.indices((3, 3, 3)).reshape(3, -1).T + 0.5, np.full(27, 0.1))
 CHANNEL = [swarm.Plane((0.0, 0.0, -1.0), 0.0), swarm.Plane((0.0, 0.0, 1.0), 1.0)]
+HALL = [CHANNEL[0], swarm.Plane((0.0, 0.0, 1.0), 3.0)]
 BELT = swarm.Plane((0, 0, -1), 0.0, friction=0.5, motion=swarm.Translation((0.3, 0.0, 0.0)))
 
 
@@ -58,6 +60,9 @@ OVER = {
     "over a ball on a floor": ([BALL, *CHANNEL], None, (1.0, 1.0, None), (0.1, 0.45, 0.1), (1e3, 37.0, 0.0), 1e5),
     "under a ball": ([BALL, *CHANNEL], None, (1.0, None, None), (0.1, 7.0, 0.1), (-1e3, 0.0, 0.0), 1e5),
     "past a ball": ([BALL], None, (1.0, None, None), (0.1, 0.61, 0.61), (-1e3, 1e-3, 0.0), 1e5),
+    "over balls of a field": ([GRID], None, (3.0, 3.0, 3.0), (0.1, 0.45, 0.1), (1e3, 37.0, 0.0), 1e5),
+    "over a field on a floor": ([GRID, *HALL], None, (3.0, 3.0, None), (0.1, 0.45, 0.1), (1e3, 37.0, 0.0), 1e5),
+    "over a ball in a corner": ([CORNER], None, CELL, (0.1, 0.5, 0.5), (-1e3, 37.0, 0.0), 1e5),
     "a fall": ([BALL], (9.81, 0.0, 0.0), CELL, (0.1, 0.2, 0.1), (0.0, 0.0, 0.0), 1e4),
     "a fall in a shaft": ([swarm.Cylinder(0.4)], (0, 0, -9.81), (None, None, 0.5), (0.1, 0.2, 0.1), (0, 0, 3.0), 1e4),
 }
@@ -87,9 +92,10 @@ def test_the_cost_is_that_of_impacts(passes):
 
 
 @pytest.mark.parametrize("frames", [1, 7])
-def test_a_time_that_is_rounded_at_each_face_does_not_add_up(frames):
+@pytest.mark.parametrize(("walls", "period"), [([BALL], CELL), ([GRID], (3.0, 3.0, 3.0))], ids=["ball", "field"])
+def test_a_time_that_is_rounded_at_each_face_does_not_add_up(walls, period, frames):
     """Along a diagonal between balls, cell by cell: faces round the position, and not what is left of the frame."""
-    scene = swarm.Scene([BALL], period=CELL)
+    scene = swarm.Scene(walls, period=period)
     for speed in (1.0, 0.7, 3e3):
         r, v, until = (0.1, 0.6, 0.41), (speed, speed, 0.0), 1234.5 / speed
         result = run(scene, r, v, until, every=until / frames)
@@ -99,6 +105,10 @@ def test_a_time_that_is_rounded_at_each_face_does_not_add_up(frames):
 
 RANDOM = {
     "ball": ([BALL], None, CELL),
+    "balls of a field": ([swarm.Spheres([(0.5, 0.1, 0.2), (0.2, 0.9, 0.3)], [0.2, 0.1])], None, CELL),
+    "balls of a field that fall": ([swarm.Spheres([(0.5, 0.1, 0.2)], [0.2])], (0.1, 0.0, -0.2), CELL),
+    "ball in a corner": ([CORNER], None, CELL),
+    "field in a channel": ([swarm.Spheres([(0.5, 0.1, 0.2)], [0.15]), *CHANNEL], None, (1.0, 1.0, None)),
     "ball in a face": ([swarm.Sphere(0.2, (0.9, 0.1, 0.5), "outside")], None, CELL),
     "two balls": ([BALL, swarm.Sphere(0.15, (0.1, 0.9, 0.2), "outside")], None, (1.0, 1.3, 0.8)),
     "rod and ball": ([ROD, swarm.Sphere(0.15, (0.5, 0.0, 0.0), "outside")], None, CELL),
@@ -124,10 +134,7 @@ def test_flights_over_faces_are_those_from_face_to_face(case, monkeypatch):
     start.velocity[1, 10:30] = 0.0
     start.velocity[2, 25:35] = 0.0
     found = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
-    cell_in = free.cell_in
-    monkeypatch.setattr(
-        "swarm.scene.cell_in", lambda period, surfaces, known, fall: cell_in(period, surfaces, False, fall)
-    )
+    monkeypatch.setattr("swarm.scene.cell_in", lambda period, surfaces, fields, fall: Period(*period, fall))
     other = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
     assert (found.impacts_per_particle == other.impacts_per_particle).all()
     few = found.impacts_per_particle <= 4
@@ -148,10 +155,11 @@ def test_where_nothing_is_in_the_way():
     assert cell([BALL, *CHANNEL], (1.0, 1.0, None)).gaps.walls is not None
     assert cell([BALL]).gaps.walls is None
     assert cell([BALL], (1.0, None, None)).gaps.z == pytest.approx(Beside(0.3998, 0.6002))
-    # Where balls are all around, where walls with images move, in fields, and with openings nothing is known.
+    assert cell([GRID], (3.0, 3.0, 3.0)).gaps.x == pytest.approx(Gap(2.603, 3.397))
+    # Where balls are all around, where walls with images move, and with openings nothing is known.
     wide = swarm.Sphere(0.497, (0.5, 0.5, 0.5), "outside")
     assert cell([wide]).gaps[:3] == (None, None, None)
-    assert cell([swarm.Spheres([(0.5, 0.5, 0.5)], [0.1])]).gaps is None
+    assert cell([swarm.Spheres([(0.5, 0.5, 0.5)], [0.497])]).gaps is None
     across = swarm.Oscillation((0.0, 0.0, 0.1), 1.0)
     moved = swarm.Sphere(0.1, (0.5, 0.5, 0.5), "outside", motion=across)
     assert cell([moved], (1.0, 1.0, None)).gaps is None

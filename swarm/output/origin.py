@@ -1,0 +1,35 @@
+"""The origin of files whose numbers are float32: with seven digits, particles far from 0 would be at one place."""
+
+import numpy as np
+
+from ..errors import SceneError
+from ..particles import Floats, Particles
+from ..scene import Scene
+
+# Of the width of a scene, how far from 0 it may be: float32 rounds positions to 4e-6 of the width there.
+_FAR = 64.0
+
+
+def origin_of(scene: Scene, start: Particles) -> Floats:
+    """The centre (3,) of a scene [m], or 0 where it is no farther from there than a few dozen times its width.
+
+    In a direction in which it is open, its centre is that of the particles at the start.
+    """
+    low, high = (np.array(corner) for corner in scene.bounds())
+    first, last = start.position.min(axis=1), start.position.max(axis=1)
+    bounded = np.isfinite(low) & np.isfinite(high)
+    low, high = np.where(bounded, low, first), np.where(bounded, high, last)
+    width = float((high - low).max()) or scene.finite_size()
+    center = 0.5 * (low + high)
+    return center if np.abs(center).max() > _FAR * width else np.zeros(3)
+
+
+def require_near(scene: Scene, start: Particles) -> None:
+    """Raise a `SceneError` where positions in float32 would be too coarse: a trajectory has no origin of its own."""
+    center = origin_of(scene, start)
+    if center.any():
+        off = float(np.spacing(np.float32(np.abs(center).max())))
+        raise SceneError(
+            f'precision must be "float64" where the scene is far from the origin, got "float32", in which positions '
+            f"around {tuple(center.tolist())} are rounded to {off:.2g} m; leave it out, or move the scene to the origin"
+        )
