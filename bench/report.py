@@ -1,4 +1,4 @@
-"""Measuring in turn, the machine's name, and the tables on the screen and in bench/results."""
+"""Measuring in turn, the machine's name, and the tables on the screen and in the folder of `-o`."""
 
 import csv
 import os
@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-RESULTS = Path(__file__).with_name("results")
+# Where tables and pictures are written unless `-o` says otherwise: Git ignores it.
+OUT = Path("out") / "bench"
+_folder = OUT
 
 
 @dataclass
@@ -84,14 +86,25 @@ def show(rows: list[Row]) -> None:
         print(f"{row.what:<{width}}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
 
 
+def write_to(folder: Path) -> None:
+    """Make the folder that this process writes its tables and pictures to."""
+    global _folder
+    folder.mkdir(parents=True, exist_ok=True)
+    _folder = folder
+
+
+def file_of(name: str) -> Path:
+    """A file in that folder."""
+    return _folder / name
+
+
 def write(rows: list[Row], report: str) -> None:
     """The report as CSV, one file a kind of machine."""
-    path = RESULTS / f"{report}-{name_of_machine()}.csv"
-    path.parent.mkdir(exist_ok=True)
+    path = file_of(f"{report}-{name_of_machine()}.csv")
     with open(path, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["what", "min", "median", "unit", "bar", "ratio"])
         for row in rows:
             ratio = "" if row.ratio is None else f"{row.ratio:.3g}"
             table.writerow([row.what, f"{row.best:.4g}", f"{row.median:.4g}", row.unit, row.bar, ratio])
-    print(f"written to {path.relative_to(ROOT)}")
+    print(f"written to {path}")
