@@ -1,8 +1,8 @@
 """Billiards in 50 digits: where rigid walls, and the springs of a soft sphere, really send a particle.
 
 `python -m bench.reference -o bench/references/billiards.npz` makes that file, some minutes on one core: for each scene
-the start of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid walls go event by event; a sphere,
-rigid or with linear springs, has a closed form.
+the start of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid walls go event by event; a
+sphere, rigid or with linear springs, has a closed form.
 """
 
 import argparse

@@ -5,6 +5,7 @@ import os
 import platform
 import resource
 import statistics
+import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,15 @@ def name_of_machine() -> str:
     return "-".join("".join(c if c.isalnum() else " " for c in machine().lower()).split())
 
 
+def commit() -> str:
+    """The commit that is measured, and whether files differ from it."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=7"]
+    try:
+        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 def stolen() -> tuple[int, int]:
     """What other guests of the machine took from this one since it started, and all of its time but that it idled."""
     try:
@@ -75,9 +85,8 @@ def told_of_others(before: tuple[int, int]) -> str:
 
 def show(rows: list[Row]) -> None:
     """The report on the screen."""
-    print(
-        f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
-    )
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{machine()}; commit {commit()}; peak memory of this process {memory:.0f} MB")
     width = max((len(row.what) for row in rows), default=0) + 2
     print(f"{'':<{width}}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
     for row in rows:
