@@ -1,6 +1,7 @@
 """No output replaces a file that is not its own: inputs, other outputs, devices, links, the user's own files."""
 
 import os
+import signal
 from pathlib import Path
 
 import h5py
@@ -86,13 +87,13 @@ def test_who_runs_again_is_told_how_to_go_on(tmp_path):
 
     def stop(frame):
         if frame.number == 1:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGTERM)
 
     run(path, compile="never")
     with pytest.raises(swarm.SceneError, match=r"run\.h5 exists; .*overwrite it \(--overwrite, overwrite=True\)$"):
         run(path, compile="never")
     with pytest.raises(KeyboardInterrupt):
-        run(path, compile="never", overwrite=True, checkpoint=1e-9, progress=stop)
+        run(path, compile="never", overwrite=True, checkpoint=60.0, progress=stop)
     assert paths.checkpoint_of(path).exists()
     with pytest.raises(swarm.SceneError, match=r"run\.h5 exists; .*, or go on with it, .*\(--resume, resume=True\)$"):
         run(path, compile="never")
