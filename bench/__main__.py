@@ -48,6 +48,10 @@ def main() -> None:
         command.add_argument(
             "--quick", action="store_true", help="a few seconds, to see that it runs; nothing is written"
         )
+        command.add_argument(
+            "-o", metavar="FOLDER", type=Path, default=report.OUT,
+            help="of the table and the pictures [default: %(default)s]; bench/results has those of the READMEs",
+        )  # fmt: skip
     comparison = commands.add_parser("compare", help="what got slower from one report to another")
     comparison.add_argument("old", type=Path, help="a CSV of bench/results")
     comparison.add_argument("new", type=Path)
@@ -69,6 +73,8 @@ def main() -> None:
         "cluster": cluster,
         "endurance": endurance,
     }
+    if not arguments.quick:
+        report.write_to(arguments.o)
     before = report.stolen()
     reports[arguments.command].main(quick=arguments.quick)
     print(report.told_of_others(before))

@@ -19,7 +19,7 @@ from swarm.methods.base import Method
 
 from . import figure, reference
 from .contenders import Contender, Ours, Plain
-from .report import RESULTS, ROOT, machine, name_of_machine
+from .report import file_of, machine, name_of_machine
 
 # dt sqrt(alpha/m) of what conserves at any stiffness.
 _STIFF = 3.0
@@ -222,7 +222,7 @@ def races(name: str, found: list[Point]) -> list[str]:
 
 def write(name: str, found: list[Point]) -> None:
     """The points of one scene as CSV."""
-    path = RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.csv"
+    path = file_of(f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.csv")
     with open(path, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         errors = [f"median_error_{count}_impacts" for count in reference.IMPACTS]
@@ -230,7 +230,7 @@ def write(name: str, found: list[Point]) -> None:
         for p in found:
             numbers = [p.seconds, *p.errors, p.energy, p.penetration]
             table.writerow([p.method, p.setting, *(f"{one:.4g}" for one in numbers)])
-    print(f"written to {path.relative_to(ROOT)}")
+    print(f"written to {path}")
 
 
 def main(quick: bool) -> None:

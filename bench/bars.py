@@ -427,7 +427,7 @@ def accuracy(many: float) -> list[Row]:
 
 
 def main(quick: bool) -> None:
-    """Measure, print and, unless quick, write bench/results/bars-MACHINE.csv."""
+    """Measure, print and, unless quick, write bars-MACHINE.csv."""
     repeats = 2 if quick else 7
     n = 5_000 if quick else 100_000
     rows = impacts(n, repeats)

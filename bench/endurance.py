@@ -94,7 +94,7 @@ def reading(n: int, frames: int, folder: Path, repeats: int) -> list[Row]:
 
 
 def main(quick: bool) -> None:
-    """Measure, print and, unless quick, write bench/results/endurance-MACHINE.csv."""
+    """Measure, print and, unless quick, write endurance-MACHINE.csv."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         rows = checkpoints(1_000 if quick else 100_000, 3 if quick else 21, folder)

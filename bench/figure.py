@@ -1,11 +1,11 @@
-"""The pictures of bench/results."""
+"""The pictures of the reports."""
 
 import statistics
 import textwrap
 from pathlib import Path
 from typing import Any
 
-from .report import RESULTS, ROOT, machine, name_of_machine
+from .report import file_of, machine, name_of_machine
 
 # Okabe and Ito: told apart by every kind of eye.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
@@ -32,7 +32,7 @@ def save(picture: Any, path: Path) -> None:
 
     picture.savefig(path, dpi=100)
     pyplot.close(picture)
-    print(f"written to {path.relative_to(ROOT)}")
+    print(f"written to {path}")
 
 
 def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
@@ -53,7 +53,7 @@ def throughput(found: Found, limits: Limits, fixed_step: list[str]) -> None:
         axes.grid(alpha=0.3, which="major")
         axes.legend(fontsize=8, loc="lower right")
     picture.suptitle(f"{machine()}: one thread (full), two (dashed), one and a trajectory (dotted)", fontsize=10)
-    save(picture, RESULTS / f"throughput-{name_of_machine()}.png")
+    save(picture, file_of(f"throughput-{name_of_machine()}.png"))
 
 
 def _speeds(axes: Any, found: Found, lines: list[tuple[str, str, str]]) -> None:
@@ -137,4 +137,4 @@ def accuracy(name: str, found: list[Any], front: list[Any], advice: str) -> None
     picture.legend(loc="outside lower center", ncols=5, fontsize=9)
     heading = f"{name}: wall time per particle and simulated second, one thread, {machine()}"
     picture.suptitle("\n".join([heading, *textwrap.wrap(advice + ".", 150)]), fontsize=10)
-    save(picture, RESULTS / f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png")
+    save(picture, file_of(f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}.png"))

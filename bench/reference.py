@@ -1,8 +1,8 @@
 """Billiards in 50 digits: where rigid walls, and the springs of a soft sphere, really send a particle.
 
-`python -m bench.reference` writes bench/references/billiards.npz, some minutes on one core: for each scene the start
-of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid walls go event by event; a sphere,
-rigid or with linear springs, has a closed form.
+`python -m bench.reference -o bench/references/billiards.npz` makes that file, some minutes on one core: for each scene
+the start of 256 particles and where they are after about 5, 20 and 64 impacts each. Rigid walls go event by event; a
+sphere, rigid or with linear springs, has a closed form.
 """
 
 import argparse
@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import swarm
+
+from .report import OUT
 
 PATH = Path(__file__).with_name("references") / "billiards.npz"
 DIGITS = 50
@@ -226,7 +228,7 @@ def soft(particles: swarm.Particles, times: list[float]) -> dict[str, NDArray]:
     return {f"{SOFT}/{key}": values for key, values in {**known, "end": np.array(ends)}.items()}
 
 
-def main() -> None:
+def main(path: Path) -> None:
     """Write the file."""
     values = {}
     for name, scene in SCENES.items():
@@ -239,11 +241,12 @@ def main() -> None:
         print(f"{name}: {times} s, {np.mean([impacts for _end, impacts in ends]):.1f} impacts each")
         if name == "sphere":
             values |= soft(particles, times)
-    PATH.parent.mkdir(exist_ok=True)
-    np.savez_compressed(PATH, **values)
-    print(f"written to {PATH}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, **values)
+    print(f"written to {path}")
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
-    main()
+    ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    ask.add_argument("-o", metavar="FILE", type=Path, default=OUT / PATH.name, help="default: %(default)s")
+    main(ask.parse_args().o)

@@ -1,16 +1,19 @@
-"""Measuring in turn, the machine's name, and the tables on the screen and in bench/results."""
+"""Measuring in turn, the machine's name, and the tables on the screen and in the folder of `-o`."""
 
 import csv
 import os
 import platform
 import resource
 import statistics
+import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-RESULTS = Path(__file__).with_name("results")
+# Where tables and pictures are written unless `-o` says otherwise: Git ignores it.
+OUT = Path("out") / "bench"
+_folder = OUT
 
 
 @dataclass
@@ -55,6 +58,15 @@ def name_of_machine() -> str:
     return "-".join("".join(c if c.isalnum() else " " for c in machine().lower()).split())
 
 
+def commit() -> str:
+    """The commit that is measured, and whether files differ from it."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=7"]
+    try:
+        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 def stolen() -> tuple[int, int]:
     """What other guests of the machine took from this one since it started, and all of its time but that it idled."""
     try:
@@ -73,9 +85,8 @@ def told_of_others(before: tuple[int, int]) -> str:
 
 def show(rows: list[Row]) -> None:
     """The report on the screen."""
-    print(
-        f"{machine()}; peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
-    )
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{machine()}; commit {commit()}; peak memory of this process {memory:.0f} MB")
     width = max((len(row.what) for row in rows), default=0) + 2
     print(f"{'':<{width}}{'min':>10}{'median':>10}  {'unit':<18}{'bar':>8}{'ratio':>8}")
     for row in rows:
@@ -84,14 +95,25 @@ def show(rows: list[Row]) -> None:
         print(f"{row.what:<{width}}{best:>10}{median:>10}  {row.unit:<18}{row.bar:>8}{ratio:>8}")
 
 
+def write_to(folder: Path) -> None:
+    """Make the folder that this process writes its tables and pictures to."""
+    global _folder
+    folder.mkdir(parents=True, exist_ok=True)
+    _folder = folder
+
+
+def file_of(name: str) -> Path:
+    """A file in that folder."""
+    return _folder / name
+
+
 def write(rows: list[Row], report: str) -> None:
     """The report as CSV, one file a kind of machine."""
-    path = RESULTS / f"{report}-{name_of_machine()}.csv"
-    path.parent.mkdir(exist_ok=True)
+    path = file_of(f"{report}-{name_of_machine()}.csv")
     with open(path, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["what", "min", "median", "unit", "bar", "ratio"])
         for row in rows:
             ratio = "" if row.ratio is None else f"{row.ratio:.3g}"
             table.writerow([row.what, f"{row.best:.4g}", f"{row.median:.4g}", row.unit, row.bar, ratio])
-    print(f"written to {path.relative_to(ROOT)}")
+    print(f"written to {path}")

@@ -5,13 +5,12 @@
 The block is made of tetrahedra of Saint Venant and Kirchhoff; each node that reaches the plane strikes it.
 """
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 
 import swarm
 from swarm.bodies.elastic import block
+
+from .asked import Asked
 
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
 SIZES, CELLS, HEIGHT = (0.2, 0.1, 0.1), (2, 1, 1), 0.1
@@ -31,9 +30,8 @@ def main() -> None:
     """Run, draw and print."""
     from .paper.plotting import BLUE, GREEN, GREY, RED, page
 
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "bouncing_block.png", "plot")
     ask.add_argument("--until", type=float, default=2.0)
-    ask.add_argument("-o", "--output", type=Path, default=Path("bouncing_block.png"))
     asked = ask.parse_args()
     seen = run(asked.until).observables
     print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}")

@@ -6,13 +6,14 @@ A particle that hits a wall keeps the part e of its normal velocity, so that 1/v
 crossing: 1/v is linear in time, and the energy falls as 1/t^2, as by Haff's law (J. Fluid Mech. 134, 1983).
 """
 
-import argparse
 import math
 from pathlib import Path
 
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 SWEEP = Path(__file__).parent / "sweeps" / "cooling.toml"
 WIDTH, SPEED = 0.2, 1.0
@@ -60,13 +61,12 @@ def draw(found: dict[float, tuple[np.ndarray, np.ndarray]], file: Path) -> None:
 
 def main() -> None:
     """Sweep, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "cooling.png", "plot", "table")
     ask.add_argument(
-        "--folder", type=Path, default=Path("cooling"), help="of the sweep, which is resumed if it is there"
+        "--folder", type=Path, help="of the sweep, which is resumed if it is there [default: the picture's name]"
     )
-    ask.add_argument("-o", "--output", type=Path, default=Path("cooling.png"))
     asked = ask.parse_args()
-    found = curves(asked.folder)
+    found = curves(asked.folder or asked.output.with_suffix(""))
     for restitution, (times, energies) in found.items():
         mean, error = energies[:, -1].mean(), energies[:, -1].std(ddof=1) / math.sqrt(len(energies))
         expected = law(restitution, times[-1:])[0]

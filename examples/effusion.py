@@ -7,7 +7,6 @@ the density f(v) of the start f(v) exp(-v A t/4V) is left: the fast ones leave f
 have a temperature the gas keeps it, and exp(-<v> A t/4V) of the particles are left.
 """
 
-import argparse
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 HALF, BALL, HOLE = 0.5, 0.3, 0.025
 # k_B T [J] of particles of mass 1 kg
@@ -107,9 +108,8 @@ def draw(cold: Gas, hot: Gas, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "effusion.png", "plot")
     ask.add_argument("--particles", type=int, default=20_000)
-    ask.add_argument("-o", "--output", type=Path, default=Path("effusion.png"))
     asked = ask.parse_args()
     cold, hot = (run(asked.particles, hot) for hot in (False, True))
     for name, gas in (("elastic walls", cold), ("walls at a temperature", hot)):

@@ -6,13 +6,14 @@ Fermi asked whether such a particle is accelerated without end. Ulam computed th
 curves of their phase space, which the slow ones cannot cross. The picture has a dot for each particle and period.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 # Amplitude of the wall [m], its distance [m], and its frequency, so that it moves as sin(t).
 AMPLITUDE, LENGTH, FREQUENCY = 0.02, 1.0, 0.5 / np.pi
@@ -74,9 +75,8 @@ def draw(places: np.ndarray, velocities: np.ndarray, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "fermi.png", "plot")
     ask.add_argument("--periods", type=int, default=2000)
-    ask.add_argument("-o", "--output", type=Path, default=Path("fermi.png"))
     asked = ask.parse_args()
     speeds = np.linspace(0.05, 2.0, 157)
     places, velocities = run(speeds, asked.periods)

@@ -8,7 +8,6 @@ with some 5 cm/s. Slower, it goes back to the middle; faster, it flies over the 
 kg), the value that makes the variance right, so is the rest. `examples/scenes/galton_board.toml` is this board.
 """
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
@@ -17,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 # Distance of pegs and of rows, radius of a peg with a grain, depth of the bins, half the thickness of a divider [m].
 ROWS, SPACING, RADIUS, DEPTH, DIVIDER = 12, 0.02, 0.006, 0.08, 0.0008
@@ -122,9 +123,8 @@ def draw(found: Filled, smooth: Filled, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "galton_board.png", "plot")
     ask.add_argument("--grains", type=int, default=20_000)
-    ask.add_argument("-o", "--output", type=Path, default=Path("galton_board.png"))
     asked = ask.parse_args()
     print("k_B T of the pegs  mean (6)  variance (3)  chi squared (12 +- 5)  still moving  impacts a grain  bins")
     found = {}

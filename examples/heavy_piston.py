@@ -7,7 +7,6 @@ that fades. Then its thermal motion carries energy from the hot gas to the cold 
 in a time that is proportional to its mass.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 HALF, LENGTH, THICK, RADIUS = 0.5, 1.0, 0.02, 0.2
 # k_B T [J] of the gas below and of that above, of particles of 1 kg
@@ -96,11 +97,10 @@ def draw(found: Shared, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "heavy_piston.png", "plot")
     ask.add_argument("--particles", type=int, default=2_000)
     ask.add_argument("--mass", type=float, default=50.0)
     ask.add_argument("--until", type=float, default=800.0)
-    ask.add_argument("-o", "--output", type=Path, default=Path("heavy_piston.png"))
     asked = ask.parse_args()
     found = run(asked.particles, asked.mass, asked.until)
     difference, error = late_difference(found)

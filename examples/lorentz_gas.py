@@ -8,7 +8,6 @@ without memory, with the diffusion coefficient of Machta and Zwanzig (Phys. Rev.
 memory, as Klages and Dellago show (J. Stat. Phys. 101 (2000) 145): most of it is how often a hop goes back.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 # Narrower than the gap at which a straight line through the lattice is free for ever: w < 4/sqrt(3) - 2 = 0.309.
 GAPS = (0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25, 0.275, 0.3)
@@ -143,9 +144,8 @@ def draw_path(axes: Any, path: np.ndarray, colour: str, circle: Any) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "lorentz_gas.png", "plot")
     ask.add_argument("--particles", type=int, default=2_000)
-    ask.add_argument("-o", "--output", type=Path, default=Path("lorentz_gas.png"))
     asked = ask.parse_args()
     found, memory = {}, {}
     print("       diffusion coefficient    over that of hops               free path           off the exact one")

@@ -12,7 +12,6 @@ balls as from mirrors, off rough ones in any direction, as from a wall with a te
 * With many balls pores close, and nothing diffuses below a porosity of 0.0317 (Priour, arXiv:1208.0328).
 """
 
-import argparse
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 POROSITIES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1)
 CLOSED, ROUGH_LIMIT = 0.0317, 9.0 / 13.0
@@ -104,9 +105,8 @@ def draw(found: dict[bool, dict[float, Bed]], file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "packed_bed.png", "plot")
     ask.add_argument("--balls", type=int, default=4_000)
-    ask.add_argument("-o", "--output", type=Path, default=Path("packed_bed.png"))
     asked = ask.parse_args()
     found: dict[bool, dict[float, Bed]] = {False: {}, True: {}}
     print("balls   porosity  found    error    free path n pi a^2  error    D over v l/3  error    impacts  time [s]")

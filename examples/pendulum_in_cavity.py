@@ -5,13 +5,14 @@
 Two bobs on rigid rods hang from a fixed point below the top of a spherical cavity; the second reaches beyond its wall.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 RADIUS, RODS, MASSES, GRAVITY = 0.5, (0.4, 0.4), (1.0, 1.0), 9.81
 TOP = (0.0, 0.0, 0.35)
@@ -40,9 +41,8 @@ def main() -> None:
     """Run, draw and print."""
     from .paper.plotting import BLUE, GREY, RED, page
 
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "pendulum_in_cavity.png", "plot")
     ask.add_argument("--until", type=float, default=20.0)
-    ask.add_argument("-o", "--output", type=Path, default=Path("pendulum_in_cavity.png"))
     asked = ask.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         seen = run(asked.until, file=Path(folder) / "pendulum.h5").observables

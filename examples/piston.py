@@ -6,7 +6,6 @@ The gas has no collisions. Balls in the vessel scatter its particles, so that th
 T V^(2/3) is constant; without them only the motion along the piston is compressed, and T_z L^2 is constant.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 HALF, LENGTH, RADIUS = 0.5, 1.0, 0.18
 # kinetic temperature k_B T [J] of particles of mass 1 kg, and the part of the length that is left at the end
@@ -86,10 +87,9 @@ def draw(found: Compressed, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "piston.png", "plot")
     ask.add_argument("--particles", type=int, default=4_000)
     ask.add_argument("--speed", type=float, default=0.001)
-    ask.add_argument("-o", "--output", type=Path, default=Path("piston.png"))
     asked = ask.parse_args()
     found = run(asked.particles, asked.speed)
     off, error = found.temperature * found.volume ** (2.0 / 3.0) - 1.0, found.error / found.temperature

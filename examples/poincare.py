@@ -8,7 +8,6 @@ of that away from it. In these coordinates the map from impact to impact keeps a
 python -m examples.poincare
 """
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
@@ -17,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import swarm
+
+from .asked import Asked
 
 Floats = NDArray[np.float64]
 # Of all of them: v^2 + 2 g z, with g = 1.
@@ -58,14 +59,13 @@ def draw(path: Path) -> None:
 
 def main() -> None:
     """Draw them, and say how well the regular one is kept."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    ask.add_argument("-o", "--output", type=Path, default=Path("poincare.png"))
+    ask = Asked(__doc__, "poincare.png", "plot")
     given = ask.parse_args()
     draw(given.output)
     orbit, _along, away = section(45.0, 60, 250.0)
     spread = max(np.ptp(away[orbit == k]) for k in range(60))
     print(f"{len(orbit)} impacts at 45 degrees, where the velocity away from the wall is kept to {spread:.1e} m/s")
-    print(f"written to {given.output}")
+    print(f"written {given.output}")
 
 
 if __name__ == "__main__":

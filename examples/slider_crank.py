@@ -7,7 +7,6 @@ the clearance. The slider stays on its line; the pin is free in the cavity until
 Dimensions and masses are those of Flores and Ambrosio (2004), Revolute joints with clearance in multibody systems.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 CRANK, ROD, CLEARANCE = 0.05, 0.12, 0.5e-3
 ROD_MASS, SLIDER_MASS = 0.21, 0.14
@@ -99,10 +100,9 @@ def draw(motion: Motion, file: Path) -> None:
 
 def main() -> None:
     """Run, draw and print."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    ask = Asked(__doc__, "slider_crank.png", "plot")
     ask.add_argument("--revolutions", type=int, default=300)
     ask.add_argument("--restitution", type=float, default=0.9)
-    ask.add_argument("-o", "--output", type=Path, default=Path("slider_crank.png"))
     asked = ask.parse_args()
     result, motion = run(asked.revolutions, asked.restitution)
     seen = result.observables

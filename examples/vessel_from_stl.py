@@ -7,7 +7,6 @@ are warm, so the gas becomes isothermal: at a height z its density is as exp(-m 
 extras `mesh` and `plot`.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
+
+from .asked import Asked
 
 GRAVITY, TEMPERATURE, MASS = 9.81, 4.0, 1.0
 HEIGHT, LOBES, DEPTH, TWIST = 1.0, 3, 0.18, 4.0
@@ -80,16 +81,15 @@ def law(z: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Run, draw and print."""
+    ask = Asked(__doc__, "vessel_from_stl.png", "plot", "mesh")
+    ask.add_argument("--count", type=int, default=4000)
+    ask.add_argument("--until", type=float, default=20.0)
+    asked = ask.parse_args()
     from matplotlib import pyplot
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     from .paper.plotting import BLUE, RED
 
-    ask = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    ask.add_argument("--count", type=int, default=4000)
-    ask.add_argument("--until", type=float, default=20.0)
-    ask.add_argument("-o", "--output", type=Path, default=Path("vessel_from_stl.png"))
-    asked = ask.parse_args()
     gas = run(asked.count, asked.until)
     seen = gas.result.observables
     print(f"{gas.surface}: within {1e3 * gas.surface.mesh_error:.2g} mm of the mesh")

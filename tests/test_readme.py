@@ -94,7 +94,7 @@ SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
 def commands():
     """Every command of swarm in the READMEs, without its options in brackets and, where it has some, with them all."""
     spans = re.findall(r"`(swarm [a-z]+ [^`\n]*\.[^`\n]*)`", ALL) + re.findall(
-        r"^(swarm [a-z]+ \S+\.\S+.*)$", ALL, re.MULTILINE
+        r"^(?:pip install \. && )?(swarm [a-z]+ \S+\.\S+.*)$", ALL, re.MULTILINE
     )
     for span in spans:
         for words in dict.fromkeys((re.sub(r" *\[.*?\]", "", span), re.sub(r"[\[\]]", "", span))):

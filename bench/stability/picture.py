@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import figure
-from ..report import RESULTS
+from ..report import file_of
 
 Cell = dict[str, Any]  # column -> number or word
 OMEGA = r"$\Omega = dt\,\sqrt{\alpha/m}$"
@@ -51,7 +51,7 @@ def words(axes: Any, image: Any, values: np.ndarray, wording: Callable[[float], 
 
 def save(picture: Any, cells: Sequence[Cell], name: str) -> None:
     """The picture as PNG and its cells as CSV; they depend on no machine but for times."""
-    path = RESULTS / f"stability-{name}.png"
+    path = file_of(f"stability-{name}.png")
     figure.save(picture, path)
     with open(path.with_suffix(".csv"), "w", newline="") as file:
         out = csv.DictWriter(file, list(cells[0]), lineterminator="\n")

@@ -1,4 +1,7 @@
-"""`python -m examples.paper [-o FOLDER]`: every figure as PNG, and the table."""
+"""`python -m examples.paper [-o FOLDER]`: every figure as PNG, and the table.
+
+Those of the repository are made by `-o examples/paper/results`.
+"""
 
 import argparse
 import importlib.util
@@ -7,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
+from ..asked import OUT
 from . import (
     beyond_adaptive,
     beyond_clearance,
@@ -23,13 +27,12 @@ from .table import Row, markdown
 
 REPRODUCED = (fig_03, fig_08_12, fig_13, fig_14_17, fig_19_22)
 BEYOND = (beyond_ellipsoid, beyond_torus, beyond_adaptive, beyond_swarm, beyond_clearance)
-RESULTS = Path(__file__).with_name("results")
 
 
 def main() -> None:
     """Draw all figures, then print and write the table."""
     parser = argparse.ArgumentParser(prog="python -m examples.paper", description="The paper's figures, and beyond.")
-    parser.add_argument("-o", metavar="FOLDER", type=Path, default=RESULTS, help="default: %(default)s")
+    parser.add_argument("-o", metavar="FOLDER", type=Path, default=OUT / "paper", help="default: %(default)s")
     folder = parser.parse_args().o
     if importlib.util.find_spec("matplotlib") is None:
         raise SystemExit('python -m examples.paper needs matplotlib: pip install -e ".[plot]"')

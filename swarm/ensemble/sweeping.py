@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import checks, interrupt
-from ..errors import SceneError
+from ..errors import FileError, SceneError
 from ..extras import needed_by
 from ..output import paths
 from ..output.lock import only_writer
@@ -126,7 +126,10 @@ def carry_out(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
     plan = read(source)
     results = Results(plan, folder, options.table)
     _require_free(results, options)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {folder}: {error.strerror}") from error
     with only_writer(results.path, "table"):
         if options.overwrite:
             results.remove()

@@ -6,15 +6,15 @@ A frame is in memory at a time. 10 000 particles and 500 frames take, read and w
 """
 
 import contextlib
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from .. import checks
-from ..errors import FileError, SceneError
+from ..errors import SceneError
 from ..extras import needed_by
 from . import paths
 from .exported import Exported, Progress, Stored
+from .replaced import named_when_whole
 
 SUFFIXES = (".vtkhdf", ".xyz", ".gsd")
 
@@ -47,11 +47,11 @@ def export(
         if kind == ".gsd":
             with needed_by("an export as .gsd", "gsd"):
                 from . import gsd
-            gsd.write(chosen, stack.enter_context(_whole(target)), shown)
+            gsd.write(chosen, stack.enter_context(named_when_whole(target)), shown)
         elif kind == ".xyz":
             from . import xyz
 
-            xyz.write(chosen, stack.enter_context(_whole(target)), shown)
+            xyz.write(chosen, stack.enter_context(named_when_whole(target)), shown)
         else:
             from . import vtkhdf
 
@@ -59,8 +59,8 @@ def export(
                 with needed_by("an export with surfaces, which --no-surfaces or surfaces=False leaves out,", "plot"):
                     from . import walls
                 drawn = walls.shapes(chosen)
-                walls.write(chosen, drawn, stack.enter_context(_whole(targets[1])))
-            vtkhdf.write(chosen, stack.enter_context(_whole(target)), shown)
+                walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
+            vtkhdf.write(chosen, stack.enter_context(named_when_whole(target)), shown)
     return targets
 
 
@@ -72,18 +72,3 @@ def _told(chosen: Exported, progress: Progress | None) -> Callable[[int], None]:
             progress(done, len(chosen.numbers))
 
     return told
-
-
-@contextlib.contextmanager
-def _whole(target: Path) -> Iterator[Path]:
-    """The name to write a file under, which gets its own when it is whole, and is removed if it never is."""
-    part = paths.part_of(target)
-    try:
-        yield part
-        os.replace(part, target)
-    except (OSError, RuntimeError) as error:
-        if isinstance(error, (SceneError, FileError)):
-            raise
-        raise FileError(f"cannot write {target}: {error}") from error
-    finally:
-        part.unlink(missing_ok=True)

@@ -61,7 +61,11 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory") -> None:
     if path.exists() and not path.is_file():
         raise SceneError(f"{what}: expected a file name, got {path}, which is a device or a pipe")
     if path.exists() and not overwrite:
-        raise SceneError(f"{what}: {path} exists; choose another name, or overwrite it (--overwrite, overwrite=True)")
+        stopped = what == "trajectory" and checkpoint_of(path).exists()
+        on = ", or go on with it, which was stopped (--resume, resume=True)" if stopped else ""
+        raise SceneError(
+            f"{what}: {path} exists; choose another name, or overwrite it (--overwrite, overwrite=True){on}"
+        )
 
 
 def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:

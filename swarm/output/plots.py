@@ -15,6 +15,7 @@ from ..particles import Particles
 from ..scene import Scene
 from . import colours, drawing, series
 from .drawn import Drawn
+from .replaced import named_when_whole
 from .shapes import Shape, shapes_of
 
 # Most particles drawn, or points of bodies.
@@ -49,8 +50,11 @@ def draw(trajectory: Any, target: Path) -> None:
 
     Raises:
         SceneError: the trajectory is damaged, or holds no frame.
+        FileError: the picture cannot be written.
     """
-    figure_of(content_of(trajectory), _FILE, SHOWN).savefig(target)
+    figure = figure_of(content_of(trajectory), _FILE, SHOWN)
+    with named_when_whole(target) as part:
+        figure.savefig(part)
 
 
 def content_of(trajectory: Any) -> Content:

@@ -14,6 +14,7 @@ Rerun's positions are float32. Those of a scene that is far from the origin are 
 import atexit
 import ctypes
 import math
+import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +101,9 @@ class RecordingWriter:
     ) -> None:
         if path is not None:
             paths.check_target(path, overwrite, "recording")
+            # Asked first: a sink of Rerun that fails writes lines of its own.
+            if not os.access(path if path.exists() else path.parent, os.W_OK):
+                raise FileError(f"cannot write the recording {path}: no permission")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body = frames - 1, body
         self._drawn = drawn = Drawn(len(start), body, settings.particles)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from ..errors import FileError
+from ..errors import FileError, SwarmError
 from . import paths
 
 
@@ -29,6 +29,26 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
     except OSError as error:
         part.unlink(missing_ok=True)
         raise FileError(f"cannot write the {what} {path}: {error}; the previous {what} is unchanged") from error
+
+
+@contextlib.contextmanager
+def named_when_whole(target: Path) -> Iterator[Path]:
+    """The name under which others write a file, which gets its own when it is whole, and is removed if it never is.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    part = paths.part_of(target)
+    try:
+        yield part
+        os.replace(part, target)
+    except (OSError, RuntimeError) as error:
+        if isinstance(error, SwarmError):
+            raise
+        raise FileError(f"cannot write {target}: {error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
 
 
 def _sync_folder(path: Path) -> None:

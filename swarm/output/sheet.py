@@ -10,6 +10,7 @@ from matplotlib.image import imread
 from ..errors import RunError, SceneError
 from . import drawing, series, viewer
 from .playback import Playback
+from .replaced import named_when_whole
 
 _COLUMNS = 3
 
@@ -26,12 +27,14 @@ def draw(playback: Playback, target: Path, times: list[float] | None, with_viewe
     Raises:
         SceneError: a time is outside the recording.
         RunError: the viewer is wanted and cannot draw.
+        FileError: the picture cannot be written.
     """
     numbers = _chosen(playback, times)
     with tempfile.TemporaryDirectory() as folder:
         found, by = _pictures(playback, numbers, Path(folder), with_viewer)
         picture = _sheet(playback, numbers, found, by)
-    picture.savefig(target)
+    with named_when_whole(target) as part:
+        picture.savefig(part)
     return by
 
 

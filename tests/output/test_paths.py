@@ -1,6 +1,7 @@
 """No output replaces a file that is not its own: inputs, other outputs, devices, links, the user's own files."""
 
 import os
+import signal
 from pathlib import Path
 
 import h5py
@@ -78,3 +79,21 @@ def test_a_file_of_the_users_own_in_the_checkpoints_place_is_refused(tmp_path, k
             run(tmp_path / "run.h5", **keywords)
         assert path.read_text() == content
     assert os.listdir(tmp_path) == ["run.h5.checkpoint"]
+
+
+def test_who_runs_again_is_told_how_to_go_on(tmp_path):
+    """One that is complete is overwritten; one that was stopped is resumed."""
+    path = tmp_path / "run.h5"
+
+    def stop(frame):
+        if frame.number == 1:
+            signal.raise_signal(signal.SIGTERM)
+
+    run(path, compile="never")
+    with pytest.raises(swarm.SceneError, match=r"run\.h5 exists; .*overwrite it \(--overwrite, overwrite=True\)$"):
+        run(path, compile="never")
+    with pytest.raises(KeyboardInterrupt):
+        run(path, compile="never", overwrite=True, checkpoint=60.0, progress=stop)
+    assert paths.checkpoint_of(path).exists()
+    with pytest.raises(swarm.SceneError, match=r"run\.h5 exists; .*, or go on with it, .*\(--resume, resume=True\)$"):
+        run(path, compile="never")
