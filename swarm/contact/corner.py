@@ -39,9 +39,12 @@ def hold(form, law, multipliers, chain, step, reactions):
         before = r
         solved = _sweep(chain, form, law, multipliers, 0, step, reactions)
         r = step.r + (step.p - total(reactions))
-        size = max(largest(r), largest(step.p))
-        if solved and (reactions.shape[0] == 1 or (i > 0 and largest(r - before) <= 4.0 * _EPSILON * size)):
+        size, moved = max(largest(r), largest(step.p)), largest(r - before)
+        if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * _EPSILON * size)):
             return Held(r, True)
+        if i > 0 and moved == 0.0:
+            # A wall that is not solved: sweeps from where they began say the same.
+            return Held(r, False)
     return Held(r, False)
 
 

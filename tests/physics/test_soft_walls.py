@@ -167,3 +167,16 @@ def test_stiff_walls_are_rigid():
         distances.append(np.median(np.linalg.norm(soft.position - hard.position, axis=0)))
     assert distances[0] > 1.5 * distances[1] > 1.5**2 * distances[2]
     assert distances[2] < 0.1 * min(AXES)
+
+
+@pytest.mark.parametrize("gradient", ["composite", "mean-value"])
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 1.0)], ids=str)
+@pytest.mark.parametrize("make", [lambda: swarm.Box((0.3, 0.4, 0.5)), lambda: swarm.Sphere(0.4)], ids=["box", "sphere"])
+def test_through_the_middle(make, direction, gradient):
+    """In the middle of a slab or a sphere dg/dq has no bound; each sweep asks all walls of a box."""
+    method = swarm.Penalty(1e-2, 1e3, exponent=1.5, gradient=gradient)
+    start = swarm.Particles((0.0, 0.0, 0.0), direction)
+    result = run(swarm.Scene([make()]), start, method, 1.0, compile="never")
+    assert result.observables["energy_error"].max() <= 1e-12
+    assert result.observables["impacts"][-1] >= 1
+    assert (result.particles.position[np.array(direction) == 0.0] == 0.0).all()
