@@ -13,7 +13,7 @@ Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
+from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from ..surfaces import contract
 from ..surfaces.stroke import framed
@@ -70,7 +70,7 @@ def composite(law, surface, r0, r1):
     q0, q1 = contract.inner(surface, r0), contract.inner(surface, r1)
     slope, _curvature = law_of.constraint_slope(law, contract.gap_of(surface, q0), contract.gap_of(surface, q1))
     rise, _curvature = contract.gap_slope(surface, q0, q1)
-    return _chained(slope, rise) * contract.inner_gradient(surface, r0, r1)
+    return slope * rise * contract.inner_gradient(surface, r0, r1)
 
 
 @outlined
@@ -83,13 +83,7 @@ def constraint_gradient(law, surface, r):
 def _constraint_slope(law, surface, q):
     """dPhi/dq"""
     slope, _curvature = contract.gap_slope(surface, q, q)
-    return _chained(law_of.constraint_gradient(law, contract.gap_of(surface, q)), slope)
-
-
-@inlined
-def _chained(steepness, slope):
-    """dPhi/dg dg/dq, where the last has no bound in the middle of a slab or a sphere: no wall pushes there."""
-    return select(steepness == 0.0, 0.0, steepness * slope)
+    return law_of.constraint_gradient(law, contract.gap_of(surface, q)) * slope
 
 
 @inlined

@@ -9,6 +9,8 @@ from ...kernel.jit import select
 from .. import contract
 
 _TINY = float(np.finfo(np.float64).tiny)
+# The least root of an inner function that is told from 0: the cube of its inverse is a number.
+_MIDDLE = 1e-100
 Numbers = TypeVar("Numbers", bound=type)
 
 
@@ -34,11 +36,12 @@ def _gradient(surface, r):
 
 
 def _gap_slope(surface, q0, q1):
-    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), by NumPy's roots: those of math raise for 1/0, at the
-    # centre, where plain Python must give what kernels do.
-    root1 = np.sqrt(q1)
-    slope = 1.0 / (np.sqrt(q0) + root1)
-    return surface.side * slope, -0.5 * surface.side * slope * slope / root1
+    # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall pushes
+    # and what it is multiplied with is 0. There q1, the sum of q0 and a rise, may be below 0 by round-off.
+    root1 = math.sqrt(select(q1 > 0.0, q1, 0.0))
+    both = math.sqrt(q0) + root1
+    slope = 1.0 / select(both > _MIDDLE, both, _MIDDLE)
+    return surface.side * slope, -0.5 * surface.side * slope * slope / select(root1 > _MIDDLE, root1, _MIDDLE)
 
 
 def exact_chord(kind: Numbers) -> Numbers:
