@@ -283,7 +283,7 @@ class Scene:
         return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
 
     def finite_size(self) -> float:
-        """`size`, or the extent of the surfaces where the volume is open, or a slot too thin to be a length of motion."""
+        """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
         size, extent = self.size(), self.extent()
         return size if _THIN * extent < size < math.inf else extent
 

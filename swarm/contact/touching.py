@@ -312,7 +312,7 @@ def _normal(chain, wall, r0, r1):
 
 @outlined
 def _goes_straight(chain, gravity, touch, r, v):
-    """Whether the step may have any length: rest, or uniform motion along flat walls, which gravity may press against."""
+    """Whether the step may have any length: rest, or uniform motion along flat walls that no gravity pulls it from."""
     g = accelerated(gravity, ZERO, 1.0)
     for i in range(touch.touched.size):
         if touch.touched[i]:
