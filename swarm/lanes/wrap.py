@@ -87,10 +87,8 @@ def _(period, chain, state, lanes, i, phase):
     if phase == ARRIVED or not has_left(period, r):
         return phase
     back, before = into(period, r), state.energy[p]
-    first, second = rows[compose.WALL, i], rows[compose.WALL + 1, i]
-    if phase not in (HELD, EDGE, AGAIN) or not _are_there(
-        period, at(chain, rows[compose.LEFT, i]), first, second, r, back.r
-    ):
+    first, second, slides = rows[compose.WALL, i], rows[compose.WALL + 1, i], phase in (HELD, EDGE, AGAIN)
+    if not slides or not _are_there(period, at(chain, rows[compose.LEFT, i]), first, second, r, back.r):
         return FLYING
     put(rows, compose.R, i, back.r)
     _count(period, state, p, back.images)
