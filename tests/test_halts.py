@@ -263,12 +263,46 @@ scene = swarm.Scene([swarm.Sphere(0.5)])
 start = swarm.place(scene, swarm.chain(3, 0.9, 1.0), 1, speed=1.0, seed=1)
 report(scene, start, swarm.Impact(dt=1e-2), until=1e9, compile="never")
 """
+# What rests on a wall that moves, in a frame of 2e9 of its swings.
+RESTING = """
+from swarm.lanes import stay
+real = stay._clear
+def noted(*about):
+    note()
+    return real(*about)
+stay._clear = noted
+floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.9, motion=swarm.Oscillation((0.01, 0.0, 0.0), 0.5))
+start = swarm.Particles([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+report(swarm.Scene([floor], (0.0, 0.0, -9.81)), start, swarm.Impact(), until=1e9, compile="never")
+"""
+SCRIPTS = {"closing": CLOSING, "resting": RESTING, "collapse": COLLAPSE, "leases": LEASES, "chain": CHAIN}
 
 
-@pytest.mark.parametrize("script", [CLOSING, COLLAPSE, LEASES, CHAIN], ids=["closing", "collapse", "leases", "chain"])
+@pytest.mark.parametrize("script", SCRIPTS.values(), ids=SCRIPTS)
 def test_what_does_not_end_is_ended(script):
     """Also walls that react, and bodies."""
     assert_all_end(script)
+
+
+def test_what_rests_where_walls_move_has_the_same_bits_after_halts():
+    """It stays for 128 paces at a time, whether it is halted there or not."""
+    floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.9, motion=swarm.Oscillation((0.01, 0.0, 0.0), 0.5))
+    scene = swarm.Scene([floor], (0.0, 0.0, -9.81))
+    # As fast as its floor, from where it is not carried away.
+    start = swarm.Particles([0.0, 0.0, 0.0], [0.01 * np.pi, 0.0, 0.0])
+    ends = []
+    for passes in (None, 1, 2):
+        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+            halts = 0
+            run.halt(10**6 if passes is None else passes)
+            while not run.advance(10.0, 10.0):
+                halts += 1
+                run.halt(passes)
+            assert (halts > 1) == (passes is not None)
+            ends.append({name: array.tobytes() for name, array in run.arrays().items()})
+    assert ends[0] == ends[1] == ends[2]
+    carried = np.frombuffer(ends[0]["position"])
+    assert carried == pytest.approx([0.01 * np.sin(2.0 * np.pi * 0.5 * 10.0), 0.0, 0.0], abs=1e-14)
 
 
 def test_a_collapse_on_a_wall_that_reacts_is_bounded():

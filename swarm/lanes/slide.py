@@ -61,7 +61,7 @@ from .compose import (
     work,
 )  # fmt: skip
 from .escape import is_at_opening
-from .stay import phase_of, stay
+from .stay import AGAIN, phase_of, stay
 from .wrap import return_particle, return_sliding
 
 # Times that a step is cut before the lane is given up: it takes four or so.
@@ -226,6 +226,8 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
 def _retire(kind, moving, chain, share, lanes, i, phase):
     """A lane back into its particle, for what it does next."""
     rows, p, contacts = lanes.rows, index(lanes.particle[i]), share.state.contacts
+    if phase == AGAIN:
+        phase = phase_of(kind)
     v, keep = column(rows, V, i), rows[KEEP, i]
     slid = phase != FLYING and phase != CAREFUL
     if not (slid and rows[LEFT, i] > 0.0):

@@ -20,6 +20,11 @@ from .compose import KEEP, LEFT, PRESS, SCALE2, SLOWEST, TWICE, WALL, A, R, V, p
 
 # Halvings of the interval in which a wall lets a particle go that rests on it.
 _HALVINGS = 60
+# So many paces it stays at a time, and is asked again: a frame may have millions of them, and between them halts count.
+# (Rejected: a halt in any of them. What is carried in two parts is rounded twice.)
+_MOST_PACES = 128.0
+# A lane goes on to stay.
+AGAIN = -1
 # Steps in the search for another wall that comes: where none is met after so many, it is too near to be told.
 _MOST_STEPS = 10_000
 
@@ -55,9 +60,9 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     moves_on = square(v - u) > slowest or _rubs(kind, methods.laws(method), now, lanes, i, r, slowest)
     if moves_on or not _rests(kind, method, now, gravity, lanes, i, r):
         return phase_of(kind)
-    pace, low, high, met = walls.shortest_pace(now), 0.0, 0.0, -1.0
+    pace, low, high, met, paces = walls.shortest_pace(now), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
-    while low < left and met < 0.0:
+    while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
         clear = _clear(kind, method, chain, lanes, i, low, left if low + step >= left else low + step)
         high = clear.time
@@ -75,9 +80,9 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
         )
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
-        low, met = high, clear.wall
-    end = start = low
-    if low < left and met < 0.0:
+        low, met, paces = high, clear.wall, paces + 1.0
+    end, start, goes_on = low, low, paces == _MOST_PACES and met < 0.0
+    if low < left and met < 0.0 and not goes_on:
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
             if _rests_later(kind, method, chain, gravity, lanes, i, middle):
@@ -103,8 +108,8 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     push(chain, state, lanes, i, pressed, pressed_second)
     work(moving, chain, state, lanes, i, given, 0.0)
     state.contacts.sliding[lanes.particle[i]] += end
-    if not after > 0.0:
-        return ARRIVED
+    if goes_on or not after > 0.0:
+        return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
         state.contacts.met[lanes.particle[i]] = met
         put(rows, R, i, walls.settle(then, met, r1))

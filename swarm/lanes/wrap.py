@@ -10,6 +10,7 @@ from ..surfaces.moving import at
 from ..surfaces.period import Period, has_left, into, keeps_walls, length_of
 from . import arrays, compose
 from .marks import marked_lanes
+from .stay import AGAIN
 
 # A wall that is farther away than this part of the cell is none that holds a particle.
 _ON_THE_WALL = 1e-12
@@ -88,8 +89,8 @@ def _(period, chain, state, lanes, i, phase):
     if phase == ARRIVED or not has_left(period, r):
         return phase
     back, before = into(period, r), state.energy[p]
-    first, second = rows[compose.WALL, i], rows[compose.WALL + 1, i]
-    if phase not in (HELD, EDGE) or not _are_there(period, at(chain, rows[compose.LEFT, i]), first, second, r, back.r):
+    first, second, slides = rows[compose.WALL, i], rows[compose.WALL + 1, i], phase in (HELD, EDGE, AGAIN)
+    if not slides or not _are_there(period, at(chain, rows[compose.LEFT, i]), first, second, r, back.r):
         return FLYING
     put(rows, compose.R, i, back.r)
     _count(period, state, p, back.images)
