@@ -64,7 +64,7 @@ def require_resolved(path: Path, mesh: Mesh, spacing: float) -> None:
     thin = _thin_places(mesh, normals, areas, spacing)
     if not len(thin.point):
         return
-    surface, first, enough = _Surface(mesh, normals), None, spacing
+    surface, first, enough = _Surface(mesh, normals, spacing), None, spacing
     # With a smaller spacing a fold that was short for the first may be a long one.
     while (worst := _thinnest(thin, surface, enough)) is not None:
         first = worst if first is None else first
@@ -90,7 +90,7 @@ def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
     # Of each cell one place is enough: that whose sides are most parallel, as those of a wall are.
     facing = (surface.normals[thin.at[found]] * surface.normals[thin.to[found]]).sum(axis=1)
     found = found[np.argsort(facing, kind="stable")]
-    cells = np.column_stack([np.floor(thin.point[found] / spacing), thin.gap[found]])
+    cells = np.column_stack([np.floor(thin.point[found] / (_ROUND * spacing)), thin.gap[found]])
     found = found[np.unique(cells, axis=0, return_index=True)[1]]
     found = found[np.argsort(thin.thickness[found], kind="stable")]
     return next((int(i) for i in found if not surface.is_fold(thin, int(i), spacing)), None)
@@ -157,11 +157,18 @@ def _touching(
 class _Surface:
     """The mesh with its edges."""
 
-    def __init__(self, mesh: Mesh, normals: Floats) -> None:
+    def __init__(self, mesh: Mesh, normals: Floats, spacing: float) -> None:
+        from scipy.spatial import KDTree
+
         self.mesh, self.normals = mesh, normals
         self.edges, self.sides = neighbours(mesh.triangles)
-        ends = mesh.vertices[self.edges]
-        self.low, self.high = ends.min(axis=1), ends.max(axis=1)
+        start, end = np.moveaxis(mesh.vertices[self.edges], 1, 0)
+        length = np.linalg.norm(end - start, axis=1)
+        # Short edges are found by their middles, long ones by their boxes.
+        self.half = 0.5 * spacing
+        self.short, self.long = np.flatnonzero(length <= spacing), np.flatnonzero(length > spacing)
+        self.middles = KDTree(0.5 * (start + end)[self.short])
+        self.low, self.high = np.minimum(start, end)[self.long], np.maximum(start, end)[self.long]
 
     def is_fold(self, thin: _Thin, i: int, spacing: float) -> bool:
         """Whether the surface around a thin place is a disc that joins its two sides."""
@@ -178,7 +185,9 @@ class _Surface:
 
     def _is_disc(self, centre: Floats, reach: float, first: int, last: int) -> bool:
         """Whether two triangles are in one part of the surface in a ball, and that part is a disc."""
-        near = np.flatnonzero(((self.low <= centre + reach) & (self.high >= centre - reach)).all(axis=1))
+        found = np.array(self.middles.query_ball_point(centre, reach + self.half), np.int64)
+        crossed = ((self.low <= centre + reach) & (self.high >= centre - reach)).all(axis=1)
+        near = np.concatenate([self.short[found], self.long[crossed]])
         start, end = np.moveaxis(self.mesh.vertices[self.edges[near]], 1, 0)
         way = end - start
         part = np.clip(((centre - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-300), 0.0, 1.0)
