@@ -6,8 +6,9 @@ from ..contact.events import ARRIVED, EDGE, FLYING, HELD
 from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined
 from ..kernel.vector import Vec, column, dot, put
 from ..surfaces import fold as walls
+from ..surfaces.axes import length_of
 from ..surfaces.moving import at
-from ..surfaces.period import Period, has_left, into, keeps_walls, length_of
+from ..surfaces.period import Period, has_left, into, keeps_walls
 from . import arrays, compose
 from .marks import marked_lanes
 from .stay import AGAIN

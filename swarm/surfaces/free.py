@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.vector import Vec
+from .axes import Free
 from .fields.many import Many
+from .gaps import Beside, Gap, Gaps
 from .images import Lengths, body_of, is_same_along
-from .period import Beside, Free, Gap, Gaps, Period
+from .period import Period
 from .surface import Surface
 
 Floats = NDArray[np.float64]

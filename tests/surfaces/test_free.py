@@ -5,7 +5,9 @@ import pytest
 
 import swarm
 from swarm.lanes import block
-from swarm.surfaces.period import Beside, Free, Gap, Period
+from swarm.surfaces.axes import Free
+from swarm.surfaces.gaps import Beside, Gap
+from swarm.surfaces.period import Period
 
 EPSILON = float(np.finfo(np.float64).eps)
 CELL = (1.0, 1.0, 1.0)

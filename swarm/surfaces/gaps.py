@@ -1,0 +1,184 @@
+"""Flights that go on over the faces of a cell that repeats, because no wall that has images is in their way.
+
+In a gap between two coordinates there is no such wall, however far a flight goes along the other axes; and one along an
+axis that passes all walls of a cell passes those of every cell.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from ..kernel.gravity import Gravity, Nothing
+from ..kernel.jit import by_type, inlined, select
+from .axes import CELLS, Free, along_x, along_y, along_z, least, length_of, time_far, time_out
+from .course import rise_time
+from .flights import Hit
+
+# Of a length of the cell, the part within which a flight begins at a face: as far beyond the other walls are known.
+_AT_FACE = 5e-4
+
+
+class Gap(NamedTuple):
+    """The coordinates along an axis between which no wall is that has images; it may go on beyond the upper face."""
+
+    low: float
+    high: float
+
+
+class Beside(NamedTuple):
+    """The coordinates below and above which no wall is that has images, along an axis that does not repeat."""
+
+    low: float
+    high: float
+
+
+class Gaps(NamedTuple):
+    """The gap along each axis, None where there is none; and whether there are walls without images, None for no."""
+
+    x: Any
+    y: Any
+    z: Any
+    walls: Any
+
+
+# --- Along one axis --------------------------------------------------------------------------------------
+
+
+@by_type
+def _time_in(gap, length, x, v, pull):
+    """How long a coordinate stays in a gap; 0 where it is not in it."""
+    return 0.0
+
+
+@_time_in.register(Gap)
+def _(gap, length, x, v, pull):
+    x = x + select(x < gap.low, length_of(length), 0.0)
+    return select((x > gap.low) & (x < gap.high), time_out(pull, (gap.low, gap.high), x, v), 0.0)
+
+
+@_time_in.register(Beside)
+def _(gap, length, x, v, pull):
+    below, above = x < gap.low, x > gap.high
+    # Below is what is above of -x.
+    far, towards = select(below, x - gap.low, gap.high - x), select(below, v, -v)
+    return select(below | above, _time_to_reach(pull, far, towards, below), 0.0)
+
+
+@by_type
+def _time_to_reach(pull, far, v, below):
+    """When a coordinate so far below 0 reaches it, without gravity."""
+    return select(v > 0.0, -far * (1.0 / v), math.inf)
+
+
+@_time_to_reach.register(float)
+def _(pull, far, v, below):
+    return rise_time(far, 0.5 * v, select(below, 0.5 * pull, -0.5 * pull))
+
+
+# --- Of a flight -----------------------------------------------------------------------------------------
+
+
+@inlined
+def _time_in_gaps(gaps, period, gravity, motion):
+    """How long a flight stays in a gap."""
+    r, v = motion
+    x = _time_in(gaps.x, period.x, r.x, v.x, along_x(gravity))
+    y = _time_in(gaps.y, period.y, r.y, v.y, along_y(gravity))
+    z = _time_in(gaps.z, period.z, r.z, v.z, along_z(gravity))
+    longest = select(x > y, x, y)
+    return select(longest > z, longest, z)
+
+
+@by_type
+def longer(gaps, period, gravity, motion, ends):
+    """The first of `ends`, or when the gap ends in which it flies, less the second."""
+    time, _late = ends
+    return time
+
+
+@longer.register(Gaps)
+def _(gaps, period, gravity, motion, ends):
+    time, late = ends
+    longest = _time_in_gaps(gaps, period, gravity, motion) - late
+    return select(longest > time, longest, time)
+
+
+@by_type
+def over_faces(gaps, period, gravity, motion, ends):
+    """When a flight leaves the cell, or the gap in which it goes on over faces; and its hit.
+
+    `ends` are the first of these, the hit, and by how much the flight may end later.
+    """
+    first, hit, _late = ends
+    return first, hit
+
+
+@over_faces.register(Gaps)
+def _(gaps, period, gravity, motion, ends):
+    leaves, hit, late = ends
+    longest = _time_in_gaps(gaps, period, gravity, motion) - late
+    longest = select(_is_line(gravity, period, motion, hit.time), math.inf, longest)
+    far = _far(gravity, period, motion, leaves)
+    longest = select(longest < far, longest, far)
+    goes_on = longest > leaves
+    return select(goes_on, longest, leaves), _hit_in(gaps.walls, goes_on, hit)
+
+
+@by_type
+def _far(gravity, period, motion, leaves):
+    """When a flight is surely no more cells away than it may go; `leaves` is when it leaves this one."""
+    return CELLS * leaves
+
+
+@_far.register(Gravity)
+def _(gravity, period, motion, leaves):
+    r, v = motion
+    x, y = time_far(period.x, r.x, v.x, gravity.x), time_far(period.y, r.y, v.y, gravity.y)
+    return least(x, y, time_far(period.z, r.z, v.z, gravity.z))
+
+
+@by_type
+def _is_line(gravity, period, motion, free):
+    """Whether a flight that is free for so long goes through each cell as through this one."""
+    return False
+
+
+@_is_line.register(Nothing)
+def _(gravity, period, motion, free):
+    r, v = motion
+    x = _spans(period.x, r.x, v.x, free) & _is_kept(period.y, v.y) & _is_kept(period.z, v.z)
+    y = _spans(period.y, r.y, v.y, free) & _is_kept(period.z, v.z) & _is_kept(period.x, v.x)
+    z = _spans(period.z, r.z, v.z, free) & _is_kept(period.x, v.x) & _is_kept(period.y, v.y)
+    return x | y | z
+
+
+@by_type
+def _spans(length, x, v, free):
+    """Whether it begins at a face and is free as far as the place beyond the other that is its image."""
+    return False
+
+
+@_spans.register(float)
+def _(length, x, v, free):
+    begins = ((v > 0.0) & (x <= _AT_FACE * length)) | ((v < 0.0) & (x >= length - _AT_FACE * length))
+    return begins & (abs(v) * free > length)
+
+
+@by_type
+def _is_kept(length, v):
+    """Whether the walls along this axis are the same for it in every cell."""
+    return v == 0.0
+
+
+_is_kept.register(Free, lambda length, v: True)
+
+
+@by_type
+def _hit_in(walls, goes_on, hit):
+    """The hit of a flight that goes on over faces, or not."""
+    return hit
+
+
+@_hit_in.register(Nothing)
+def _(walls, goes_on, hit):
+    # Of a fall it may be known for a part of its way only that it is free.
+    return Hit(select(goes_on, math.inf, hit.time), select(goes_on, -1.0, hit.wall))
