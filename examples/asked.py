@@ -7,8 +7,8 @@ from typing import Any
 
 # What examples write goes here unless they are told otherwise: Git ignores it.
 OUT = Path("out")
-# One module of each extra of pyproject.toml says whether it is installed.
-_MODULES = {"plot": "matplotlib", "mesh": "trimesh", "table": "pandas"}
+# What the extras of pyproject.toml hold of what examples import.
+_MODULES = {"plot": ("matplotlib",), "mesh": ("trimesh", "igl"), "table": ("pandas",)}
 
 
 class Asked(argparse.ArgumentParser):
@@ -30,9 +30,9 @@ class Asked(argparse.ArgumentParser):
     def parse_args(self, *given: Any, **more: Any) -> Any:
         """The arguments; what is missing is a sentence before anything runs."""
         asked = super().parse_args(*given, **more)
-        missing = [extra for extra in self._extras if importlib.util.find_spec(_MODULES[extra]) is None]
+        needed = [name for extra in self._extras for name in _MODULES[extra]]
+        missing = [name for name in needed if importlib.util.find_spec(name) is None]
         if missing:
-            names = ", ".join(_MODULES[extra] for extra in missing)
-            self.exit(1, f'{self.prog} needs {names}: pip install ".[{",".join(self._extras)}]"\n')
+            self.exit(1, f'{self.prog} needs {", ".join(missing)}: pip install ".[{",".join(self._extras)}]"\n')
         asked.output.parent.mkdir(parents=True, exist_ok=True)
         return asked

@@ -1,8 +1,10 @@
 """The results of a sweep: a status file for every run, and one table of all."""
 
 import csv
+import functools
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +50,7 @@ class Results:
         self.path = folder / f"results.{table}"
         self._statuses: dict[str, Status] = {}
         values = [variant.parameters for variant in plan.variants]
-        # A column has values of one type; of others their JSON.
-        self._plain = {
-            key: len({_type_of(row[key]) for row in values}) == 1 and _type_of(values[0][key]) is not None
-            for key in values[0]
-        }
+        self._written = {key: _written_as([row[key] for row in values]) for key in values[0]}
 
     def trajectory(self, variant: Variant) -> Path:
         """The trajectory of a run."""
@@ -108,10 +106,7 @@ class Results:
         made = []
         for variant in self.plan.variants:
             status = self._statuses.get(variant.stem, {})
-            parameters = {
-                key: value if self._plain[key] else json.dumps(value, default=str)
-                for key, value in variant.parameters.items()
-            }
+            parameters = {key: self._written[key](value) for key, value in variant.parameters.items()}
             about = {
                 "state": status.get("state", "waiting"),
                 "error": status.get("error"),
@@ -155,8 +150,20 @@ def _columns(rows: list[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
+def _written_as(values: list[Any]) -> Callable[[Any], Any]:
+    """What makes values of one type of the values of a column; of those that no column holds their JSON."""
+    kinds = {_type_of(value) for value in values}
+    if kinds == {"whole", "number"}:
+        return float
+    holds = len(kinds) == 1 and None not in kinds
+    if kinds == {"whole"}:
+        # 64 bits, with or without a sign.
+        least, most = min(values), max(values)
+        holds = least >= -(2**63) and most < (2**63 if least < 0 else 2**64)
+    return (lambda value: value) if holds else functools.partial(json.dumps, default=str)
+
+
 def _type_of(value: Any) -> str | None:
     """What values of one type are; None for lists and tables."""
-    if isinstance(value, bool):
-        return "truth"
-    return "number" if isinstance(value, (int, float)) else "text" if isinstance(value, str) else None
+    kinds = {bool: "truth", int: "whole", float: "number", str: "text"}
+    return next((name for kind, name in kinds.items() if isinstance(value, kind)), None)

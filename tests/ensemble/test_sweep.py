@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -205,3 +206,24 @@ def test_vectors_have_a_column_for_each_component():
         "wall_orientation_0_y": 6.0, "wall_orientation_0_z": 7.0,
     }  # fmt: skip
     assert all(type(value) in (int, float) for value in results.final(seen).values())
+
+
+@pytest.mark.parametrize(
+    ("values", "written"),
+    [
+        ([1, 2**64 - 1], [1, 2**64 - 1]),
+        ([1, 2**65], ["1", str(2**65)]),
+        ([-1, 2**63], ["-1", str(2**63)]),
+        ([1, 0.5, 10**23], [1.0, 0.5, 1e23]),
+        ([True, 1], ["true", "1"]),
+        (["a", 1], ['"a"', "1"]),
+        ([[1.0], [2.0]], ["[1.0]", "[2.0]"]),
+    ],
+)
+def test_a_column_of_any_values_is_of_one_type(values, written, tmp_path):
+    """Else Parquet refuses the table when all runs are done."""
+    variants = [SimpleNamespace(parameters={"key": value}, stem=f"{k}") for k, value in enumerate(values)]
+    known = results.Results(SimpleNamespace(variants=variants), tmp_path, "parquet")
+    assert [row["key"] for row in known.rows()] == written
+    known.write()
+    assert pd.read_parquet(known.path)["key"].tolist() == written
