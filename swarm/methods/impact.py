@@ -51,7 +51,8 @@ class Impact(base.Method):
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
     fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
-    ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing.
+    ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing. A corner of
+    three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the speed is no impact.
 
     Raises:
         SceneError: an argument is out of its range.

@@ -150,6 +150,11 @@ def test_impacts_on_walls_at_rest_do_not_either(restitution):
     assert restitution > 0.0 or counts[-1] == 4
 
 
+def test_when_hops_end_does_not_depend_on_the_speed_at_the_start_of_a_frame():
+    box = swarm.Scene([swarm.Box((0.3, 0.3, 0.3), restitution=0.5)], PULLS[1])
+    require_same_counts(box, swarm.fill(box, 8, speed=3.0, seed=1))
+
+
 def require_same_counts(scene, particles):
     """The counts at the ends of frames, which are those of runs that end there."""
     ends = np.linspace(0.1, 1.0, 10)
