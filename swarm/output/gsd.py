@@ -23,8 +23,9 @@ def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
     """Write the particles."""
     scene = chosen.trajectory.scene
     low, high = np.array(scene.bounds())
-    far = origin_of(scene, chosen.trajectory.frame(chosen.numbers[0]))
-    center = np.where(chosen.periods > 0.0, 0.5 * (low + high), far)
+    center = origin_of(scene, chosen.trajectory.frame(chosen.numbers[0]))
+    repeats = chosen.periods > 0.0
+    center[repeats] = 0.5 * (low[repeats] + high[repeats])
     needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low - center), abs(high - center)), 0.0)
     with gsd.hoomd.open(str(path), "w") as file:
         for done, moment in enumerate(chosen.moments()):

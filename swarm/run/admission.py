@@ -73,24 +73,7 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
             f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
             "particles, or a vessel without a period"
         )
-    for i, surface in enumerate(scene.surfaces):
-        if surface.temperature is not None:
-            raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
-        if surface.motion is not None:
-            raise SceneError(
-                f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
-                "anchors, in the frame of the wall"
-            )
-        if surface.openings:
-            raise SceneError(
-                f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
-                f"{len(surface.openings)}; use particles, or a box with an open face"
-            )
-        if surface.reacts():
-            raise SceneError(
-                f"surfaces[{i}] must have no mass and no inertia with bodies, got {surface}; make it a body, whose "
-                "cavities= are walls that it carries"
-            )
+    _require_walls_of_bodies(scene)
     if options.frames not in ("all", "none"):
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
@@ -110,6 +93,28 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
+
+
+def _require_walls_of_bodies(scene: Scene) -> None:
+    """Raise a `SceneError` where a surface has what bodies do not know."""
+    for i, surface in enumerate(scene.surfaces):
+        if surface.temperature is not None:
+            raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
+        if surface.motion is not None:
+            raise SceneError(
+                f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
+                "anchors, in the frame of the wall"
+            )
+        if surface.openings:
+            raise SceneError(
+                f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
+                f"{len(surface.openings)}; use particles, or a box with an open face"
+            )
+        if surface.reacts():
+            raise SceneError(
+                f"surfaces[{i}] must have no mass and no inertia with bodies, got {surface}; make it a body, whose "
+                "cavities= are walls that it carries"
+            )
 
 
 def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:

@@ -91,7 +91,8 @@ class BodyRun:
         self._size = max(1, block_size or _AT_ONCE)
         self._halt = np.full(1, _NEVER)
         self._threads = min(threads, math.ceil(n / self._size))
-        self._pool = threads_with(self._threads, self._lanes * per_lane + _at_once(rows, max(contacts, 3 * MOST_CONTACTS)))
+        at_once = _at_once(rows, max(contacts, 3 * MOST_CONTACTS))
+        self._pool = threads_with(self._threads, self._lanes * per_lane + at_once)
         self._cut_short = False
         pull = math.hypot(*gravity) * self._ties.mass.sum()
         self._led_start, self._start, self._scale = np.zeros((3, n))

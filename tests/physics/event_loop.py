@@ -141,45 +141,38 @@ def first_impact(walls, place, start, until):
     begin, left = start, start + 0.1 * SHORTEST
     while begin < until:
         t = np.minimum(begin + STEP * np.arange(WINDOW + 2), until + STEP)
-        found = (math.inf, None, True)
-        r = place(t)
-        for wall in walls:
-            g = wall.gap(r, t)
-            # A rise, or a top between samples.
-            rises = (g[:-1] <= 0.0) & (g[1:] > 0.0)
-            tops = np.zeros_like(rises)
-            # A parabola through three samples rises above the middle one by an eighth of its fall to them.
-            fall = g[1:-1] - np.minimum(g[:-2], g[2:])
-            tops[1:] = (g[1:-1] >= g[:-2]) & (g[1:-1] >= g[2:]) & (g[1:-1] <= 0.0) & (g[1:-1] + fall > -GRAZES)
-            for i in np.flatnonzero(rises | tops):
-                if t[i] >= found[0]:
-                    break
-                low, high, clear = t[i], t[i + 1], True
-
-                def gap(s, wall=wall):
-                    return wall.gap(place(np.array([s])), np.array([s]))[0]
-
-                if not rises[i]:
-                    low = t[max(i - 1, 0)]
-                    top = minimize_scalar(
-                        lambda s: -gap(s), bounds=(low, high), method="bounded", options={"xatol": 1e-12}
-                    )
-                    if -top.fun <= -GRAZES:
-                        continue
-                    clear, high = -top.fun > GRAZES, top.x
-                    if not clear:
-                        hit = top.x
-                if clear:
-                    low = max(low, left)
-                    if low >= high or gap(low) > 0.0:
-                        # Back within the first samples after the impact.
-                        hit, clear = t[i], False
-                    else:
-                        hit = brentq(gap, low, high, xtol=1e-15, rtol=9e-16)
-                if hit < found[0]:
-                    found = (hit, wall, clear)
-                break
-        if found[0] <= until:
-            return found
+        hits = [(*first_rise(wall, place, t, left), wall) for wall in walls]
+        hit, clear, wall = min(hits, key=lambda one: one[0])
+        if hit <= until:
+            return hit, wall, clear
         begin = t[WINDOW]
     return math.inf, None, True
+
+
+def first_rise(wall, place, t, left):
+    """(time, whether it is clear) of the first rise of the gap of one wall among samples; infinite if there is none."""
+    g = wall.gap(place(t), t)
+
+    def gap(s):
+        return wall.gap(place(np.array([s])), np.array([s]))[0]
+
+    rises = (g[:-1] <= 0.0) & (g[1:] > 0.0)
+    tops = np.zeros_like(rises)
+    # A parabola through three samples rises above the middle one by an eighth of its fall to them.
+    fall = g[1:-1] - np.minimum(g[:-2], g[2:])
+    tops[1:] = (g[1:-1] >= g[:-2]) & (g[1:-1] >= g[2:]) & (g[1:-1] <= 0.0) & (g[1:-1] + fall > -GRAZES)
+    for i in np.flatnonzero(rises | tops):
+        low, high = t[i], t[i + 1]
+        if not rises[i]:
+            low = t[max(i - 1, 0)]
+            top = minimize_scalar(lambda s: -gap(s), bounds=(low, high), method="bounded", options={"xatol": 1e-12})
+            if top.fun >= GRAZES:
+                continue
+            if top.fun >= -GRAZES:
+                return top.x, False
+            high = top.x
+        low = max(low, left)
+        # Else it is back within the first samples after its impact.
+        clear = low < high and gap(low) <= 0.0
+        return (brentq(gap, low, high, xtol=1e-15, rtol=9e-16) if clear else t[i]), clear
+    return math.inf, True
