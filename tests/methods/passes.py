@@ -43,7 +43,9 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
-    constants = call(contract.constants, numbers, mass, energy / mass, velocity)
+    # Twice the energy scale per mass, as `observables.energy_scale` has it
+    scale2 = velocity @ velocity + 2.0 * np.abs(scene.gravity or 0.0).sum() * scene.finite_size()
+    constants = call(contract.constants, numbers, mass, energy / mass, scale2)
     own = call(contract.own, numbers, *map(float, constants))
     lane = contract.Lane(vec(position), vec(velocity), np.float64(left), 1.0, own)
     if contract.lands(numbers):
