@@ -305,7 +305,7 @@ def test_particles_beyond_an_open_face_have_escaped(side, gravity):
 def test_too_many_impacts_in_a_frame_are_an_error(monkeypatch):
     """An error that names the particle and its walls, not a hang."""
     monkeypatch.setattr(blocks, "MOST_HITS", 5000.0)
-    monkeypatch.setattr(blocks, "_LOOK", 16)
+    monkeypatch.setattr(blocks, "LOOK", 16)
     start = swarm.Particles([[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     with pytest.raises(swarm.RunError, match=r"particle 1: .*without end.* surfaces\[0\] \(Slab\)"):
         swarm.simulate(swarm.Scene([swarm.Slab((0, 0, 1), 1e-4)]), start, swarm.Impact(), until=2.0, compile="never")

@@ -74,7 +74,7 @@ class Run:
         self._draws = math.ceil(n / self._size)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
-        self._watch = Watch()
+        self._watch = Watch(n)
         self._phase = np.zeros(n, np.int8)
         # Kernels have signed numbers, of the same 64 bits.
         self._seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
@@ -123,7 +123,7 @@ class Run:
             latest = min(latest, time.monotonic() + self._tier.left)
         self._ticket[0] = 0
         others, helps = self._hands(span, writing)
-        self._watch.begin(latest, helps)
+        self._watch.begin(latest, helps, self._tier.is_plain)
         began = time.perf_counter()
         shares = [self._pool.submit(self._share, span) for _ in range(others)]
         ends = [self._share(span)] if helps else []
