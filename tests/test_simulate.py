@@ -267,6 +267,18 @@ def test_what_particles_would_not_take_is_refused(name, assigned, words):
         swarm.simulate(SPHERE, particles, swarm.Impact(), until=1.0)
 
 
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.AugmentedLagrangian(1e-2, 1e3, adaptive=True)], ids=repr)
+def test_a_flight_out_of_a_tip_is_refused(method):
+    """No normal says how it is reflected: it took 10 000 impacts, and stayed with the velocity that it had."""
+    scene = swarm.Scene([swarm.Cone(0.5)])
+    start = swarm.Particles(np.zeros((3, 2)), [[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])
+    with pytest.raises(swarm.SceneError, match=r"particle 1 at \(0.0, 0.0, 0.0\), a tip of surfaces\[0\] \(Cone\)"):
+        swarm.simulate(scene, start, method, until=1.0, compile="never")
+    inwards = swarm.Particles((0.0, 0.0, 0.0), (0.0, 0.1, 1.0))
+    end = swarm.simulate(scene, inwards, method, until=0.5, compile="never")
+    assert end.particles.position[:, 0] == pytest.approx([0.0, 0.05, 0.5], abs=1e-12)
+
+
 def test_a_phi_that_is_no_number_is_outside():
     wall = swarm.Formula("x**2 + y**2 + z**2 - 0.25 + log(z + 0.4)/1e3", bounds=((-0.6, -0.6, -0.39), (0.6, 0.6, 0.6)))
     start = swarm.Particles([[0.0], [0.0], [-0.41]], np.ones((3, 1)))

@@ -12,12 +12,16 @@ from ..motion.given import require_angles
 from ..output.origin import require_near
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.fields.many import Many
 from ..surfaces.formulas.own import require_compiled
+from ..surfaces.instant import gaps_of
 from . import passing, workload
 from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
+# Of the size of a scene, a place ahead that tells on which side of a wall a flight begins.
+_NEAR = 1e-6
 # A time this many runs ago leaves float64 a ten-thousandth of the run.
 _LONG_AGO = 1e12
 # Images beyond this are no whole numbers of floats, which files and `Particles` hold.
@@ -61,6 +65,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     method.span("every", times.every)
     _require_motions(scene, times.until)
     _require_inside(scene, particles)
+    _require_normals(scene, particles)
     workload.check(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
 
@@ -265,6 +270,26 @@ def _require_inside(scene: Scene, particles: Particles) -> None:
             f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
             f"({type(scene.surfaces[wall]).__name__}){when}"
         )
+
+
+def _require_normals(scene: Scene, particles: Particles) -> None:
+    """Raise a `SceneError` for a flight out of the tip of a wall, where no normal says how it is reflected."""
+    for i, surface in enumerate(scene.surfaces):
+        if isinstance(surface, Many) or surface.motion is not None:
+            continue
+        on_wall = np.flatnonzero(surface.phi(particles.position) == 0.0)
+        tips = on_wall[(surface.gradient(particles.position[:, on_wall]) == 0.0).all(axis=0)]
+        r, v = particles.position[:, tips], particles.velocity[:, tips]
+        speed = np.sqrt((v**2).sum(axis=0))
+        ahead = r + v * (_NEAR * scene.finite_size() / np.where(speed > 0.0, speed, 1.0))
+        lost = np.flatnonzero((speed > 0.0) & (gaps_of((surface,), ahead, 0.0)[0] > 0.0))
+        if lost.size:
+            k = int(lost[0])
+            raise SceneError(
+                f"particles must not fly out of a tip of their walls, where phi has no gradient, got particle "
+                f"{tips[k]} at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the "
+                f"velocity {tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
+            )
 
 
 def _magnitude(scene: Scene, particles: Particles) -> float:
