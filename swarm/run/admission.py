@@ -12,16 +12,18 @@ from ..motion.given import require_angles
 from ..output.origin import require_near
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.fields.many import Many
 from ..surfaces.formulas.own import require_compiled
-from ..surfaces.instant import gaps_of
+from ..surfaces.instant import gaps_of, gradient_of
+from ..surfaces.shapes.cone import Cone
+from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
 from .options import RunOptions, Task
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
-# Of the size of a scene, a place ahead that tells on which side of a wall a flight begins.
-_NEAR = 1e-6
+# Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
+# outside it is where it begins in a tip.
+_NEAR, _TIP = 1e-6, 1e-2
 # A time this many runs ago leaves float64 a ten-thousandth of the run.
 _LONG_AGO = 1e12
 # Images beyond this are no whole numbers of floats, which files and `Particles` hold.
@@ -273,22 +275,25 @@ def _require_inside(scene: Scene, particles: Particles) -> None:
 
 
 def _require_normals(scene: Scene, particles: Particles) -> None:
-    """Raise a `SceneError` for a flight out of the tip of a wall, where no normal says how it is reflected."""
+    """Raise a `SceneError` for a flight out of the tip of a cone, where no normal says how it is reflected."""
+    step = _NEAR * scene.finite_size()
     for i, surface in enumerate(scene.surfaces):
-        if isinstance(surface, Many) or surface.motion is not None:
+        if not isinstance(surface, (Cone, Quadric)) or surface.motion is not None:
             continue
         on_wall = np.flatnonzero(surface.phi(particles.position) == 0.0)
-        tips = on_wall[(surface.gradient(particles.position[:, on_wall]) == 0.0).all(axis=0)]
-        r, v = particles.position[:, tips], particles.velocity[:, tips]
+        r, v = particles.position[:, on_wall], particles.velocity[:, on_wall]
         speed = np.sqrt((v**2).sum(axis=0))
-        ahead = r + v * (_NEAR * scene.finite_size() / np.where(speed > 0.0, speed, 1.0))
-        lost = np.flatnonzero((speed > 0.0) & (gaps_of((surface,), ahead, 0.0)[0] > 0.0))
+        ahead = r + v * (step / np.where(speed > 0.0, speed, 1.0))
+        # Where there is a normal, what does not fly against it comes outside by a square of the way.
+        against = (gradient_of((surface,), r) * v).sum(axis=0) > 0.0
+        slope = np.sqrt((surface.gradient(ahead) ** 2).sum(axis=0))
+        lost = np.flatnonzero((speed > 0.0) & ~against & (gaps_of((surface,), ahead, 0.0)[0] > _TIP * step * slope))
         if lost.size:
             k = int(lost[0])
             raise SceneError(
-                f"particles must not fly out of a tip of their walls, where phi has no gradient, got particle "
-                f"{tips[k]} at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the "
-                f"velocity {tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
+                f"particles must not fly out of a tip of their walls, which has no normal, got particle {on_wall[k]} "
+                f"at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the velocity "
+                f"{tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
             )
 
 
