@@ -520,7 +520,7 @@ def test_nothing_else_is_in_kernels():
 def test_no_argument_of_a_kernel_is_of_another_type(name, method):
     scene = scene_of(name)
     start = swarm.Particles(np.zeros(3), np.zeros(3))
-    for _kernel, arguments in Run(scene, start, method, 1, None, "never")._calls():
+    for _kernel, arguments in Run(scene, start, method, 1, None, "never").calls():
         for kind in kinds_of(arguments):
             assert kind is tuple or in_kernels(Path(inspect.getfile(sys.modules[kind.__module__]))), kind
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from passes import bounded
+from bounded import bounded
 
 import swarm
 

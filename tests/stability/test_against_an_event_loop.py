@@ -4,7 +4,7 @@ no contact lasts each particle is where a plain event loop has it.
 
 import numpy as np
 import pytest
-from passes import bounded
+from bounded import bounded
 from physics.event_loop import follow
 
 import swarm
@@ -12,7 +12,7 @@ import swarm
 UNTIL, FRAMES, NUMBER = 1.0, 8, 4
 # Coarse steps while it slides: the event loop says nothing of those.
 METHOD = swarm.Impact(sliding_tolerance=1e-7)
-# Passes of all kernels in one run; most take some hundreds at most.
+# Passes of all kernels in one run; most take a dozen, sliding ones hundreds.
 PASSES = 5_000
 # Of the ring that takes minutes.
 SEEDS = range(16)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from passes import bounded
+from bounded import bounded
 
 import swarm
 
