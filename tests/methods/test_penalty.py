@@ -59,6 +59,20 @@ def test_a_step_conserves_energy(name, exponent, point, velocity, depth, mass, s
     assert before.left == 0.0
 
 
+@pytest.mark.parametrize("pull", [None, (0.0, 0.0, 1.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", ["torus", "capsule", "sphere", "ellipsoid"])
+def test_deep_in_a_soft_wall(name, pull):
+    """As far outside as the cavity is thick it is held all the same: a torus let go of it there."""
+    scene, mass = scene_of(name, gravity=pull), 1e-3
+    method = swarm.Penalty(dt=0.02, penalty=0.0025 * mass / 0.02**2, exponent=1.5)
+    wall = wall_point(numbers_of(name), np.array([0.0, 1.0, 0.0]))
+    before, *passes = run(method, scene, 0.99 * wall, [0.0, 1.0, 0.0], 40.0, mass, restores=False)
+    first = energy_of(method, scene, before.position, before.velocity, mass)
+    assert max(scene.gaps(after.position[:, None]).max() for after in passes) > 0.1
+    for after in passes:
+        assert energy_of(method, scene, after.position, after.velocity, mass) == pytest.approx(first, rel=1e-10)
+
+
 @exponents
 def test_round_off_does_not_add_up(exponent):
     """In a stiff wall each step is off by round-off of its gap; every contact restores the energy of the start."""

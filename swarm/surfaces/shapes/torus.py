@@ -208,14 +208,15 @@ def _(gravity, surface, r, v):
 
 @inlined
 def _ball(surface, d2):
-    """Whether a point is outside of a ball around the torus, and the square radius of one that is nearer to it.
+    """Whether a solid is within a ball that a point is outside of, and the square radius of one that is nearer to it.
 
-    To that ball the level is a quartic, or a parabola.
+    To that ball the level is a quartic, or a parabola. Outside of it a cavity is not admissible, where soft walls let
+    a particle be.
     """
     wide2 = surface.major + surface.radius
     wide2 = wide2 * wide2
     ball2 = select(d2 > _AFAR * wide2, d2 * (1.0 / _AFAR), _NEARER * wide2)
-    return d2 > _OUTER * wide2, ball2
+    return (surface.side < 0.0) & (d2 > _OUTER * wide2), ball2
 
 
 @contract.bend.register(TorusNumbers)
