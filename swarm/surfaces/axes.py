@@ -173,14 +173,12 @@ time_far.register(Nothing, lambda length, x, v, pull: math.inf)
 
 
 @by_type
-def is_short(length, v, pull, t, late):
-    """Whether it makes no odds that a flight over a time t ends later by so little."""
-    return True
+def room_along(length):
+    """How much farther along an axis a flight may end for the sake of its time."""
+    return math.inf
 
 
-@is_short.register(float)
-def _(length, v, pull, t, late):
-    return fastest(pull, v, t) * late <= _LATER * length
+room_along.register(float, lambda length: _LATER * length)
 
 
 @by_type
@@ -220,3 +218,10 @@ def least(x, y, z):
     """The least of three."""
     first = select(x < y, x, y)
     return select(first < z, first, z)
+
+
+@inlined
+def most(x, y, z):
+    """The greatest of three."""
+    first = select(x > y, x, y)
+    return select(first > z, first, z)

@@ -22,8 +22,9 @@ from .axes import (
     is_beyond_face,
     is_free,
     is_out,
-    is_short,
     least,
+    most,
+    room_along,
     time_to_leave,
 )  # fmt: skip
 from .flights import Hit
@@ -115,12 +116,18 @@ def _(period, gravity, motion, left, hit):
     # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
     # ends a little later, after a time that leaves exactly what it is rounded to.
     exact = left - (left - (first + late))
-    short = is_short(period.x, v.x, along_x(gravity), first, late)
-    short &= is_short(period.y, v.y, along_y(gravity), first, late)
-    short &= is_short(period.z, v.z, along_z(gravity), first, late)
+    room = least(room_along(period.x), room_along(period.y), room_along(period.z))
+    short = _fastest(gravity, v, first) * late <= room
     time = select(short, exact, first)
     leaves = time < hit.time
     return Hit(select(leaves, time, hit.time), select(leaves, -1.0, hit.wall))
+
+
+@inlined
+def _fastest(gravity, v, t):
+    """The greatest speed along an axis, which is not exceeded within a time t."""
+    x, y = fastest(along_x(gravity), v.x, t), fastest(along_y(gravity), v.y, t)
+    return most(x, y, fastest(along_z(gravity), v.z, t))
 
 
 @by_type
@@ -138,9 +145,7 @@ def _(period, gravity, motion, left, time, room):
     # As in `cut`: cells of a grid are as many as faces.
     late = _EPSILON * left
     exact = left - (left - (time + late))
-    short = 2.0 * fastest(along_x(gravity), v.x, time) * late <= room.x
-    short &= 2.0 * fastest(along_y(gravity), v.y, time) * late <= room.y
-    short &= 2.0 * fastest(along_z(gravity), v.z, time) * late <= room.z
+    short = 2.0 * _fastest(gravity, v, time) * late <= least(room.x, room.y, room.z)
     return longer(period.gaps, period, gravity, motion, (select(short, exact, time), 2.0 * late))
 
 
