@@ -252,32 +252,32 @@ def _(method, chain, gravity, lane, hit):
 
 
 @by_type
-def _slow2(laws, method, lane):
-    """The square of twice the speed away from a wall below which a contact may last."""
-    return lane.own.slow * lane.own.slow
+def _is_within(laws, method, lane, speed, part):
+    """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last."""
+    return speed <= part * lane.own.slow
 
 
-@_slow2.register(wall_laws.Laws)
-def _(laws, method, lane):
+@_is_within.register(wall_laws.Laws)
+def _(laws, method, lane, speed, part):
     # By the velocity with which it comes: such walls change that. One of both is 0.
     speed2 = (square(lane.v) + method.fall2) / (method.size * method.size)
     by_time, by_length = method.shortest_flight * method.size * speed2, method.shortest_length
-    return by_time * by_time + by_length * by_length * speed2
+    return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
 
 
 @contract.contact.register(Reflection)
 def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
-    impulse, slow2 = select(hit, bounce.impulse, 0.0), _slow2(method.laws, method, lane)
+    impulse = select(hit, bounce.impulse, 0.0)
     contact = contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
         wall,
         impulse,
-        select(impulse * impulse > (_NO_IMPACT * _NO_IMPACT) * slow2, 1.0, 0.0),
+        select(_is_within(method.laws, method, lane, impulse, _NO_IMPACT), 0.0, 1.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
-        hit & (bounce.twice_away * bounce.twice_away <= slow2),
+        hit & _is_within(method.laws, method, lane, bounce.twice_away, 1.0),
     )
     return contract.worked(wall_laws.moving(method.laws), contact, select(hit, 0.5 * bounce.work, 0.0))
