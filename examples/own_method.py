@@ -36,7 +36,7 @@ class MirrorNumbers(NamedTuple):
 
 
 @contract.constants.register(MirrorNumbers)
-def _(method, mass, energy, v):
+def _(method, mass, energy, scale2):
     return 0.0, 0.0, 0.0
 
 

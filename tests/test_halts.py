@@ -273,7 +273,7 @@ def noted(*about):
 stay._clear = noted
 floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.9, motion=swarm.Oscillation((0.01, 0.0, 0.0), 0.5))
 start = swarm.Particles([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
-report(swarm.Scene([floor], (0.0, 0.0, -9.81)), start, swarm.Impact(), until=1e9, compile="never")
+report(swarm.Scene([floor], (0.0, 0.0, -9.81)), start, swarm.Impact(), until=1e8, compile="never")
 """
 SCRIPTS = {"closing": CLOSING, "resting": RESTING, "collapse": COLLAPSE, "leases": LEASES, "chain": CHAIN}
 
