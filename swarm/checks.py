@@ -178,14 +178,15 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         if given.dtype.kind not in "iufO":
             raise TypeError
         # A view of one number may say that it has any shape: nothing of that size is copied.
-        if _DOUBLE * given.size > memory():
-            raise SceneError(
-                f"{name} must fit in memory, got shape {given.shape}; this machine has {in_bytes(memory())}"
-            )
-        return given.astype(np.float64, copy=False)
+        if _DOUBLE * given.size <= memory():
+            return given.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
         raise SceneError(f"{name} must be an array of numbers, got {came}") from None
+    raise SceneError(
+        f"{name} must fit in memory, got shape {given.shape}, which takes {in_bytes(_DOUBLE * given.size)}; this "
+        f"machine has {in_bytes(memory())}"
+    )
 
 
 def no_radius(value: Any) -> None:

@@ -23,16 +23,18 @@ def balls(name: str, value: ArrayLike) -> Floats:
 
 def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:
     """`value` as points (n, 3), one a body, which takes so many bytes."""
+    # With the grid they take more than the numbers themselves, which are looked at then.
+    many = len(value) if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim) else 0
+    if many > _FEW and each * many > memory():
+        raise SceneError(
+            f"{name} must fit in memory with the grid of their cells, got {many:.6g} bodies, which take "
+            f"{in_bytes(each * many)}; this machine has {in_bytes(memory())}"
+        )
     rows = array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise SceneError(f"{name} must have shape (n, 3), one row a body, got {rows.shape}")
     if not len(rows):
         raise SceneError(f"{name} must have at least one row, got none")
-    if len(rows) > _FEW and each * len(rows) > memory():
-        raise SceneError(
-            f"{name} must fit in memory with the grid of their cells, got {len(rows):.6g} bodies, which take "
-            f"{in_bytes(each * len(rows))}; this machine has {in_bytes(memory())}"
-        )
     bad = np.flatnonzero(~(np.abs(rows) <= LARGEST).all(axis=1))
     if bad.size:
         raise SceneError(f"{name}[{bad[0]}] must be three finite numbers, got {tuple(rows[bad[0]].tolist())}")
