@@ -18,14 +18,14 @@ import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
-from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
+from numba.extending import intrinsic, lower_builtin, overload, type_callable
 from numba.np import linalg as blas
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
-from . import cache
-from .entries import python_class
+from . import cache, trace
 from .frozen import registered
+from .helpers import prepare
 from .parts import KernelCompiler, PartCompiler
 
 Array = NDArray[np.generic]
@@ -75,13 +75,13 @@ def kernel(function: F) -> F:
 
 def outlined(function: F) -> F:
     """Compile a helper that is rare and long: inlining it would only cost compile time."""
-    register_jitable(**_OUTLINE)(function)
+    prepare(function, _OUTLINE, outlined=True)
     return function
 
 
 def inlined(function: F) -> F:
     """Compile a helper that is always inlined into the kernel that calls it, so that its loop vectorises."""
-    register_jitable(**_INLINE)(function)
+    prepare(function, _INLINE, outlined=False)
     return function
 
 
@@ -136,11 +136,7 @@ def _dispatched(function: Callable[..., Any], options: Any) -> Any:
 
     generic.register, generic.implies = register, implies
 
-    @functools.wraps(function)
-    def chosen(*args: Any) -> Any:
-        return generic.dispatch(python_class(args[0]))
-
-    overload(generic, jit_options=options)(chosen)
+    prepare(generic, options, options is _OUTLINE, generic.dispatch)
     return generic
 
 
@@ -156,6 +152,17 @@ def select(condition: Any, first: Any, second: Any) -> Any:
     58 ns an impact instead of 17).
     """
     return first if condition else second
+
+
+def _traced_select(condition: Any, first: Any, second: Any) -> Any:
+    if not trace.has_value((condition, first, second)):
+        return first if condition else second
+    if isinstance(first, tuple):
+        return trace.made_of(first, [_traced_select(condition, a, b) for a, b in zip(first, second, strict=True)])
+    return first if first is second or first is None else trace.noted(select, condition, first, second)
+
+
+trace.REPLACED[select] = _traced_select
 
 
 @type_callable(select)
@@ -179,6 +186,8 @@ def spaced(stride: int) -> Callable[[Any], Any]:
 
     def known(tables: Any) -> Any:
         return tables
+
+    trace.operation(known)
 
     @type_callable(known)
     def _type_of_tables(_context):
@@ -212,6 +221,9 @@ def scratch(shape: Any, dtype: Any) -> Any:
 def unwritten(shape: Any, dtype: Any) -> Any:
     """`scratch` that holds anything, for what is written first: zeros in 20 rows of lanes cost a lane 1 ns a pass."""
     return np.zeros(shape, dtype)
+
+
+trace.INTRINSIC.update((scratch, unwritten))
 
 
 @type_callable(scratch)
@@ -256,6 +268,9 @@ def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     target[int(i), :count] = source[int(m), :count]
 
 
+trace.operation(copy_row)
+
+
 @type_callable(copy_row)
 def _type_of_copy_row(_context):
     return lambda target, i, source, m, count: types.none
@@ -284,6 +299,9 @@ def next_of(ticket: Any) -> int:
         return int(ticket[0]) - 1
 
 
+trace.operation(next_of)
+
+
 @intrinsic  # type: ignore[call-arg]
 def _next_of(_typing, ticket):
     def emit(context, builder, signature, args):
@@ -308,6 +326,9 @@ def index(value: Any) -> Any:
     nothing that may count from the end (in a box that is carried along 29 instead of 9.5 ns an impact).
     """
     return value
+
+
+trace.operation(index)
 
 
 @type_callable(index)

@@ -1,0 +1,169 @@
+"""The notes of a trace as instructions of LLVM, each operation by Numba's own lowering."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+
+from . import trace
+from .trace import Argument, Assign, Attribute, Branch, Call, Jump, Label, Load, Part, PartCall, Slot, Value
+
+
+def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
+    """The result of a part that is written out where the builder is."""
+    writer = _Writer(context, builder, dict(zip(part.arguments, given, strict=True)))
+    writer.emit(part.notes)
+    return writer.value(part.result)
+
+
+class _Writer:
+    """Where notes are emitted: the values and the places that are known here."""
+
+    def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
+        self._context, self._builder, self._values = context, builder, values
+        self._parts: dict[Any, Any] = {}  # of tuples, in this block
+        self._blocks: dict[Label, Any] = {}
+        self._slots: dict[Slot, Any] = {}
+        self._functions: dict[Any, Any] = {}
+
+    def emit(self, notes: list[Any]) -> None:
+        """Emit notes in their order; what is behind the end of a way is left out."""
+        for note in notes:
+            if isinstance(note, Label):
+                self._enter(note)
+            elif not self._builder.block.is_terminated:
+                self._WAYS[type(note)](self, note)
+
+    def value(self, given: Any) -> Any:
+        """The value in LLVM of a constant, a proxy, or a record of them."""
+        if isinstance(given, Value):
+            return self._part(given.note, given.path)
+        if given is None:
+            return self._context.get_dummy_value()
+        kind = trace.kind_of(given)
+        if isinstance(kind, types.BaseTuple):
+            parts = [self.cast(*pair) for pair in zip(given, kind.types, strict=True)]  # type: ignore[attr-defined]
+            return self._context.make_tuple(self._builder, kind, parts)
+        if isinstance(kind, (types.NumberClass, types.Function, types.Dispatcher)):
+            return self._context.get_dummy_value()
+        constant = given.item() if isinstance(kind, (types.Number, types.Boolean)) and hasattr(given, "item") else given
+        return self._context.get_constant_generic(self._builder, kind, constant)
+
+    def cast(self, given: Any, kind: Any) -> Any:
+        """The same as another type."""
+        have = trace.kind_of(given)
+        return self.value(given) if have == kind else self._context.cast(self._builder, self.value(given), have, kind)
+
+    def _part(self, note: Any, path: tuple[int, ...]) -> Any:
+        if not path:
+            return self._values[note]
+        found = self._parts.get((note, path))
+        if found is None:
+            found = self._builder.extract_value(self._part(note, path[:-1]), path[-1])
+            self._parts[note, path] = found
+        return found
+
+    # --- Notes ---
+
+    def _enter(self, label: Label) -> None:
+        block = self._block(label)
+        if not self._builder.block.is_terminated:
+            self._builder.branch(block)
+        self._builder.position_at_end(block)
+        # A part that was taken from a tuple on one way is not known on another.
+        self._parts = {}
+
+    def _block(self, label: Label) -> Any:
+        if label not in self._blocks:
+            self._blocks[label] = self._builder.append_basic_block("way")
+        return self._blocks[label]
+
+    def _slot(self, slot: Slot) -> Any:
+        if slot not in self._slots:
+            kind = self._context.get_value_type(slot.kind)
+            self._slots[slot] = cgutils.alloca_once(self._builder, kind)
+        return self._slots[slot]
+
+    def _call(self, note: Call) -> None:
+        found, given = note.signature, note.given
+        key = note.symbol, found
+        function = self._functions.get(key)
+        if function is None:
+            function = self._functions[key] = self._context.get_function(note.symbol, found)
+        kinds, star = found.args, ()
+        if kinds and isinstance(kinds[-1], (types.StarArgTuple, types.StarArgUniTuple)):
+            *kinds, last = kinds
+            star = [last]
+        values = [self.cast(v, kind) for v, kind in zip(given, kinds, strict=not star)]
+        for kind in star:
+            rest = [self.cast(*pair) for pair in zip(given[len(kinds) :], kind.types, strict=True)]
+            values.append(self._context.make_tuple(self._builder, kind, rest))
+        self._values[note] = function(self._builder, values)
+
+    def _attribute(self, note: Attribute) -> None:
+        get = self._context.get_getattr(note.of.kind, note.name)
+        self._values[note] = get(self._context, self._builder, note.of.kind, self.value(note.of), note.name)
+
+    def _assign(self, note: Assign) -> None:
+        # All values before all stores: a value may be another variable's.
+        for place, value in [(self._slot(slot), self.cast(value, slot.kind)) for slot, value in note.pairs]:
+            self._builder.store(value, place)
+
+    def _load(self, note: Load) -> None:
+        self._values[note] = self._builder.load(self._slot(note.slot))
+
+    def _jump(self, note: Jump) -> None:
+        self._builder.branch(self._block(note.to))
+
+    def _branch(self, note: Branch) -> None:
+        self._builder.cbranch(self.value(note.condition), self._block(note.first), self._block(note.second))
+
+    def _call_part(self, note: PartCall) -> None:
+        part, builder, context = note.part, self._builder, self._context
+        function, kind = _function_of(context, builder.module, part)
+        place = cgutils.alloca_once(builder, kind)
+        given = [self.value(v) for v in note.given]
+        status = builder.call(function, [place, context.call_conv._get_excinfo_argument(builder.function), *given])
+        failed = builder.icmp_unsigned("!=", status, ir.Constant(status.type, 0))
+        with cgutils.if_unlikely(builder, failed):
+            builder.ret(status)
+        self._parts = {}
+        self._values[note] = builder.load(place)
+
+    _WAYS = {
+        Call: _call,
+        Attribute: _attribute,
+        Assign: _assign,
+        Load: _load,
+        Jump: _jump,
+        Branch: _branch,
+        PartCall: _call_part,
+    }
+
+
+def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
+    """The function of a part in a module, and the type of what it gives.
+
+    It takes the places of its result and of an error first, as Numba's functions do: what Numba compiled may be called
+    in it.
+    """
+    name = f"traced.{part.name}.{part.number}"
+    result = ir.LiteralStructType([context.get_value_type(one.kind) for one in part.numbers])
+    function = module.globals.get(name)
+    if function is not None:
+        return function, result
+    status, (_place, error) = context.call_conv.get_function_type(types.none, ()).return_type, (
+        context.call_conv.get_function_type(types.none, ()).args[:2]
+    )
+    kinds = [context.get_value_type(one.kind) for one in part.arguments]
+    function = ir.Function(module, ir.FunctionType(status, [result.as_pointer(), error, *kinds]), name)
+    function.linkage = "internal"
+    function.attributes.add("alwaysinline" if part.inlined else "noinline")
+    builder = ir.IRBuilder(function.append_basic_block("entry"))
+    writer = _Writer(context, builder, dict(zip(part.arguments, function.args[2:], strict=True)))
+    writer.emit(part.notes)
+    for k, one in enumerate(part.numbers):
+        builder.store(writer.value(one), cgutils.gep_inbounds(builder, function.args[0], 0, k))
+    builder.ret(ir.Constant(status, 0))
+    return function, result

@@ -1,0 +1,180 @@
+"""Helpers for Numba and for traces: each is traced into the kernel that calls it; what cannot be is compiled by Numba."""
+
+import functools
+import inspect
+import logging
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import types
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.typing import signature
+from numba.core.typing.templates import infer, infer_global, make_overload_template
+from numba.extending import lower_builtin
+
+from . import trace
+from .emit import emit
+from .entries import python_class
+from .trace import Argument, Frame, NotTraceable, Part, Real, Value
+from .twins import twin_of
+
+_LOG = logging.getLogger("swarm.trace")
+_HERE = Path(__file__).parent
+# Why helpers are compiled by Numba, by their names.
+left_to_numba: dict[str, str] = {}
+
+# What Python says where a proxy is none of what a function expects.
+_FAILURES = (NotTraceable, TypeError, AttributeError, ValueError, IndexError, NotImplementedError)
+
+Choose = Callable[[Any], Any]
+
+
+class Helper:
+    """A function, or a family of them that is chosen by the class of the first argument, for kernels.
+
+    Args:
+        function: what Python calls.
+        choose: gives the definition for a class.
+        outlined: a function of its own in a kernel, called and not inlined.
+    """
+
+    def __init__(self, function: Any, choose: Choose, outlined: bool) -> None:
+        self._function, self._choose, self._outlined = function, choose, outlined
+        self.signature = inspect.signature(function)
+        self.name: str = function.__name__
+        self._parts: dict[Any, Part | None] = {}
+        self._whole: dict[Any, Part | None] = {}
+
+    def called(self, *given: Any, **named: Any) -> Any:
+        """What a call of it gives, in a trace."""
+        if named or len(given) < len(self.signature.parameters):
+            bound = self.signature.bind(*given, **named)
+            bound.apply_defaults()
+            given = bound.args
+        if not self._outlined:
+            return self._inlined(given)
+        part = self._part(given)
+        return trace.noted(self._function, *given) if part is None else part.called(given)
+
+    def whole(self, context: Any, kinds: tuple[Any, ...]) -> Part | None:
+        """It as Numba calls it, for arguments of these types, or None where it cannot be traced."""
+        if kinds not in self._whole:
+            self._whole[kinds] = None
+            part = Part(self.name, inlined=True)
+            part.arguments = [Argument(kind, k) for k, kind in enumerate(kinds)]
+            with trace.noting(part.notes, context):
+                given = tuple(trace.opened(one.kind, one) for one in part.arguments)
+                try:
+                    if self._outlined:
+                        outlined = self._part(given)
+                        if outlined is None:
+                            return None
+                        part.result = outlined.called(given)
+                    else:
+                        part.result = self._run(given)
+                    part.kind = trace.kind_of(part.result)
+                    self._whole[kinds] = part
+                except _FAILURES as error:
+                    self._leave(error)
+        return self._whole[kinds]
+
+    def known(self, kinds: tuple[Any, ...]) -> Part | None:
+        """What `whole` has found."""
+        return self._whole.get(kinds)
+
+    def _part(self, given: Any) -> Part | None:
+        """It as a part for such arguments, or None where it cannot be traced."""
+        key = trace.key_of(given)
+        if key not in self._parts:
+            self._parts[key] = None
+            part = Part(self.name, inlined=False)
+            with trace.noting(part.notes):
+                try:
+                    part.give(self._run(part.take(given)))
+                    self._parts[key] = part
+                except _FAILURES as error:
+                    self._leave(error)
+        return self._parts[key]
+
+    def _inlined(self, given: Any) -> Any:
+        notes = trace.notes()
+        mark = len(notes)
+        try:
+            return self._run(given)
+        except _FAILURES as error:
+            del notes[mark:]
+            self._leave(error)
+            return trace.noted(self._function, *given)
+
+    def _run(self, given: Any) -> Any:
+        definition, frame = self._choose(_class_of(given[0]) if given else object), Frame()
+        twin = twin_of(definition, frame)
+        if twin is None:
+            return definition(*given)
+        twin(*given)
+        return frame.result()
+
+    def _leave(self, error: Exception) -> None:
+        left_to_numba.setdefault(self.name, f"{type(error).__name__}: {error} ({_place_of(error)})")
+        _LOG.debug("%s is compiled by Numba: %s", self.name, error, exc_info=error)
+
+
+def _place_of(error: Exception) -> str:
+    """The line of a helper that an error is about."""
+    frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else "no line"
+
+
+def _class_of(given: Any) -> Any:
+    """The class by which a definition is chosen: that of the value in plain Python."""
+    if isinstance(given, Value):
+        return float if isinstance(given, Real) else object
+    return type(given)
+
+
+def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None = None) -> None:
+    """Let traces and Numba call a helper; `choose` gives the definitions of a family."""
+    helper = Helper(function, choose or (lambda made: function), outlined)
+    trace.REPLACED[function] = helper.called
+    key = ("traced", function.__module__, helper.name, id(function))
+    base: Any = make_overload_template(function, _definition(function, choose), options, choose is not None, "never")
+
+    class Template(base):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            kinds = tuple(map(types.unliteral, args))
+            if not kws and len(kinds) == len(helper.signature.parameters) and all(map(_is_open, kinds)):
+                part = helper.whole(self.context, kinds)
+                if part is not None:
+                    return signature(part.kind, *kinds)
+            return super().generic(args, kws)
+
+        def get_impl_key(self, sig: Any) -> Any:
+            return super().get_impl_key(sig) if helper.known(sig.args) is None else key
+
+    Template.__name__ = base.__name__
+    infer(Template)
+    infer_global(function, types.Function(Template))
+
+    @lower_builtin(key, types.VarArg(types.Any))
+    def _emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        result = emit(context, builder, helper.known(sig.args), args)
+        return impl_ret_borrowed(context, builder, sig.return_type, result)
+
+
+def _definition(function: Any, choose: Choose | None) -> Any:
+    """What Numba asks for the function to compile, for the types of arguments."""
+
+    @functools.wraps(function)
+    def compiled(*kinds: Any, **named: Any) -> Any:
+        return function if choose is None else choose(python_class(kinds[0]))
+
+    return compiled
+
+
+def _is_open(kind: Any) -> bool:
+    """Whether values of a type are known in a trace."""
+    if isinstance(kind, types.BaseTuple):
+        return all(map(_is_open, kind.types))  # type: ignore[attr-defined]
+    return isinstance(kind, (types.Number, types.Boolean, types.NoneType, types.Array, types.NumberClass))

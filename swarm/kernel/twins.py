@@ -1,0 +1,357 @@
+"""Twins of functions for traces: the same statements, whose control flow and calls go through a `Frame`.
+
+    if x > 0.0:          def then():
+        y = x                nonlocal y
+    else:                    y = x
+        y = f(x)             return frame.NEXT
+                         ...
+                         if frame.branch(x > 0.0, then, other, get, put) is not frame.NEXT:
+                             return False
+
+The twin has the globals and the cells of the function, so that names mean what they mean there, and its line numbers.
+"""
+
+import ast
+import copy
+import functools
+import itertools
+import linecache
+import types
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from .trace import UNDEFINED, Frame, NotTraceable
+
+# A name of its own: the function's name in the twin is that of its globals.
+_FRAME, _TWIN = "_frame", "_twin"
+_OWN = str(Path(__file__).parents[1])
+
+
+def twin_of(function: Any, frame: Frame) -> Callable[..., Any] | None:
+    """The twin of a function for one call of it; None where its source is not known.
+
+    Raises:
+        NotTraceable: it has a statement that no kernel has.
+    """
+    factory = _factory(function.__code__)
+    if factory is None:
+        return None
+    make = types.FunctionType(factory, function.__globals__)
+    cells = [_content(cell) for cell in function.__closure__ or ()]
+    twin: Any = make(frame, *cells)
+    twin.__defaults__, twin.__kwdefaults__ = function.__defaults__, function.__kwdefaults__
+    return twin  # type: ignore[no-any-return]
+
+
+def _content(cell: Any) -> Any:
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return UNDEFINED
+
+
+@functools.cache
+def _factory(code: types.CodeType) -> types.CodeType | None:
+    """The code of a function (frame, cells) that gives the twin."""
+    node = _node_of(code)
+    if node is None:
+        return None
+    made = _Writer(copy.deepcopy(node), code).written()
+    return _compiled(made, code)
+
+
+def _compiled(node: Any, code: types.CodeType) -> types.CodeType:
+    """A function inside one of its frame and its free variables."""
+    names = [_FRAME, *code.co_freevars]
+    arguments = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+    result = ast.Return(ast.Name(node.name, ast.Load()))
+    outer = _function("make", arguments, [node, result])
+    tree = ast.fix_missing_locations(ast.Module([ast.copy_location(outer, node)], []))
+    whole = compile(tree, code.co_filename, "exec", dont_inherit=True)
+    return _inner(whole)
+
+
+# --- The source of a function ----------------------------------------------------------------------------
+
+
+def _node_of(code: types.CodeType) -> Any:
+    """The syntax of a function, or None where its file is not known or no longer has it."""
+    found = _functions(code.co_filename).get((code.co_firstlineno, code.co_name), [])
+    for node in found:
+        is_lambda = isinstance(node, ast.Lambda)
+        body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
+        given = ast.copy_location(_function(_TWIN, node.args, body), node)
+        if len(found) == 1 or _told(_inner(_compiled(given, code))) == _told(code):
+            return given if _is_as_written(code) else None
+    return None
+
+
+def _inner(code: types.CodeType) -> types.CodeType:
+    return next(one for one in code.co_consts if isinstance(one, types.CodeType))
+
+
+def _told(code: types.CodeType) -> Any:
+    """What tells two functions of one line apart; code itself depends on what the file imports."""
+    return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
+
+
+def _is_as_written(code: types.CodeType) -> bool:
+    """Whether the file of a function still has this code: a user may edit it while a session goes on."""
+    return code.co_filename.startswith(_OWN) or code in _codes(code.co_filename)
+
+
+@functools.cache
+def _codes(file: str) -> set[types.CodeType]:
+    found = [compile("".join(linecache.getlines(file)), file, "exec", dont_inherit=True)]
+    for code in found:
+        found.extend(one for one in code.co_consts if isinstance(one, types.CodeType))
+    return set(found)
+
+
+@functools.lru_cache(maxsize=None)
+def _functions(file: str) -> dict[tuple[int, str], list[Any]]:
+    """The functions of a file, by their first line and their name."""
+    try:
+        tree = ast.parse("".join(linecache.getlines(file)))
+    except SyntaxError:
+        return {}
+    found: dict[tuple[int, str], list[Any]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(one.lineno for one in node.decorator_list)])
+            found.setdefault((first, node.name), []).append(node)
+        elif isinstance(node, ast.Lambda):
+            found.setdefault((node.lineno, "<lambda>"), []).append(node)
+    return found
+
+
+# --- The twin --------------------------------------------------------------------------------------------
+
+
+def _assigned(statements: Any) -> list[str]:
+    """The names that statements assign, in their order."""
+    names: dict[str, None] = {}
+    for statement in statements:
+        for node in _inside(statement):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names[node.id] = None
+            elif isinstance(node, ast.FunctionDef):
+                names[node.name] = None
+    return list(names)
+
+
+def _inside(node: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a statement, without those of functions in it."""
+    yield node
+    if isinstance(node, (ast.FunctionDef, ast.Lambda, ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp)):
+        return
+    for child in ast.iter_child_nodes(node):
+        yield from _inside(child)
+
+
+def _leaves(statements: Any) -> bool:
+    """Whether a loop with these statements has `break` or `continue`."""
+    for node in statements:
+        if isinstance(node, (ast.Break, ast.Continue)):
+            return True
+        if not isinstance(node, (ast.For, ast.While, ast.FunctionDef)) and _leaves(ast.iter_child_nodes(node)):
+            return True
+    return False
+
+
+def _load(name: str) -> ast.Name:
+    return ast.Name(name, ast.Load())
+
+
+def _of_frame(name: str, *given: ast.expr) -> ast.Call:
+    return ast.Call(ast.Attribute(_load(_FRAME), name, ast.Load()), list(given), [])
+
+
+def _function(name: str, arguments: ast.arguments, body: list[Any]) -> ast.FunctionDef:
+    made = ast.FunctionDef(name, arguments, body, [], None, None)
+    made.type_params = []  # from Python 3.12 on
+    return made
+
+
+def _without_arguments(body: Any) -> ast.Lambda:
+    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), body)
+
+
+class _Writer(ast.NodeTransformer):
+    """Writes the twin of one function."""
+
+    def __init__(self, node: Any, code: types.CodeType) -> None:
+        self._node, self._code = node, code
+        self._numbers = itertools.count()
+        self._locals = {*code.co_varnames, *code.co_cellvars}
+
+    def written(self) -> Any:
+        """The twin."""
+        node = self._node
+        parameters = node.args
+        names = {one.arg for one in [*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs]}
+        names |= {one.arg for one in (parameters.vararg, parameters.kwarg) if one is not None}
+        undefined = [
+            ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(_load(_FRAME), "UNDEFINED", ast.Load()))
+            for name in _assigned(node.body) if name not in names
+        ]  # fmt: skip
+        arguments = ast.arguments(
+            [ast.arg(one.arg) for one in parameters.posonlyargs], [ast.arg(one.arg) for one in parameters.args],
+            parameters.vararg and ast.arg(parameters.vararg.arg), [ast.arg(one.arg) for one in parameters.kwonlyargs],
+            [None] * len(parameters.kwonlyargs), parameters.kwarg and ast.arg(parameters.kwarg.arg), [],
+        )  # fmt: skip
+        made = _function(node.name, arguments, [*undefined, *self._block(node.body, last=True)])
+        return ast.copy_location(made, node)
+
+    # --- Statements ---
+
+    def _block(self, statements: Any, last: bool = False) -> list[Any]:
+        """Statements; those that nothing reaches are left out."""
+        made: list[Any] = []
+        for statement in statements:
+            written = self.visit(statement)
+            written = written if isinstance(written, list) else [written]
+            made.extend(ast.copy_location(one, statement) for one in written if one is not None)
+            if isinstance(statement, (ast.Return, ast.Break, ast.Continue)):
+                return made
+        if last:
+            made.append(ast.Expr(_of_frame("give", ast.Constant(None))))
+        return made
+
+    def _as_function(self, name: str, statements: Any, *arguments: str) -> ast.FunctionDef:
+        """A block of statements as a function."""
+        names = [one for one in _assigned(statements) if one in self._locals]
+        body = self._block(statements)
+        body.append(ast.Return(ast.Attribute(_load(_FRAME), "NEXT", ast.Load())))
+        if names:
+            body.insert(0, ast.Nonlocal(names))
+        given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
+        return _function(name, given, body)
+
+    def _variables(self, number: int, names: list[str]) -> list[Any]:
+        """The functions that get and put variables."""
+        values = ast.Tuple([_load(name) for name in names], ast.Load())
+        get = self._plain(f"_get{number}", [ast.Return(values)])
+        body: list[Any] = [ast.Pass()]
+        if names:
+            target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
+            body = [ast.Nonlocal(names), ast.Assign([target], _load("_values"))]
+        return [get, self._plain(f"_put{number}", body, "_values")]
+
+    def _plain(self, name: str, body: list[Any], *arguments: str) -> ast.FunctionDef:
+        given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
+        return _function(name, given, body)
+
+    def _goes_on(self, call: ast.expr) -> ast.If:
+        """What follows is reached only where the call says so."""
+        test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(_load(_FRAME), "NEXT", ast.Load())])
+        return ast.If(test, [ast.Return(ast.Constant(False))], [])
+
+    def visit_Return(self, node: ast.Return) -> Any:
+        value = ast.Constant(None) if node.value is None else self.visit(node.value)
+        return ast.Return(_of_frame("give", value))
+
+    def visit_If(self, node: ast.If) -> Any:
+        number = next(self._numbers)
+        names = [one for one in _assigned([*node.body, *node.orelse]) if one in self._locals]
+        test = self.visit(node.test)
+        first, second = self._as_function(f"_then{number}", node.body), self._as_function(f"_else{number}", node.orelse)
+        names_of = [f"{one}{number}" for one in ("_then", "_else", "_get", "_put")]
+        call = _of_frame("branch", test, *map(_load, names_of))
+        return [first, second, *self._variables(number, names), self._goes_on(call)]
+
+    def visit_While(self, node: ast.While) -> Any:
+        if node.orelse:
+            raise NotTraceable("it has an `else` of a loop")
+        number = next(self._numbers)
+        names = [one for one in _assigned(node.body) if one in self._locals]
+        test, body = _without_arguments(self.visit(node.test)), self._as_function(f"_body{number}", node.body)
+        call = _of_frame("repeat", test, *(_load(f"{one}{number}") for one in ("_body", "_get", "_put")))
+        return [body, *self._variables(number, names), self._goes_on(call)]
+
+    def visit_For(self, node: ast.For) -> Any:
+        if node.orelse:
+            raise NotTraceable("it has an `else` of a loop")
+        number = next(self._numbers)
+        names = [one for one in _assigned([node.target, *node.body]) if one in self._locals]
+        values = self.visit(node.iter)
+        if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) and node.iter.func.id == "range":
+            values = _of_frame("range", *map(self.visit, node.iter.args))
+        taken = [one for one in _assigned([node.target]) if one in self._locals]
+        take = self._plain(
+            f"_take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load("_value"))], "_value"
+        )
+        body = self._as_function(f"_body{number}", node.body)
+        names_of = [f"{one}{number}" for one in ("_take", "_body", "_get", "_put")]
+        call = _of_frame("each", values, *map(_load, names_of), ast.Constant(_leaves(node.body)))
+        return [take, body, *self._variables(number, names), self._goes_on(call)]
+
+    def visit_Break(self, node: ast.Break) -> Any:
+        return ast.Return(_of_frame("leave"))
+
+    def visit_Continue(self, node: ast.Continue) -> Any:
+        return ast.Return(_of_frame("again"))
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> Any:
+        if node.value is None:
+            return ast.Pass()
+        return ast.Assign([self.visit(node.target)], self.visit(node.value))
+
+    def visit_Try(self, node: ast.Try) -> Any:
+        raise NotTraceable("it has a `try`")
+
+    def visit_With(self, node: ast.With) -> Any:
+        raise NotTraceable("it has a `with`")
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
+        return node
+
+    # --- Expressions ---
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        given = [self.visit(one) for one in node.args]
+        named = [ast.keyword(one.arg, self.visit(one.value)) for one in node.keywords]
+        made = _of_frame("call", self.visit(node.func), *given)
+        made.keywords = named
+        return ast.copy_location(made, node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        ways = (_without_arguments(self.visit(one)) for one in (node.body, node.orelse))
+        return ast.copy_location(_of_frame("choose", self.visit(node.test), *ways), node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> Any:
+        first, *rest = node.values
+        other = rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(node.op, rest), node)
+        name = "both" if isinstance(node.op, ast.And) else "either"
+        return ast.copy_location(_of_frame(name, self.visit(first), _without_arguments(self.visit(other))), node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
+        if not isinstance(node.op, ast.Not):
+            return self.generic_visit(node)
+        return ast.copy_location(_of_frame("negate", self.visit(node.operand)), node)
+
+    def visit_Compare(self, node: ast.Compare) -> Any:
+        if len(node.ops) == 1:
+            return self.generic_visit(node)
+        terms = [node.left, *node.comparators]
+        pairs = zip(terms, node.ops, terms[1:], strict=False)
+        return self.visit(
+            ast.copy_location(ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in pairs]), node)
+        )
+
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        if not isinstance(node.ctx, ast.Load):
+            return self.generic_visit(node)
+        return ast.copy_location(_of_frame("item", self.visit(node.value), self._place(node.slice)), node)
+
+    def _place(self, node: Any) -> Any:
+        if isinstance(node, ast.Tuple):
+            return ast.Tuple([self._place(one) for one in node.elts], ast.Load())
+        if isinstance(node, ast.Slice):
+            parts = [ast.Constant(None) if one is None else self.visit(one) for one in (node.lower, node.upper, node.step)]
+            return ast.Call(_load("slice"), parts, [])
+        return self.visit(node)
+
+    def visit_Lambda(self, node: ast.Lambda) -> Any:
+        return node
