@@ -4,6 +4,7 @@ import ast
 import contextlib
 import functools
 import hashlib
+import inspect
 import logging
 import os
 import sys
@@ -90,15 +91,20 @@ def _code(text: bytes) -> bytes:
 _folder = functools.cache(cache_folder)
 
 
+def is_disabled() -> bool:
+    """Whether the compiler is switched off for this process."""
+    return bool(_CONFIG.DISABLE_JIT)
+
+
 def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     """The kernel of a function: Numba compiles it with these flags where no earlier process has."""
-    if _CONFIG.DISABLE_JIT:
+    if is_disabled():
         return function
     previous = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(_folder())
     try:
-        made: Any = numba.njit(cache=True, **flags)(function)
-        made._cache = _Cache(function)
+        made: Any = numba.njit(cache=True, **flags)(_called(function))
+        made.py_func, made._cache = function, _Cache(function)
     finally:
         _CONFIG.CACHE_DIR = previous
     disk = made._cache
@@ -113,6 +119,15 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     made.compile = functools.partial(_compile_once, made, made.compile)
     _kernels.append(made)
     return made
+
+
+def _called(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that calls another, all that Numba compiles of a kernel by itself: the other is traced into it."""
+    names = ", ".join(inspect.signature(function).parameters)
+    scope: dict[str, Any] = {"__name__": function.__module__, "traced": function}
+    code = compile(f"def {function.__name__}({names}): return traced({names})", function.__code__.co_filename, "exec")
+    exec(code, scope)
+    return functools.update_wrapper(scope[function.__name__], function, ("__module__", "__name__", "__qualname__"), ())
 
 
 def _is_own(function: Callable[..., Any]) -> bool:

@@ -69,6 +69,8 @@ _find_scipy_only()
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
+    if not cache.is_disabled():
+        prepare(function, _INLINE, outlined=False)
     compiled: F = cache.kept(function, _KERNEL)
     return compiled
 

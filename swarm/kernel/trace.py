@@ -581,6 +581,15 @@ class Frame:
         """`not value`"""
         return noted(operator.not_, value) if isinstance(value, Value) else not value
 
+    def contains(self, values: Any, value: Any) -> Any:
+        """`value in values`"""
+        if not has_value((value, values)):
+            return value in values
+        found: Any = False
+        for one in values:
+            found = found | (one == value)
+        return found
+
     # --- Loops ---
 
     def leave(self) -> bool:
@@ -605,6 +614,9 @@ class Frame:
         self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put, leaves: bool
     ) -> bool:
         """`for value in values: body()`; the values of a `range` may be known in the kernel only."""
+        if isinstance(values, Value):
+            whole = values
+            return self.each(Range(whole.shape[0]), lambda k: take(whole[k]), body, get, put, leaves)
         if not isinstance(values, Range):
             return self._written_out(values, take, body, get, put)
         known = values.known()

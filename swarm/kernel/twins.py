@@ -204,6 +204,10 @@ class _Writer(ast.NodeTransformer):
         made = _function(node.name, arguments, [*undefined, *self._block(node.body, last=True)])
         return ast.copy_location(made, node)
 
+    def _refused(self, node: Any, what: str) -> NotTraceable:
+        code = self._code
+        return NotTraceable(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
+
     # --- Statements ---
 
     def _block(self, statements: Any, last: bool = False) -> list[Any]:
@@ -263,7 +267,7 @@ class _Writer(ast.NodeTransformer):
 
     def visit_While(self, node: ast.While) -> Any:
         if node.orelse:
-            raise NotTraceable("it has an `else` of a loop")
+            raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
         names = [one for one in _assigned(node.body) if one in self._locals]
         test, body = _without_arguments(self.visit(node.test)), self._as_function(f"_body{number}", node.body)
@@ -272,12 +276,14 @@ class _Writer(ast.NodeTransformer):
 
     def visit_For(self, node: ast.For) -> Any:
         if node.orelse:
-            raise NotTraceable("it has an `else` of a loop")
+            raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
         names = [one for one in _assigned([node.target, *node.body]) if one in self._locals]
-        values = self.visit(node.iter)
-        if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) and node.iter.func.id == "range":
-            values = _of_frame("range", *map(self.visit, node.iter.args))
+        over = node.iter
+        if isinstance(over, ast.Call) and isinstance(over.func, ast.Name) and over.func.id == "range":
+            values: ast.expr = _of_frame("range", *map(self.visit, over.args))
+        else:
+            values = self.visit(over)
         taken = [one for one in _assigned([node.target]) if one in self._locals]
         take = self._plain(
             f"_take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load("_value"))], "_value"
@@ -299,10 +305,10 @@ class _Writer(ast.NodeTransformer):
         return ast.Assign([self.visit(node.target)], self.visit(node.value))
 
     def visit_Try(self, node: ast.Try) -> Any:
-        raise NotTraceable("it has a `try`")
+        raise self._refused(node, "`try`")
 
     def visit_With(self, node: ast.With) -> Any:
-        raise NotTraceable("it has a `with`")
+        raise self._refused(node, "`with`")
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
         return node
@@ -333,7 +339,12 @@ class _Writer(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> Any:
         if len(node.ops) == 1:
-            return self.generic_visit(node)
+            made = self.generic_visit(node)
+            if not isinstance(node.ops[0], (ast.In, ast.NotIn)):
+                return made
+            found = _of_frame("contains", node.comparators[0], node.left)
+            found = found if isinstance(node.ops[0], ast.In) else _of_frame("negate", found)
+            return ast.copy_location(found, node)
         terms = [node.left, *node.comparators]
         pairs = zip(terms, node.ops, terms[1:], strict=False)
         return self.visit(
