@@ -883,6 +883,8 @@ def called(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
             return function(*given, **named)
         if named:
             raise NotTraceable(f"{_name_of(function)} is called by the names of its arguments")
+        if function is int:
+            return given[0] if isinstance(given[0].kind, types.Integer) else noted(np.int64, *given)
         if function in _FARTHER:
             return _extreme(_FARTHER[function], given[0] if len(given) == 1 else given)
         return noted(function, *given)
