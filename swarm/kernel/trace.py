@@ -194,6 +194,8 @@ class Value:
         kind = None if name.startswith("__") else _now.context.resolve_getattr(self.kind, name)
         if kind is None:
             raise AttributeError(name)
+        if isinstance(kind, types.BoundFunction):
+            return _Method(name, kind, self)
         return opened(types.unliteral(kind), add(Attribute(self, name, kind)))
 
     def __pow__(self, exponent: Any) -> Any:
@@ -374,21 +376,40 @@ _signatures: dict[Any, tuple[Any, Any]] = {}
 
 def noted(symbol: Any, *given: Any) -> Any:
     """Note an operation that Numba knows; its result as proxies."""
-    kinds = tuple(map(kind_of, map(_sliced, given)))
-    key = symbol, kinds
-    found = _signatures.get(key)
-    if found is None:
-        context = _now.context
+    given = tuple(map(_sliced, given))
+    key = symbol, tuple(map(kind_of, given))
+    if key not in _signatures:
         try:
-            kind = context.resolve_value_type(symbol)
-            signature = context.resolve_function_type(kind, kinds, {})
+            kind = _now.context.resolve_value_type(symbol)
         except Exception as error:
-            raise NotTraceable(f"{_name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
-        if signature is None:
-            raise NotTraceable(f"there is no {_name_of(symbol)} of {', '.join(map(str, kinds))}")
-        found = _signatures[key] = kind, signature
-    note = add(Call(*found, tuple(map(_sliced, given))))
-    return opened(types.unliteral(found[1].return_type), note)
+            raise NotTraceable(f"{_name_of(symbol)} is nothing that a kernel has") from error
+        _signatures[key] = kind, _signature(symbol, kind, key[1])
+    return _result(Call(*_signatures[key], given))
+
+
+class _Method:
+    """A method of an array."""
+
+    def __init__(self, name: str, kind: Any, of: Value) -> None:
+        self._name, self._kind, self._of = name, kind, of
+
+    def __call__(self, *given: Any) -> Any:
+        signature = _signature(self._name, self._kind, tuple(map(kind_of, given)))
+        return _result(Call(self._kind, signature.as_function(), (self._of, *given)))
+
+
+def _signature(symbol: Any, kind: Any, kinds: tuple[Any, ...]) -> Signature:
+    try:
+        signature = _now.context.resolve_function_type(kind, kinds, {})
+    except Exception as error:
+        raise NotTraceable(f"{_name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
+    if signature is None:
+        raise NotTraceable(f"there is no {_name_of(symbol)} of {', '.join(map(str, kinds))}")
+    return signature
+
+
+def _result(note: Call) -> Any:
+    return opened(types.unliteral(note.signature.return_type), add(note))
 
 
 def _sliced(given: Any) -> Any:
@@ -709,10 +730,6 @@ class Frame:
 
     # --- Expressions ---
 
-    def range(self, *given: Any) -> Any:
-        """`range(...)` of a loop"""
-        return Range(*given)
-
     def item(self, of: Any, place: Any) -> Any:
         """`of[place]`"""
         if isinstance(of, (tuple, np.ndarray)) and has_value(place):
@@ -734,6 +751,12 @@ class Range:
     def known(self) -> range | None:
         """What it is in Python."""
         return None if has_value(self._given) else range(*map(int, self._given))
+
+    def __iter__(self) -> Iterator[int]:
+        known = self.known()
+        if known is None:
+            raise NotTraceable("it asks for the numbers of a range that is known in the kernel only")
+        return iter(known)
 
     def numbers(self) -> tuple[Any, Any, Any]:
         """Start, stop and step, of one type; the step is known."""
@@ -793,7 +816,7 @@ OPERATIONS: set[Any] = {
 # Functions that only a kernel can do.
 INTRINSIC: set[Any] = set()
 # What is called in place of a function while it is traced.
-REPLACED: dict[Any, Callable[..., Any]] = {}
+REPLACED: dict[Any, Callable[..., Any]] = {range: Range}
 
 
 def operation(function: Any) -> Any:
