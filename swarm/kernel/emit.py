@@ -1,13 +1,16 @@
 """The notes of a trace as instructions of LLVM, each operation by Numba's own lowering."""
 
+import functools
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.datamodel import default_manager
+from numba.np.arrayobj import load_item, store_item
 
 from . import trace
-from .trace import Argument, Assign, Attribute, Branch, Call, Jump, Label, Load, Part, PartCall, Slot, Value
+from .trace import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, Part, PartCall, Slot, Value
 
 
 def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
@@ -23,6 +26,8 @@ class _Writer:
     def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
         self._context, self._builder, self._values = context, builder, values
         self._parts: dict[Any, Any] = {}  # of tuples, in this block
+        self._taken: dict[Any, Any] = {}  # of arguments, where the notes begin
+        self._start = builder.block
         self._blocks: dict[Label, Any] = {}
         self._slots: dict[Slot, Any] = {}
         self._functions: dict[Any, Any] = {}
@@ -58,11 +63,15 @@ class _Writer:
     def _part(self, note: Any, path: tuple[int, ...]) -> Any:
         if not path:
             return self._values[note]
-        found = self._parts.get((note, path))
-        if found is None:
-            found = self._builder.extract_value(self._part(note, path[:-1]), path[-1])
-            self._parts[note, path] = found
-        return found
+        if isinstance(note, Argument):
+            if (note, path) not in self._taken:
+                of = self._part(note, path[:-1])
+                with self._builder.goto_block(self._start):
+                    self._taken[note, path] = self._builder.extract_value(of, path[-1])
+            return self._taken[note, path]
+        if (note, path) not in self._parts:
+            self._parts[note, path] = self._builder.extract_value(self._part(note, path[:-1]), path[-1])
+        return self._parts[note, path]
 
     # --- Notes ---
 
@@ -91,7 +100,7 @@ class _Writer:
         function = self._functions.get(key)
         if function is None:
             function = self._functions[key] = self._context.get_function(note.symbol, found)
-        kinds, star = found.args, ()
+        kinds, star = found.args if found.recvr is None else (found.recvr, *found.args), ()
         if kinds and isinstance(kinds[-1], (types.StarArgTuple, types.StarArgUniTuple)):
             *kinds, last = kinds
             star = [last]
@@ -106,6 +115,42 @@ class _Writer:
     def _attribute(self, note: Attribute) -> None:
         get = self._context.get_getattr(note.of.kind, note.name)
         self._values[note] = get(self._context, self._builder, note.of.kind, self.value(note.of), note.name)
+
+    def _element(self, note: Element) -> None:
+        kind = note.array.kind
+        place = self._address(note.array, note.place)
+        if note.value is None:
+            self._values[note] = load_item(self._context, self._builder, kind, place)
+        else:
+            store_item(self._context, self._builder, kind, self.cast(note.value, kind.dtype), place)
+
+    def _address(self, array: Value, place: tuple[Any, ...]) -> Any:
+        """Where an element is. A negative index counts from the end, as in Numba."""
+        builder, model = self._builder, default_manager[array.kind]
+
+        def field(name: str, *path: int) -> Any:
+            return self._part(array.note, (*array.path, model.get_field_position(name), *path))
+
+        steps = [self._index(one, functools.partial(field, "shape", k)) for k, one in enumerate(place)]
+        if array.kind.layout == "A":
+            offsets = [builder.mul(step, field("strides", k)) for k, step in enumerate(steps)]
+            return cgutils.pointer_add(builder, field("data"), functools.reduce(builder.add, offsets))
+        axes = range(len(steps)) if array.kind.layout == "C" else range(len(steps) - 1, -1, -1)
+        first, *others = axes
+        offset = steps[first]
+        for k in others:
+            offset = builder.add(builder.mul(offset, field("shape", k)), steps[k])
+        return builder.gep(field("data"), [offset])
+
+    def _index(self, given: Any, length: Any) -> Any:
+        kind = trace.kind_of(given)
+        if not isinstance(given, Value):
+            return self._context.get_constant(types.intp, int(given))
+        if not kind.signed:
+            return self.cast(given, types.uintp)
+        value = self.cast(given, types.intp)
+        negative = self._builder.icmp_signed("<", value, value.type(0))
+        return self._builder.select(negative, self._builder.add(value, length()), value)
 
     def _assign(self, note: Assign) -> None:
         # All values before all stores: a value may be another variable's.
@@ -136,6 +181,7 @@ class _Writer:
     _WAYS = {
         Call: _call,
         Attribute: _attribute,
+        Element: _element,
         Assign: _assign,
         Load: _load,
         Jump: _jump,

@@ -11,6 +11,7 @@ compiled the helper. What cannot be traced is compiled by Numba.
 
 import builtins
 import contextlib
+import functools
 import itertools
 import math
 import operator
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from numba import typeof, types
+from numba.core.datamodel import default_manager
 from numba.core.dispatcher import Dispatcher
 from numba.core.typing.templates import Signature
 
@@ -53,6 +55,15 @@ class Attribute:
 
     def __init__(self, of: "Value", name: str, kind: Any) -> None:
         self.of, self.name, self.kind = of, name, kind
+
+
+class Element:
+    """The element of an array, read where `value` is None."""
+
+    __slots__ = ("array", "place", "value")
+
+    def __init__(self, array: "Value", place: tuple[Any, ...], value: Any = None) -> None:
+        self.array, self.place, self.value = array, place, value
 
 
 class Slot:
@@ -185,17 +196,27 @@ class Value:
     __bool__ = __float__ = __int__ = __index__ = __iter__ = __len__ = _unknown
 
     def __getitem__(self, place: Any) -> Any:
-        return noted(operator.getitem, self, place)
+        if not _is_element(self.kind, place):
+            return noted(operator.getitem, self, place)
+        return opened(self.kind.dtype, add(Element(self, place if isinstance(place, tuple) else (place,))))
 
     def __setitem__(self, place: Any, value: Any) -> None:
-        noted(operator.setitem, self, place, value)
+        if not _is_element(self.kind, place) or not is_number(value):
+            noted(operator.setitem, self, place, value)
+        else:
+            add(Element(self, place if isinstance(place, tuple) else (place,), value))
 
     def __getattr__(self, name: str) -> Any:
+        if name in _FIELDS and isinstance(self.kind, types.Array):
+            # A part of what an array is in a kernel: there is nothing to note.
+            number = _ARRAY.get_field_position(_FIELDS[name])
+            kind = types.UniTuple(types.intp, self.kind.ndim) if name in ("shape", "strides") else types.intp
+            return opened(kind, self.note, (*self.path, number))
         kind = None if name.startswith("__") else _now.context.resolve_getattr(self.kind, name)
         if kind is None:
-            raise AttributeError(name)
+            raise AttributeError(f"{self.kind} has no attribute {name}")
         if isinstance(kind, types.BoundFunction):
-            return _Method(name, kind, self)
+            return functools.partial(_method, self, kind)
         return opened(types.unliteral(kind), add(Attribute(self, name, kind)))
 
     def __pow__(self, exponent: Any) -> Any:
@@ -219,6 +240,25 @@ class Value:
         return noted(abs, self)
 
 
+def _is_element(kind: Any, place: Any) -> bool:
+    """Whether a place in an array is that of one number."""
+    if not isinstance(kind, types.Array) or not isinstance(kind.dtype, (types.Number, types.Boolean)):
+        return False
+    places = place if isinstance(place, tuple) else (place,)
+    return len(places) == kind.ndim and all(map(_is_index, places))
+
+
+def _is_index(place: Any) -> bool:
+    if isinstance(place, Value):
+        return isinstance(place.kind, types.Integer)
+    return isinstance(place, (int, np.integer)) and not isinstance(place, bool) and place >= 0
+
+
+def _method(of: Value, kind: Any, *given: Any) -> Any:
+    """Note the call of a method of an array."""
+    return _result(Call(kind, _signature(kind, kind, tuple(map(kind_of, given))), (of, *given)))
+
+
 class Real(Value):
     """A floating-point number: helpers are chosen by its class."""
 
@@ -226,6 +266,8 @@ class Real(Value):
 
 
 _MOST_PRODUCTS = 64
+_FIELDS = {"shape": "shape", "strides": "strides", "size": "nitems"}
+_ARRAY = default_manager[types.Array(types.float64, 1, "C")]
 
 
 def _product(base: Any, exponent: int) -> Any:
@@ -385,17 +427,6 @@ def noted(symbol: Any, *given: Any) -> Any:
             raise NotTraceable(f"{_name_of(symbol)} is nothing that a kernel has") from error
         _signatures[key] = kind, _signature(symbol, kind, key[1])
     return _result(Call(*_signatures[key], given))
-
-
-class _Method:
-    """A method of an array."""
-
-    def __init__(self, name: str, kind: Any, of: Value) -> None:
-        self._name, self._kind, self._of = name, kind, of
-
-    def __call__(self, *given: Any) -> Any:
-        signature = _signature(self._name, self._kind, tuple(map(kind_of, given)))
-        return _result(Call(self._kind, signature.as_function(), (self._of, *given)))
 
 
 def _signature(symbol: Any, kind: Any, kinds: tuple[Any, ...]) -> Signature:
@@ -819,6 +850,25 @@ INTRINSIC: set[Any] = set()
 REPLACED: dict[Any, Callable[..., Any]] = {range: Range}
 
 
+_FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}
+
+
+def _extreme(farther: Any, values: Any) -> Any:
+    """The least or the largest of some numbers, by the comparisons of Python: a NaN is never taken for the first one."""
+    from .jit import select
+
+    kind = _unified(list(map(kind_of, values)))
+    first, *others = (one if kind_of(one) == kind else _cast(one, kind) for one in values)
+    for one in others:
+        first = REPLACED[select](farther(one, first), one, first)
+    return first
+
+
+def _cast(value: Any, kind: Any) -> Any:
+    number = np.dtype(str(kind)).type
+    return noted(number, value) if isinstance(value, Value) else number(value)
+
+
 def operation(function: Any) -> Any:
     """Of a function that has a type and a lowering of its own for Numba: traces note it."""
     OPERATIONS.add(function)
@@ -840,9 +890,11 @@ def called(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
             return function(*given, **named)
         if named:
             raise NotTraceable(f"{_name_of(function)} is called by the names of its arguments")
-        if function in (min, max) and len(given) == 1 and isinstance(given[0], tuple):
-            given = given[0]
-        return given[0] if len(given) == 1 and function in (min, max) else noted(function, *given)
+        if function is int:
+            return given[0] if isinstance(given[0].kind, types.Integer) else noted(np.int64, *given)
+        if function in _FARTHER:
+            return _extreme(_FARTHER[function], given[0] if len(given) == 1 else given)
+        return noted(function, *given)
     if isinstance(function, python_types.FunctionType):
         return _plain(function, given, named)
     if isinstance(function, python_types.MethodType) and isinstance(function.__func__, python_types.FunctionType):

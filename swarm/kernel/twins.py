@@ -12,7 +12,6 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
-import copy
 import functools
 import itertools
 import linecache
@@ -51,14 +50,21 @@ def _content(cell: Any) -> Any:
         return UNDEFINED
 
 
-@functools.cache
+_factories: dict[types.CodeType, types.CodeType | NotTraceable | None] = {}
+
+
 def _factory(code: types.CodeType) -> types.CodeType | None:
     """The code of a function (frame, cells) that gives the twin."""
-    node = _node_of(code)
-    if node is None:
-        return None
-    made = _Writer(copy.deepcopy(node), code).written()
-    return _compiled(made, code)
+    if code not in _factories:
+        node = _node_of(code)
+        try:
+            _factories[code] = None if node is None else _compiled(_Writer(node, code).written(), code)
+        except NotTraceable as refused:
+            _factories[code] = refused
+    found = _factories[code]
+    if isinstance(found, NotTraceable):
+        raise found
+    return found
 
 
 def _compiled(node: Any, code: types.CodeType) -> types.CodeType:
@@ -77,7 +83,7 @@ def _compiled(node: Any, code: types.CodeType) -> types.CodeType:
 
 def _node_of(code: types.CodeType) -> Any:
     """The syntax of a function, or None where its file is not known or no longer has it."""
-    found = _functions(code.co_filename).get((code.co_firstlineno, code.co_name), [])
+    found = _nodes_at(code.co_filename, code.co_firstlineno, code.co_name)
     for node in found:
         is_lambda = isinstance(node, ast.Lambda)
         body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
@@ -109,21 +115,36 @@ def _codes(file: str) -> set[types.CodeType]:
     return set(found)
 
 
-@functools.lru_cache(maxsize=None)
-def _functions(file: str) -> dict[tuple[int, str], list[Any]]:
-    """The functions of a file, by their first line and their name."""
+def _nodes_at(file: str, line: int, name: str) -> list[Any]:
+    """The functions of that name that begin in a line of a file."""
+    if name != "<lambda>":
+        return [one for one in _definitions(file) if one.name == name and _first_line(one) == line]
+    inside = [one for one in _statements(file) if one.lineno <= line <= one.end_lineno]
+    found = (one for statement in inside for one in ast.walk(statement))
+    # A lambda in a function is met in that as well as in the statement around it.
+    return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
+
+
+def _first_line(node: ast.FunctionDef) -> int:
+    return min([node.lineno, *(one.lineno for one in node.decorator_list)])
+
+
+@functools.cache
+def _statements(file: str) -> list[Any]:
     try:
-        tree = ast.parse("".join(linecache.getlines(file)))
+        return ast.parse("".join(linecache.getlines(file))).body
     except SyntaxError:
-        return {}
-    found: dict[tuple[int, str], list[Any]] = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef):
-            first = min([node.lineno, *(one.lineno for one in node.decorator_list)])
-            found.setdefault((first, node.name), []).append(node)
-        elif isinstance(node, ast.Lambda):
-            found.setdefault((node.lineno, "<lambda>"), []).append(node)
-    return found
+        return []
+
+
+@functools.cache
+def _definitions(file: str) -> list[ast.FunctionDef]:
+    """The functions of a file, also those in functions, classes and branches."""
+    statements = list(_statements(file))
+    for one in statements:
+        for block in ("body", "orelse", "finalbody"):
+            statements.extend(getattr(one, block, ()))
+    return [one for one in statements if isinstance(one, ast.FunctionDef)]
 
 
 # --- The twin --------------------------------------------------------------------------------------------
