@@ -99,14 +99,14 @@ def is_disabled() -> bool:
     return bool(_CONFIG.DISABLE_JIT)
 
 
-def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
-    """The kernel of a function: Numba compiles it with these flags where no earlier process has."""
+def kept(function: Callable[..., Any], flags: dict[str, Any], compiled: Callable[..., Any] | None = None) -> Any:
+    """The kernel of a function: Numba compiles it, or `compiled` in its place, where no earlier process has."""
     if is_disabled():
         return function
     previous = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(_folder())
     try:
-        made: Any = numba.njit(cache=True, **flags)(_called(function))
+        made: Any = numba.njit(cache=True, **flags)(compiled or function)
         made.py_func, made._cache = function, _Cache(function)
     finally:
         _CONFIG.CACHE_DIR = previous
@@ -124,7 +124,7 @@ def kept(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     return made
 
 
-def _called(function: Callable[..., Any]) -> Callable[..., Any]:
+def calling(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function that calls another, all that Numba compiles of a kernel by itself: the other is traced into it."""
     names = ", ".join(inspect.signature(function).parameters)
     scope: dict[str, Any] = {"__name__": function.__module__, "traced": function}

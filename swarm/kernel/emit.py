@@ -104,7 +104,9 @@ class _Writer:
         if kinds and isinstance(kinds[-1], (types.StarArgTuple, types.StarArgUniTuple)):
             *kinds, last = kinds
             star = [last]
-        values = [self.cast(v, kind) for v, kind in zip(given, kinds, strict=not star)]
+        values = [self.cast(v, kind) for v, kind in zip(given, kinds, strict=False)]
+        rest = kinds[len(values) :]  # arguments that have defaults
+        values += [self._context.get_constant_generic(self._builder, kind, kind.value) for kind in rest]
         for kind in star:
             rest = [self.cast(*pair) for pair in zip(given[len(kinds) :], kind.types, strict=True)]
             values.append(self._context.make_tuple(self._builder, kind, rest))

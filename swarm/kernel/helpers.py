@@ -138,7 +138,6 @@ def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None =
     """Let traces and Numba call a helper; `choose` gives the definitions of a family."""
     helper = Helper(function, choose or (lambda made: function), outlined)
     trace.REPLACED[function] = helper.called
-    key = ("traced", function.__module__, helper.name, id(function))
     base: Any = make_overload_template(function, _definition(function, choose), options, choose is not None, "never")
 
     class Template(base):  # type: ignore[misc]
@@ -151,13 +150,14 @@ def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None =
             return super().generic(args, kws)
 
         def get_impl_key(self, sig: Any) -> Any:
-            return super().get_impl_key(sig) if helper.known(sig.args) is None else key
+            return super().get_impl_key(sig) if helper.known(sig.args) is None else helper
 
     Template.__name__ = base.__name__
     infer(Template)
     infer_global(function, types.Function(Template))
 
-    @lower_builtin(key, types.VarArg(types.Any))
+    # By the helper and not by its function: who prepares a function again has another.
+    @lower_builtin(helper, types.VarArg(types.Any))
     def _emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         result = emit(context, builder, helper.known(sig.args), args)
         return impl_ret_borrowed(context, builder, sig.return_type, result)

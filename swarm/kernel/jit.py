@@ -11,7 +11,7 @@ import importlib.util
 import inspect
 import threading
 from collections.abc import Callable
-from types import UnionType
+from types import FunctionType, UnionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -69,9 +69,14 @@ _find_scipy_only()
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    if not cache.is_disabled():
-        prepare(function, _INLINE, outlined=False)
-    compiled: F = cache.kept(function, _KERNEL)
+    if cache.is_disabled():
+        return function
+    # Numba keeps what it knows of a function by its identity: a kernel that is made again has one of its own.
+    traced = FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+    )
+    prepare(traced, _INLINE, outlined=False)
+    compiled: F = cache.kept(function, _KERNEL, cache.calling(traced))
     return compiled
 
 

@@ -256,10 +256,7 @@ def _is_index(place: Any) -> bool:
 
 def _method(of: Value, kind: Any, *given: Any) -> Any:
     """Note the call of a method of an array."""
-    found = _now.context.resolve_function_type(kind, tuple(map(kind_of, given)), {})
-    if found is None:
-        raise NotTraceable(f"there is no {kind} of {', '.join(str(kind_of(one)) for one in given)}")
-    return opened(types.unliteral(found.return_type), add(Call(kind, found, (of, *given))))
+    return _result(Call(kind, _signature(kind, kind, tuple(map(kind_of, given))), (of, *given)))
 
 
 class Real(Value):
@@ -421,21 +418,29 @@ _signatures: dict[Any, tuple[Any, Any]] = {}
 
 def noted(symbol: Any, *given: Any) -> Any:
     """Note an operation that Numba knows; its result as proxies."""
-    kinds = tuple(map(kind_of, map(_sliced, given)))
-    key = symbol, kinds
-    found = _signatures.get(key)
-    if found is None:
-        context = _now.context
+    given = tuple(map(_sliced, given))
+    key = symbol, tuple(map(kind_of, given))
+    if key not in _signatures:
         try:
-            kind = context.resolve_value_type(symbol)
-            signature = context.resolve_function_type(kind, kinds, {})
+            kind = _now.context.resolve_value_type(symbol)
         except Exception as error:
-            raise NotTraceable(f"{_name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
-        if signature is None:
-            raise NotTraceable(f"there is no {_name_of(symbol)} of {', '.join(map(str, kinds))}")
-        found = _signatures[key] = kind, signature
-    note = add(Call(*found, tuple(map(_sliced, given))))
-    return opened(types.unliteral(found[1].return_type), note)
+            raise NotTraceable(f"{_name_of(symbol)} is nothing that a kernel has") from error
+        _signatures[key] = kind, _signature(symbol, kind, key[1])
+    return _result(Call(*_signatures[key], given))
+
+
+def _signature(symbol: Any, kind: Any, kinds: tuple[Any, ...]) -> Signature:
+    try:
+        signature = _now.context.resolve_function_type(kind, kinds, {})
+    except Exception as error:
+        raise NotTraceable(f"{_name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
+    if signature is None:
+        raise NotTraceable(f"there is no {_name_of(symbol)} of {', '.join(map(str, kinds))}")
+    return signature
+
+
+def _result(note: Call) -> Any:
+    return opened(types.unliteral(note.signature.return_type), add(note))
 
 
 def _sliced(given: Any) -> Any:
@@ -756,10 +761,6 @@ class Frame:
 
     # --- Expressions ---
 
-    def range(self, *given: Any) -> Any:
-        """`range(...)` of a loop"""
-        return Range(*given)
-
     def item(self, of: Any, place: Any) -> Any:
         """`of[place]`"""
         if isinstance(of, (tuple, np.ndarray)) and has_value(place):
@@ -781,6 +782,12 @@ class Range:
     def known(self) -> range | None:
         """What it is in Python."""
         return None if has_value(self._given) else range(*map(int, self._given))
+
+    def __iter__(self) -> Iterator[int]:
+        known = self.known()
+        if known is None:
+            raise NotTraceable("it asks for the numbers of a range that is known in the kernel only")
+        return iter(known)
 
     def numbers(self) -> tuple[Any, Any, Any]:
         """Start, stop and step, of one type; the step is known."""
@@ -840,7 +847,7 @@ OPERATIONS: set[Any] = {
 # Functions that only a kernel can do.
 INTRINSIC: set[Any] = set()
 # What is called in place of a function while it is traced.
-REPLACED: dict[Any, Callable[..., Any]] = {}
+REPLACED: dict[Any, Callable[..., Any]] = {range: Range}
 
 
 _FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}

@@ -22,8 +22,8 @@ from typing import Any
 
 from .trace import UNDEFINED, Frame, NotTraceable
 
-# A name of its own: the function's name in the twin is that of its globals.
-_FRAME, _TWIN = "_frame", "_twin"
+# Names that no function has: the syntax tree knows them, and no text does.
+_FRAME, _TWIN = ".frame", ".twin"
 _OWN = str(Path(__file__).parents[1])
 
 
@@ -257,12 +257,12 @@ class _Writer(ast.NodeTransformer):
     def _variables(self, number: int, names: list[str]) -> list[Any]:
         """The functions that get and put variables."""
         values = ast.Tuple([_load(name) for name in names], ast.Load())
-        get = self._plain(f"_get{number}", [ast.Return(values)])
+        get = self._plain(f".get{number}", [ast.Return(values)])
         body: list[Any] = [ast.Pass()]
         if names:
             target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
-            body = [ast.Nonlocal(names), ast.Assign([target], _load("_values"))]
-        return [get, self._plain(f"_put{number}", body, "_values")]
+            body = [ast.Nonlocal(names), ast.Assign([target], _load(".values"))]
+        return [get, self._plain(f".put{number}", body, ".values")]
 
     def _plain(self, name: str, body: list[Any], *arguments: str) -> ast.FunctionDef:
         given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
@@ -281,8 +281,8 @@ class _Writer(ast.NodeTransformer):
         number = next(self._numbers)
         names = [one for one in _assigned([*node.body, *node.orelse]) if one in self._locals]
         test = self.visit(node.test)
-        first, second = self._as_function(f"_then{number}", node.body), self._as_function(f"_else{number}", node.orelse)
-        names_of = [f"{one}{number}" for one in ("_then", "_else", "_get", "_put")]
+        first, second = self._as_function(f".then{number}", node.body), self._as_function(f".else{number}", node.orelse)
+        names_of = [f"{one}{number}" for one in (".then", ".else", ".get", ".put")]
         call = _of_frame("branch", test, *map(_load, names_of))
         return [first, second, *self._variables(number, names), self._goes_on(call)]
 
@@ -291,8 +291,8 @@ class _Writer(ast.NodeTransformer):
             raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
         names = [one for one in _assigned(node.body) if one in self._locals]
-        test, body = _without_arguments(self.visit(node.test)), self._as_function(f"_body{number}", node.body)
-        call = _of_frame("repeat", test, *(_load(f"{one}{number}") for one in ("_body", "_get", "_put")))
+        test, body = _without_arguments(self.visit(node.test)), self._as_function(f".body{number}", node.body)
+        call = _of_frame("repeat", test, *(_load(f"{one}{number}") for one in (".body", ".get", ".put")))
         return [body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_For(self, node: ast.For) -> Any:
@@ -300,18 +300,13 @@ class _Writer(ast.NodeTransformer):
             raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
         names = [one for one in _assigned([node.target, *node.body]) if one in self._locals]
-        over = node.iter
-        if isinstance(over, ast.Call) and isinstance(over.func, ast.Name) and over.func.id == "range":
-            values: ast.expr = _of_frame("range", *map(self.visit, over.args))
-        else:
-            values = self.visit(over)
         taken = [one for one in _assigned([node.target]) if one in self._locals]
         take = self._plain(
-            f"_take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load("_value"))], "_value"
+            f".take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load(".value"))], ".value"
         )
-        body = self._as_function(f"_body{number}", node.body)
-        names_of = [f"{one}{number}" for one in ("_take", "_body", "_get", "_put")]
-        call = _of_frame("each", values, *map(_load, names_of), ast.Constant(_leaves(node.body)))
+        body = self._as_function(f".body{number}", node.body)
+        names_of = [f"{one}{number}" for one in (".take", ".body", ".get", ".put")]
+        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of), ast.Constant(_leaves(node.body)))
         return [take, body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_Break(self, node: ast.Break) -> Any:
