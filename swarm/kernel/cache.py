@@ -82,13 +82,18 @@ def _digest(texts: Any) -> str:
 
 def _code(path: Path) -> Iterator[Any]:
     """The code of a module, without comments and docstrings: Python has compiled it already, or keeps it now."""
-    found = [SourceFileLoader(path.stem, str(path)).get_code(path.stem)]
+    whole: Any = SourceFileLoader(path.stem, str(path)).get_code(path.stem)
+    found = [whole]
     for code in found:
         # The first constant is the docstring, or None.
         constants = [one for k, one in enumerate(code.co_consts) if k > 0 or not isinstance(one, str)]
         found.extend(one for one in constants if isinstance(one, CodeType))
         yield code.co_code, code.co_names, code.co_varnames, code.co_freevars, code.co_argcount
-        yield [sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants if not isinstance(one, CodeType)]
+        yield [
+            sorted(map(repr, one)) if isinstance(one, frozenset) else one
+            for one in constants
+            if not isinstance(one, CodeType)
+        ]
 
 
 _folder = functools.cache(cache_folder)

@@ -23,10 +23,12 @@ from numba.np import linalg as blas
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
-from . import cache, trace
+from . import cache
 from .frozen import registered
-from .helpers import prepare
 from .parts import KernelCompiler, PartCompiler
+from .trace import calls
+from .trace.helpers import prepare
+from .trace.selection import select as select
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -151,38 +153,6 @@ def _arguments(function: Any) -> list[str]:
     return list(inspect.signature(function).parameters)
 
 
-def select(condition: Any, first: Any, second: Any) -> Any:
-    """`first if condition else second` without a branch; both are evaluated.
-
-    Python's conditional expression compiles to a branch. LLVM usually turns it back into a select, but with three
-    surfaces its jump threading splits the paths first, and the lane loop is no longer vectorised (measured:
-    58 ns an impact instead of 17).
-    """
-    return first if condition else second
-
-
-def _traced_select(condition: Any, first: Any, second: Any) -> Any:
-    if not trace.has_value((condition, first, second)):
-        return first if condition else second
-    if isinstance(first, tuple):
-        return trace.made_of(first, [_traced_select(condition, a, b) for a, b in zip(first, second, strict=True)])
-    return first if first is second or first is None else trace.noted(select, condition, first, second)
-
-
-trace.REPLACED[select] = _traced_select
-
-
-@type_callable(select)
-def _type_of_select(_context):
-    return lambda condition, first, second: types.unliteral(first)
-
-
-@lower_builtin(select, types.Boolean, types.Any, types.Any)
-def _emit_select(context, builder, signature, args):
-    kinds, kind = signature.args[1:], signature.return_type
-    return builder.select(args[0], *(context.cast(builder, *pair, kind) for pair in zip(args[1:], kinds, strict=True)))
-
-
 def spaced(stride: int) -> Callable[[Any], Any]:
     """A function that tells the compiler how far apart rows of the 2-D arrays in a NamedTuple are: `stride` numbers.
 
@@ -194,7 +164,7 @@ def spaced(stride: int) -> Callable[[Any], Any]:
     def known(tables: Any) -> Any:
         return tables
 
-    trace.operation(known)
+    calls.operation(known)
 
     @type_callable(known)
     def _type_of_tables(_context):
@@ -230,7 +200,7 @@ def unwritten(shape: Any, dtype: Any) -> Any:
     return np.zeros(shape, dtype)
 
 
-trace.INTRINSIC.update((scratch, unwritten))
+calls.INTRINSIC.update((scratch, unwritten))
 
 
 @type_callable(scratch)
@@ -275,7 +245,7 @@ def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     target[int(i), :count] = source[int(m), :count]
 
 
-trace.operation(copy_row)
+calls.operation(copy_row)
 
 
 @type_callable(copy_row)
@@ -306,7 +276,7 @@ def next_of(ticket: Any) -> int:
         return int(ticket[0]) - 1
 
 
-trace.operation(next_of)
+calls.operation(next_of)
 
 
 @intrinsic  # type: ignore[call-arg]
@@ -335,7 +305,7 @@ def index(value: Any) -> Any:
     return value
 
 
-trace.operation(index)
+calls.operation(index)
 
 
 @type_callable(index)

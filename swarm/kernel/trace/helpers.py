@@ -1,4 +1,4 @@
-"""Helpers for Numba and for traces: each is traced into the kernel that calls it; what cannot be is compiled by Numba."""
+"""Helpers for Numba and for traces: each is traced into its kernel; what cannot be traced is compiled by Numba."""
 
 import functools
 import inspect
@@ -10,15 +10,16 @@ from typing import Any
 
 from numba import types
 from numba.core.imputils import impl_ret_borrowed
-from numba.core.typing import signature
-from numba.core.typing.templates import infer, infer_global, make_overload_template
+from numba.core.typing.templates import Signature, infer, infer_global, make_overload_template
 from numba.extending import lower_builtin
 
-from . import trace
+from ..entries import python_class
+from . import calls, values
+from .calls import traced
 from .emit import emit
-from .entries import python_class
-from .trace import Argument, Frame, NotTraceable, Part, Real, Value
-from .twins import twin_of
+from .notes import Argument
+from .part import Part, key_of
+from .values import Real, TraceError, Value
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
@@ -26,7 +27,7 @@ _HERE = Path(__file__).parent
 left_to_numba: dict[str, str] = {}
 
 # What Python says where a proxy is none of what a function expects.
-_FAILURES = (NotTraceable, TypeError, AttributeError, ValueError, IndexError, NotImplementedError)
+_FAILURES = (TraceError, TypeError, AttributeError, ValueError, IndexError, NotImplementedError)
 
 Choose = Callable[[Any], Any]
 
@@ -48,7 +49,7 @@ class Helper:
         self._whole: dict[Any, Part | None] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
-        """What a call of it gives, in a trace."""
+        """What a call of it gives, in a values."""
         if named or len(given) < len(self.signature.parameters):
             bound = self.signature.bind(*given, **named)
             bound.apply_defaults()
@@ -56,7 +57,7 @@ class Helper:
         if not self._outlined:
             return self._inlined(given)
         part = self._part(given)
-        return trace.noted(self._function, *given) if part is None else part.called(given)
+        return values.noted(self._function, *given) if part is None else part.called(given)
 
     def whole(self, context: Any, kinds: tuple[Any, ...]) -> Part | None:
         """It as Numba calls it, for arguments of these types, or None where it cannot be traced."""
@@ -64,8 +65,8 @@ class Helper:
             self._whole[kinds] = None
             part = Part(self.name, inlined=True)
             part.arguments = [Argument(kind, k) for k, kind in enumerate(kinds)]
-            with trace.noting(part.notes, context):
-                given = tuple(trace.opened(one.kind, one) for one in part.arguments)
+            with values.noting(part.notes, context):
+                given = tuple(values.opened(one.kind, one) for one in part.arguments)
                 try:
                     if self._outlined:
                         outlined = self._part(given)
@@ -74,7 +75,7 @@ class Helper:
                         part.result = outlined.called(given)
                     else:
                         part.result = self._run(given)
-                    part.kind = trace.kind_of(part.result)
+                    part.kind = values.kind_of(part.result)
                     self._whole[kinds] = part
                 except _FAILURES as error:
                     self._leave(error)
@@ -86,11 +87,11 @@ class Helper:
 
     def _part(self, given: Any) -> Part | None:
         """It as a part for such arguments, or None where it cannot be traced."""
-        key = trace.key_of(given)
+        key = key_of(given)
         if key not in self._parts:
             self._parts[key] = None
             part = Part(self.name, inlined=False)
-            with trace.noting(part.notes):
+            with values.noting(part.notes):
                 try:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
@@ -99,22 +100,17 @@ class Helper:
         return self._parts[key]
 
     def _inlined(self, given: Any) -> Any:
-        notes = trace.notes()
+        notes = values.notes()
         mark = len(notes)
         try:
             return self._run(given)
         except _FAILURES as error:
             del notes[mark:]
             self._leave(error)
-            return trace.noted(self._function, *given)
+            return values.noted(self._function, *given)
 
     def _run(self, given: Any) -> Any:
-        definition, frame = self._choose(_class_of(given[0]) if given else object), Frame()
-        twin = twin_of(definition, frame)
-        if twin is None:
-            return definition(*given)
-        twin(*given)
-        return frame.result()
+        return traced(self._choose(_class_of(given[0]) if given else object), given, {})
 
     def _leave(self, error: Exception) -> None:
         left_to_numba.setdefault(self.name, f"{type(error).__name__}: {error} ({_place_of(error)})")
@@ -137,7 +133,7 @@ def _class_of(given: Any) -> Any:
 def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None = None) -> None:
     """Let traces and Numba call a helper; `choose` gives the definitions of a family."""
     helper = Helper(function, choose or (lambda made: function), outlined)
-    trace.REPLACED[function] = helper.called
+    calls.REPLACED[function] = helper.called
     base: Any = make_overload_template(function, _definition(function, choose), options, choose is not None, "never")
 
     class Template(base):  # type: ignore[misc]
@@ -146,7 +142,7 @@ def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None =
             if not kws and len(kinds) == len(helper.signature.parameters) and all(map(_is_open, kinds)):
                 part = helper.whole(self.context, kinds)
                 if part is not None:
-                    return signature(part.kind, *kinds)
+                    return Signature(part.kind, kinds, recvr=None)
             return super().generic(args, kws)
 
         def get_impl_key(self, sig: Any) -> Any:
@@ -159,7 +155,8 @@ def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None =
     # By the helper and not by its function: who prepares a function again has another.
     @lower_builtin(helper, types.VarArg(types.Any))
     def _emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        result = emit(context, builder, helper.known(sig.args), args)
+        part: Any = helper.known(sig.args)
+        result = emit(context, builder, part, args)
         return impl_ret_borrowed(context, builder, sig.return_type, result)
 
 

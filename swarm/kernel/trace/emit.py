@@ -1,16 +1,17 @@
 """The notes of a trace as instructions of LLVM, each operation by Numba's own lowering."""
 
 import functools
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.datamodel import default_manager
+from numba.core.datamodel.registry import default_manager
 from numba.np.arrayobj import load_item, store_item
 
-from . import trace
-from .trace import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, Part, PartCall, Slot, Value
+from .notes import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, PartCall, Slot
+from .part import Part
+from .values import Value, kind_of
 
 
 def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
@@ -46,7 +47,7 @@ class _Writer:
             return self._part(given.note, given.path)
         if given is None:
             return self._context.get_dummy_value()
-        kind = trace.kind_of(given)
+        kind = kind_of(given)
         if isinstance(kind, types.BaseTuple):
             parts = [self.cast(*pair) for pair in zip(given, kind.types, strict=True)]  # type: ignore[attr-defined]
             return self._context.make_tuple(self._builder, kind, parts)
@@ -57,7 +58,7 @@ class _Writer:
 
     def cast(self, given: Any, kind: Any) -> Any:
         """The same as another type."""
-        have = trace.kind_of(given)
+        have = kind_of(given)
         return self.value(given) if have == kind else self._context.cast(self._builder, self.value(given), have, kind)
 
     def _part(self, note: Any, path: tuple[int, ...]) -> Any:
@@ -97,20 +98,17 @@ class _Writer:
     def _call(self, note: Call) -> None:
         found, given = note.signature, note.given
         key = note.symbol, found
-        function = self._functions.get(key)
-        if function is None:
-            function = self._functions[key] = self._context.get_function(note.symbol, found)
-        kinds, star = found.args if found.recvr is None else (found.recvr, *found.args), ()
+        if key not in self._functions:
+            self._functions[key] = self._context.get_function(note.symbol, found)
+        kinds = list(found.args if found.recvr is None else (found.recvr, *found.args))
         if kinds and isinstance(kinds[-1], (types.StarArgTuple, types.StarArgUniTuple)):
-            *kinds, last = kinds
-            star = [last]
-        values = [self.cast(v, kind) for v, kind in zip(given, kinds, strict=False)]
-        rest = kinds[len(values) :]  # arguments that have defaults
+            fixed = len(kinds) - 1
+            given = (*given[:fixed], given[fixed:])
+        values = [self.cast(*pair) for pair in zip(given, kinds, strict=False)]
+        # Arguments that have defaults
+        rest = kinds[len(values) :]
         values += [self._context.get_constant_generic(self._builder, kind, kind.value) for kind in rest]
-        for kind in star:
-            rest = [self.cast(*pair) for pair in zip(given[len(kinds) :], kind.types, strict=True)]
-            values.append(self._context.make_tuple(self._builder, kind, rest))
-        self._values[note] = function(self._builder, values)
+        self._values[note] = self._functions[key](self._builder, values)
 
     def _attribute(self, note: Attribute) -> None:
         get = self._context.get_getattr(note.of.kind, note.name)
@@ -143,7 +141,7 @@ class _Writer:
         return builder.gep(field("data"), [offset])
 
     def _index(self, given: Any, length: Any) -> Any:
-        kind = trace.kind_of(given)
+        kind = kind_of(given)
         if not isinstance(given, Value):
             return self._context.get_constant(types.intp, int(given))
         if not kind.signed:
@@ -178,7 +176,7 @@ class _Writer:
         self._parts = {}
         self._values[note] = builder.load(place)
 
-    _WAYS = {
+    _WAYS: ClassVar[dict[Any, Any]] = {
         Call: _call,
         Attribute: _attribute,
         Element: _element,
@@ -201,8 +199,9 @@ def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
     function = module.globals.get(name)
     if function is not None:
         return function, result
-    status, (_place, error) = context.call_conv.get_function_type(types.none, ()).return_type, (
-        context.call_conv.get_function_type(types.none, ()).args[:2]
+    status, (_place, error) = (
+        context.call_conv.get_function_type(types.none, ()).return_type,
+        (context.call_conv.get_function_type(types.none, ()).args[:2]),
     )
     kinds = [context.get_value_type(one.kind) for one in part.arguments]
     function = ir.Function(module, ir.FunctionType(status, [result.as_pointer(), error, *kinds]), name)

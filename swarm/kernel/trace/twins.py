@@ -12,26 +12,21 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
-import functools
 import itertools
-import linecache
 import types
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
-from .trace import UNDEFINED, Frame, NotTraceable
-
-# Names that no function has: the syntax tree knows them, and no text does.
-_FRAME, _TWIN = ".frame", ".twin"
-_OWN = str(Path(__file__).parents[1])
+from .frame import Frame
+from .source import FRAME, compiled, definition, node_of
+from .values import UNDEFINED, TraceError
 
 
 def twin_of(function: Any, frame: Frame) -> Callable[..., Any] | None:
     """The twin of a function for one call of it; None where its source is not known.
 
     Raises:
-        NotTraceable: it has a statement that no kernel has.
+        TraceError: it has a statement that no kernel has.
     """
     factory = _factory(function.__code__)
     if factory is None:
@@ -50,101 +45,21 @@ def _content(cell: Any) -> Any:
         return UNDEFINED
 
 
-_factories: dict[types.CodeType, types.CodeType | NotTraceable | None] = {}
+_factories: dict[types.CodeType, types.CodeType | TraceError | None] = {}
 
 
 def _factory(code: types.CodeType) -> types.CodeType | None:
     """The code of a function (frame, cells) that gives the twin."""
     if code not in _factories:
-        node = _node_of(code)
+        node = node_of(code)
         try:
-            _factories[code] = None if node is None else _compiled(_Writer(node, code).written(), code)
-        except NotTraceable as refused:
+            _factories[code] = None if node is None else compiled(_Writer(node, code).written(), code)
+        except TraceError as refused:
             _factories[code] = refused
     found = _factories[code]
-    if isinstance(found, NotTraceable):
+    if isinstance(found, TraceError):
         raise found
     return found
-
-
-def _compiled(node: Any, code: types.CodeType) -> types.CodeType:
-    """A function inside one of its frame and its free variables."""
-    names = [_FRAME, *code.co_freevars]
-    arguments = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
-    result = ast.Return(ast.Name(node.name, ast.Load()))
-    outer = _function("make", arguments, [node, result])
-    tree = ast.fix_missing_locations(ast.Module([ast.copy_location(outer, node)], []))
-    whole = compile(tree, code.co_filename, "exec", dont_inherit=True)
-    return _inner(whole)
-
-
-# --- The source of a function ----------------------------------------------------------------------------
-
-
-def _node_of(code: types.CodeType) -> Any:
-    """The syntax of a function, or None where its file is not known or no longer has it."""
-    found = _nodes_at(code.co_filename, code.co_firstlineno, code.co_name)
-    for node in found:
-        is_lambda = isinstance(node, ast.Lambda)
-        body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
-        given = ast.copy_location(_function(_TWIN, node.args, body), node)
-        if len(found) == 1 or _told(_inner(_compiled(given, code))) == _told(code):
-            return given if _is_as_written(code) else None
-    return None
-
-
-def _inner(code: types.CodeType) -> types.CodeType:
-    return next(one for one in code.co_consts if isinstance(one, types.CodeType))
-
-
-def _told(code: types.CodeType) -> Any:
-    """What tells two functions of one line apart; code itself depends on what the file imports."""
-    return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
-
-
-def _is_as_written(code: types.CodeType) -> bool:
-    """Whether the file of a function still has this code: a user may edit it while a session goes on."""
-    return code.co_filename.startswith(_OWN) or code in _codes(code.co_filename)
-
-
-@functools.cache
-def _codes(file: str) -> set[types.CodeType]:
-    found = [compile("".join(linecache.getlines(file)), file, "exec", dont_inherit=True)]
-    for code in found:
-        found.extend(one for one in code.co_consts if isinstance(one, types.CodeType))
-    return set(found)
-
-
-def _nodes_at(file: str, line: int, name: str) -> list[Any]:
-    """The functions of that name that begin in a line of a file."""
-    if name != "<lambda>":
-        return [one for one in _definitions(file) if one.name == name and _first_line(one) == line]
-    inside = [one for one in _statements(file) if one.lineno <= line <= one.end_lineno]
-    found = (one for statement in inside for one in ast.walk(statement))
-    # A lambda in a function is met in that as well as in the statement around it.
-    return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
-
-
-def _first_line(node: ast.FunctionDef) -> int:
-    return min([node.lineno, *(one.lineno for one in node.decorator_list)])
-
-
-@functools.cache
-def _statements(file: str) -> list[Any]:
-    try:
-        return ast.parse("".join(linecache.getlines(file))).body
-    except SyntaxError:
-        return []
-
-
-@functools.cache
-def _definitions(file: str) -> list[ast.FunctionDef]:
-    """The functions of a file, also those in functions, classes and branches."""
-    statements = list(_statements(file))
-    for one in statements:
-        for block in ("body", "orelse", "finalbody"):
-            statements.extend(getattr(one, block, ()))
-    return [one for one in statements if isinstance(one, ast.FunctionDef)]
 
 
 # --- The twin --------------------------------------------------------------------------------------------
@@ -186,13 +101,7 @@ def _load(name: str) -> ast.Name:
 
 
 def _of_frame(name: str, *given: ast.expr) -> ast.Call:
-    return ast.Call(ast.Attribute(_load(_FRAME), name, ast.Load()), list(given), [])
-
-
-def _function(name: str, arguments: ast.arguments, body: list[Any]) -> ast.FunctionDef:
-    made = ast.FunctionDef(name, arguments, body, [], None, None)
-    made.type_params = []  # from Python 3.12 on
-    return made
+    return ast.Call(ast.Attribute(_load(FRAME), name, ast.Load()), list(given), [])
 
 
 def _without_arguments(body: Any) -> ast.Lambda:
@@ -214,7 +123,7 @@ class _Writer(ast.NodeTransformer):
         names = {one.arg for one in [*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs]}
         names |= {one.arg for one in (parameters.vararg, parameters.kwarg) if one is not None}
         undefined = [
-            ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(_load(_FRAME), "UNDEFINED", ast.Load()))
+            ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(_load(FRAME), "UNDEFINED", ast.Load()))
             for name in _assigned(node.body) if name not in names
         ]  # fmt: skip
         arguments = ast.arguments(
@@ -222,12 +131,12 @@ class _Writer(ast.NodeTransformer):
             parameters.vararg and ast.arg(parameters.vararg.arg), [ast.arg(one.arg) for one in parameters.kwonlyargs],
             [None] * len(parameters.kwonlyargs), parameters.kwarg and ast.arg(parameters.kwarg.arg), [],
         )  # fmt: skip
-        made = _function(node.name, arguments, [*undefined, *self._block(node.body, last=True)])
+        made = definition(node.name, arguments, [*undefined, *self._block(node.body, last=True)])
         return ast.copy_location(made, node)
 
-    def _refused(self, node: Any, what: str) -> NotTraceable:
+    def _refused(self, node: Any, what: str) -> TraceError:
         code = self._code
-        return NotTraceable(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
+        return TraceError(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
 
     # --- Statements ---
 
@@ -248,11 +157,11 @@ class _Writer(ast.NodeTransformer):
         """A block of statements as a function."""
         names = [one for one in _assigned(statements) if one in self._locals]
         body = self._block(statements)
-        body.append(ast.Return(ast.Attribute(_load(_FRAME), "NEXT", ast.Load())))
+        body.append(ast.Return(ast.Attribute(_load(FRAME), "NEXT", ast.Load())))
         if names:
             body.insert(0, ast.Nonlocal(names))
         given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
-        return _function(name, given, body)
+        return definition(name, given, body)
 
     def _variables(self, number: int, names: list[str]) -> list[Any]:
         """The functions that get and put variables."""
@@ -266,11 +175,11 @@ class _Writer(ast.NodeTransformer):
 
     def _plain(self, name: str, body: list[Any], *arguments: str) -> ast.FunctionDef:
         given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
-        return _function(name, given, body)
+        return definition(name, given, body)
 
     def _goes_on(self, call: ast.expr) -> ast.If:
         """What follows is reached only where the call says so."""
-        test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(_load(_FRAME), "NEXT", ast.Load())])
+        test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(_load(FRAME), "NEXT", ast.Load())])
         return ast.If(test, [ast.Return(ast.Constant(False))], [])
 
     def visit_Return(self, node: ast.Return) -> Any:
@@ -376,7 +285,9 @@ class _Writer(ast.NodeTransformer):
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self._place(one) for one in node.elts], ast.Load())
         if isinstance(node, ast.Slice):
-            parts = [ast.Constant(None) if one is None else self.visit(one) for one in (node.lower, node.upper, node.step)]
+            parts = [
+                ast.Constant(None) if one is None else self.visit(one) for one in (node.lower, node.upper, node.step)
+            ]
             return ast.Call(_load("slice"), parts, [])
         return self.visit(node)
 

@@ -1,0 +1,1 @@
+"""Helpers of kernels, traced into the kernels that call them."""

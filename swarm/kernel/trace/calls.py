@@ -1,0 +1,102 @@
+"""Calls of a helper while it is traced: what is an operation of a kernel, and what is traced in its turn."""
+
+import builtins
+import math
+import operator
+import types as python_types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core.dispatcher import Dispatcher
+
+from .frame import Frame, Range
+from .selection import select, traced_select
+from .twins import twin_of
+from .values import TraceError, Value, has_value, kind_of, name_of, noted
+from .ways import unified
+
+# Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
+OPERATIONS: set[Any] = {
+    *(getattr(math, name) for name in (
+        "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos", "cosh", "degrees", "erf",
+        "erfc", "exp", "expm1", "fabs", "floor", "fmod", "frexp", "gamma", "hypot", "isfinite", "isinf", "isnan",
+        "ldexp", "lgamma", "log", "log10", "log1p", "log2", "pow", "radians", "sin", "sinh", "sqrt", "tan", "tanh",
+        "trunc",
+    )),
+    builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int, builtins.max, builtins.min,
+    builtins.pow, builtins.round,
+    *(function for function in vars(operator).values() if isinstance(function, python_types.BuiltinFunctionType)),
+}  # fmt: skip
+# Functions that only a kernel can do.
+INTRINSIC: set[Any] = set()
+# What is called in place of a function while it is traced.
+REPLACED: dict[Any, Callable[..., Any]] = {range: Range, select: traced_select}
+
+_FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}
+
+
+def _extreme(farther: Any, values: Any) -> Any:
+    """The least or the largest of some numbers, by Python's comparisons: a NaN does not take the place of another."""
+    kind = unified(list(map(kind_of, values)))
+    first, *others = (one if kind_of(one) == kind else _cast(one, kind) for one in values)
+    for one in others:
+        first = traced_select(farther(one, first), one, first)
+    return first
+
+
+def _cast(value: Any, kind: Any) -> Any:
+    number = np.dtype(str(kind)).type
+    return noted(number, value) if isinstance(value, Value) else number(value)
+
+
+def operation(function: Any) -> Any:
+    """Of a function that has a type and a lowering of its own for Numba: traces note it."""
+    OPERATIONS.add(function)
+    return function
+
+
+def called(function: Any, *given: Any, **named: Any) -> Any:
+    """A call while a helper is traced."""
+    try:
+        replaced, is_operation = REPLACED.get(function), function in OPERATIONS
+    except TypeError:  # not hashable: a method of a proxy
+        return function(*given, **named)
+    if replaced is not None:
+        return replaced(*given, **named)
+    if function in INTRINSIC:
+        return noted(function, *given)
+    if is_operation or isinstance(function, (np.ufunc, Dispatcher)) or _is_number_class(function):
+        return _operation(function, given, named)
+    if isinstance(function, python_types.MethodType):
+        function, given = function.__func__, (function.__self__, *given)
+    if isinstance(function, python_types.FunctionType):
+        return traced(function, given, named)
+    return function(*given, **named)
+
+
+def _is_number_class(function: Any) -> bool:
+    return isinstance(function, type) and issubclass(function, np.generic)
+
+
+def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    if not has_value(given):
+        return function(*given, **named)
+    if named:
+        raise TraceError(f"{name_of(function)} is called by the names of its arguments")
+    if function is int:
+        return given[0] if isinstance(given[0].kind, types.Integer) else noted(np.int64, *given)
+    if function in _FARTHER:
+        return _extreme(_FARTHER[function], given[0] if len(given) == 1 else given)
+    return noted(function, *given)
+
+
+def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """What a Python function gives, noting what it does."""
+    frame = Frame(called)
+    twin = twin_of(function, frame)
+    if twin is None:
+        return function(*given, **named)
+    twin(*given, **named)
+    return frame.result()

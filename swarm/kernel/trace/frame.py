@@ -1,0 +1,302 @@
+"""The control flow of a helper while it is traced."""
+
+import operator
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from .notes import Assign, Branch, Jump, Label, Slot
+from .values import UNDEFINED, TraceError, Value, add, has_value, is_defined, kind_of, noted, notes
+from .ways import all_of, carried, goes_round, merged
+
+# Rounds of a loop that are written out: a loop over the parts of a composition, the axes, the corners of a cell.
+UNROLLED = 8
+
+# How a block of statements ends: at the next statement, or elsewhere.
+NEXT, DONE = True, False
+
+Get = Callable[[], tuple[Any, ...]]
+Put = Callable[[tuple[Any, ...]], None]
+
+
+class _Loop:
+    """A loop that is being traced."""
+
+    def __init__(self, get: Get) -> None:
+        self.get = get
+        self.advance: Get = get
+        self.head, self.end = Label(), Label()
+        self.exits: list[tuple[Assign, Any]] = []
+        self.nexts: list[tuple[Assign, Any]] = []
+
+
+class Frame:
+    """One call of a function while it is traced: what `twins.py` makes of its statements calls this.
+
+    The statements inside of `if` and loops are functions of no arguments that return NEXT, or DONE where the end is not
+    reached; `get` and `put` are the variables that they assign.
+    """
+
+    UNDEFINED = UNDEFINED
+    NEXT = NEXT
+
+    def __init__(self, call: Callable[..., Any]) -> None:
+        # `function(...)`
+        self.call = call
+        self._depth = 0
+        self._gives: list[tuple[Assign, Any]] = []
+        self._exit = Label()
+        self._loops: list[_Loop] = []
+        self._only: Any = None
+
+    # --- The end ---
+
+    def give(self, value: Any) -> bool:
+        """`return value`"""
+        if self._depth == 0 and not self._gives:
+            self._only = value
+            return DONE
+        self._gives.append((self._ends_at(self._exit), value))
+        return DONE
+
+    def result(self) -> Any:
+        """What the function returns."""
+        if not self._gives:
+            return self._only
+        return self._met(self._exit, self._gives)
+
+    @staticmethod
+    def _ends_at(label: Label) -> Assign:
+        assign: Assign = add(Assign())
+        add(Jump(label))
+        return assign
+
+    @staticmethod
+    def _met(label: Label, ways: list[tuple[Assign, Any]]) -> Any:
+        add(label)
+        return merged(ways)
+
+    # --- Decisions ---
+
+    def test(self, value: Any) -> Any:
+        """A condition: True or False where Python knows it."""
+        if not isinstance(value, Value):
+            return bool(value)
+        return value if isinstance(value.kind, types.Boolean) else noted(bool, value)
+
+    def branch(self, condition: Any, first: Callable[[], bool], second: Callable[[], bool], get: Get, put: Put) -> bool:
+        """`if condition: first() else: second()`"""
+        condition = self.test(condition)
+        if not isinstance(condition, Value):
+            return first() if condition else second()
+        before, label, ways = get(), Label(), list[tuple[Assign, Any]]()
+        places = (Label(), Label())
+        add(Branch(condition, *places))
+        self._depth += 1
+        for place, way in zip(places, (first, second), strict=True):
+            put(before)
+            add(place)
+            if way() is NEXT:
+                ways.append((self._ends_at(label), get()))
+        self._depth -= 1
+        if not ways:
+            return DONE
+        put(self._met(label, ways))
+        return NEXT
+
+    def choose(self, condition: Any, first: Callable[[], Any], second: Callable[[], Any]) -> Any:
+        """`first() if condition else second()`"""
+        condition = self.test(condition)
+        if not isinstance(condition, Value):
+            return first() if condition else second()
+        label, places, ways = Label(), (Label(), Label()), []
+        add(Branch(condition, *places))
+        for place, way in zip(places, (first, second), strict=True):
+            add(place)
+            value = way()
+            ways.append((self._ends_at(label), value))
+        result = self._met(label, ways)
+        if not is_defined(result):
+            raise TraceError("an expression has values of several kinds")
+        return result
+
+    def both(self, first: Any, second: Callable[[], Any]) -> Any:
+        """`first and second()`"""
+        if not isinstance(first, Value):
+            return first and second()
+        return self.choose(first, lambda: self.test(second()), lambda: False)
+
+    def either(self, first: Any, second: Callable[[], Any]) -> Any:
+        """`first or second()`"""
+        if not isinstance(first, Value):
+            return first or second()
+        return self.choose(first, lambda: True, lambda: self.test(second()))
+
+    def negate(self, value: Any) -> Any:
+        """`not value`"""
+        return noted(operator.not_, value) if isinstance(value, Value) else not value
+
+    def contains(self, values: Any, value: Any) -> Any:
+        """`value in values`"""
+        if not has_value((value, values)):
+            return value in values
+        found: Any = False
+        for one in values:
+            found = found | (one == value)
+        return found
+
+    # --- Loops ---
+
+    def leave(self) -> bool:
+        """`break`"""
+        loop = self._loops[-1]
+        values = loop.get()
+        loop.exits.append((self._ends_at(loop.end), values))
+        return DONE
+
+    def again(self) -> bool:
+        """`continue`"""
+        loop = self._loops[-1]
+        values = loop.advance()
+        loop.nexts.append((self._ends_at(loop.head), values))
+        return DONE
+
+    def repeat(self, test: Callable[[], Any], body: Callable[[], bool], get: Get, put: Put) -> bool:
+        """`while test(): body()`"""
+        return self._rounds(test, body, get, put, get)
+
+    def each(
+        self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put, leaves: bool
+    ) -> bool:
+        """`for value in values: body()`; the values of a `range` may be known in the kernel only."""
+        if isinstance(values, Value):
+            whole = values
+            return self.each(Range(whole.shape[0]), lambda k: take(whole[k]), body, get, put, leaves)
+        if not isinstance(values, Range):
+            return self._written_out(values, take, body, get, put)
+        known = values.known()
+        if known is not None and len(known) <= UNROLLED and not leaves:
+            return self._written_out(known, take, body, get, put)
+        start, stop, step = values.numbers()
+        counter = [start]
+
+        def test() -> Any:
+            return counter[0] > stop if step < 0 else counter[0] < stop
+
+        def take_and_go() -> bool:
+            take(counter[0])
+            return body()
+
+        def both() -> tuple[Any, ...]:
+            return (*get(), counter[0])
+
+        def set_both(state: tuple[Any, ...]) -> None:
+            put(state[:-1])
+            counter[0] = state[-1]
+
+        return self._rounds(test, take_and_go, both, set_both, lambda: (*get(), counter[0] + step))
+
+    def _written_out(
+        self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put
+    ) -> bool:
+        loop = _Loop(get)
+        self._loops.append(loop)
+        reached = NEXT
+        for value in values:
+            loop.head, loop.nexts = Label(), []
+            take(value)
+            reached = body()
+            if loop.nexts:
+                if reached is NEXT:
+                    loop.nexts.append((self._ends_at(loop.head), get()))
+                put(self._met(loop.head, loop.nexts))
+                reached = NEXT
+            if reached is DONE:
+                break
+        self._loops.pop()
+        if not loop.exits:
+            return reached
+        if reached is NEXT:
+            loop.exits.append((self._ends_at(loop.end), get()))
+        put(self._met(loop.end, loop.exits))
+        return NEXT
+
+    def _rounds(self, test: Callable[[], Any], body: Callable[[], bool], get: Get, put: Put, advance: Get) -> bool:
+        noted_so_far, before, gives = notes(), get(), len(self._gives)
+        mark, wider = len(noted_so_far), dict[tuple[int, ...], Any]()
+        while True:
+            loop = _Loop(get)
+            loop.advance = advance
+            entry = self._ends_at(loop.head)
+            add(loop.head)
+            slots: dict[tuple[int, ...], Slot] = {}
+            put(carried(before, entry, slots, wider, ()))
+            going = self.test(test())
+            if going is False:
+                del noted_so_far[mark:]
+                put(before)
+                return NEXT
+            if isinstance(going, Value):
+                inside, out = Label(), Label()
+                add(Branch(going, inside, out))
+                add(out)
+                loop.exits.append((self._ends_at(loop.end), get()))
+                add(inside)
+            self._loops.append(loop)
+            self._depth += 1
+            reached = body()
+            self._depth -= 1
+            self._loops.pop()
+            if reached is NEXT:
+                values = advance()
+                loop.nexts.append((self._ends_at(loop.head), values))
+            again = [(slots, wider, assign, value) for assign, value in loop.nexts]
+            if all_of(goes_round(*one, ()) for one in again):
+                break
+            # A variable changes its type in the loop: once more with that which holds both.
+            del noted_so_far[mark:]
+            del self._gives[gives:]
+            put(before)
+        if not loop.exits:
+            return DONE
+        put(self._met(loop.end, loop.exits))
+        return NEXT
+
+    # --- Expressions ---
+
+    def item(self, of: Any, place: Any) -> Any:
+        """`of[place]`"""
+        if isinstance(of, (tuple, np.ndarray)) and has_value(place):
+            return noted(operator.getitem, of, place)
+        return of[place]
+
+
+class Range:
+    """The `range` of a loop of which a bound may be known in the kernel only."""
+
+    def __init__(self, *given: Any) -> None:
+        start, stop, step = (0, *given, 1) if len(given) == 1 else (*given, 1)[:3]
+        self._given = start, stop, step
+
+    def known(self) -> range | None:
+        """What it is in Python."""
+        return None if has_value(self._given) else range(*map(int, self._given))
+
+    def __iter__(self) -> Iterator[int]:
+        known = self.known()
+        if known is None:
+            raise TraceError("it asks for the numbers of a range that is known in the kernel only")
+        return iter(known)
+
+    def numbers(self) -> tuple[Any, Any, Any]:
+        """Start, stop and step, of one type; the step is known."""
+        start, stop, step = self._given
+        if isinstance(step, Value):
+            raise TraceError("the step of a range must be known before the kernel runs")
+        kinds = [kind_of(one) for one in (start, stop) if isinstance(one, Value)]
+        unsigned = bool(kinds) and all(not kind.signed for kind in kinds)
+        number = np.uint64 if unsigned else np.int64
+        first, last = (noted(number, one) if isinstance(one, Value) else number(one) for one in (start, stop))
+        return first, last, number(step)

@@ -1,0 +1,97 @@
+"""The syntax of a function that Python has compiled: where its source is, and whether it is still that."""
+
+import ast
+import functools
+import linecache
+import types
+from pathlib import Path
+from typing import Any
+
+_OWN = str(Path(__file__).parents[2])
+
+# Names that no function has: the syntax tree knows them, and no text does.
+FRAME, _TWIN = ".frame", ".twin"
+
+
+def node_of(code: types.CodeType) -> Any:
+    """The syntax of a function, or None where its file is not known or no longer has it."""
+    found = _nodes_at(code.co_filename, code.co_firstlineno, code.co_name)
+    for node in found:
+        is_lambda = isinstance(node, ast.Lambda)
+        body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
+        given = ast.copy_location(definition(_TWIN, node.args, body), node)
+        if len(found) == 1 or _told(_inner(compiled(given, code))) == _told(code):
+            return given if _is_as_written(code) else None
+    return None
+
+
+def definition(name: str, arguments: ast.arguments, body: list[Any]) -> ast.FunctionDef:
+    """The syntax of a function."""
+    made = ast.FunctionDef(name, arguments, body, [], None, None)
+    made.type_params = []  # type: ignore[attr-defined]  # from Python 3.12 on
+    return made
+
+
+def compiled(node: Any, code: types.CodeType) -> types.CodeType:
+    """A function inside one of its frame and its free variables."""
+    names = [FRAME, *code.co_freevars]
+    arguments = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+    result = ast.Return(ast.Name(node.name, ast.Load()))
+    outer = definition("make", arguments, [node, result])
+    tree = ast.fix_missing_locations(ast.Module([ast.copy_location(outer, node)], []))
+    whole = compile(tree, code.co_filename, "exec", dont_inherit=True)
+    return _inner(whole)
+
+
+def _inner(code: types.CodeType) -> types.CodeType:
+    return next(one for one in code.co_consts if isinstance(one, types.CodeType))
+
+
+def _told(code: types.CodeType) -> Any:
+    """What tells two functions of one line apart; code itself depends on what the file imports."""
+    return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
+
+
+def _is_as_written(code: types.CodeType) -> bool:
+    """Whether the file of a function still has this code: a user may edit it while a session goes on."""
+    return code.co_filename.startswith(_OWN) or code in _codes(code.co_filename)
+
+
+@functools.cache
+def _codes(file: str) -> set[types.CodeType]:
+    found = [compile("".join(linecache.getlines(file)), file, "exec", dont_inherit=True)]
+    for code in found:
+        found.extend(one for one in code.co_consts if isinstance(one, types.CodeType))
+    return set(found)
+
+
+def _nodes_at(file: str, line: int, name: str) -> list[Any]:
+    """The functions of that name that begin in a line of a file."""
+    if name != "<lambda>":
+        return [one for one in _definitions(file) if one.name == name and _first_line(one) == line]
+    inside = [one for one in _statements(file) if one.lineno <= line <= one.end_lineno]
+    found = (one for statement in inside for one in ast.walk(statement))
+    # A lambda in a function is met in that as well as in the statement around it.
+    return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
+
+
+def _first_line(node: ast.FunctionDef) -> int:
+    return min([node.lineno, *(one.lineno for one in node.decorator_list)])
+
+
+@functools.cache
+def _statements(file: str) -> list[Any]:
+    try:
+        return ast.parse("".join(linecache.getlines(file))).body
+    except SyntaxError:
+        return []
+
+
+@functools.cache
+def _definitions(file: str) -> list[ast.FunctionDef]:
+    """The functions of a file, also those in functions, classes and branches."""
+    statements = list(_statements(file))
+    for one in statements:
+        for block in ("body", "orelse", "finalbody"):
+            statements.extend(getattr(one, block, ()))
+    return [one for one in statements if isinstance(one, ast.FunctionDef)]

@@ -1,0 +1,300 @@
+"""Proxies of what a kernel has: an operation on them is noted, and Numba says of what type its result is."""
+
+import contextlib
+import functools
+import operator
+import threading
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from numba import typeof, types
+from numba.core.datamodel.registry import default_manager
+from numba.core.typing.templates import Signature
+
+from .notes import Attribute, Call, Element
+
+_now = threading.local()
+
+
+class TraceError(Exception):
+    """A helper does what has no notes; the text says what."""
+
+
+class Value:
+    """A number or an array of a kernel that is being traced: of a note, the part of its value at a path."""
+
+    __slots__ = ("kind", "note", "path")
+    __hash__ = None  # type: ignore[assignment]
+    # Without it an operator of NumPy's numbers takes it for an array.
+    __array_ufunc__ = None
+
+    def __init__(self, kind: Any, note: Any, path: tuple[int, ...]) -> None:
+        self.kind, self.note, self.path = kind, note, path
+
+    def _unknown(self, *_: Any) -> Any:
+        raise TraceError("it asks for a number that is known in the kernel only")
+
+    __bool__ = __float__ = __int__ = __index__ = __iter__ = __len__ = _unknown
+
+    def __getitem__(self, place: Any) -> Any:
+        if not _is_element(self.kind, place):
+            return noted(operator.getitem, self, place)
+        return opened(self.kind.dtype, add(Element(self, place if isinstance(place, tuple) else (place,))))
+
+    def __setitem__(self, place: Any, value: Any) -> None:
+        if not _is_element(self.kind, place) or not is_number(value):
+            noted(operator.setitem, self, place, value)
+        else:
+            add(Element(self, place if isinstance(place, tuple) else (place,), value))
+
+    def __getattr__(self, name: str) -> Any:
+        if name in _FIELDS and isinstance(self.kind, types.Array):
+            # A part of what an array is in a kernel: there is nothing to note.
+            number = _ARRAY.get_field_position(_FIELDS[name])
+            kind: Any = types.UniTuple(types.intp, self.kind.ndim) if name in ("shape", "strides") else types.intp
+            return opened(kind, self.note, (*self.path, number))
+        kind = None if name.startswith("__") else context().resolve_getattr(self.kind, name)
+        if kind is None:
+            raise AttributeError(f"{self.kind} has no attribute {name}")
+        if isinstance(kind, types.BoundFunction):
+            return functools.partial(_method, self, kind)
+        return opened(types.unliteral(kind), add(Attribute(self, name, kind)))
+
+    def __pow__(self, exponent: Any) -> Any:
+        if type(exponent) is int and 0 <= exponent <= _MOST_PRODUCTS:
+            return _product(self, exponent)
+        return noted(operator.pow, self, exponent)
+
+    def __rpow__(self, base: Any) -> Any:
+        return noted(operator.pow, base, self)
+
+    def __neg__(self) -> Any:
+        return noted(operator.neg, self)
+
+    def __pos__(self) -> Any:
+        return noted(operator.pos, self)
+
+    def __invert__(self) -> Any:
+        return noted(operator.invert, self)
+
+    def __abs__(self) -> Any:
+        return noted(abs, self)
+
+
+def _is_element(kind: Any, place: Any) -> bool:
+    """Whether a place in an array is that of one number."""
+    if not isinstance(kind, types.Array) or not isinstance(kind.dtype, (types.Number, types.Boolean)):
+        return False
+    places = place if isinstance(place, tuple) else (place,)
+    return len(places) == kind.ndim and all(map(_is_index, places))
+
+
+def _is_index(place: Any) -> bool:
+    if isinstance(place, Value):
+        return isinstance(place.kind, types.Integer)
+    return isinstance(place, (int, np.integer)) and not isinstance(place, bool) and bool(place >= 0)
+
+
+def _method(of: Value, kind: Any, *given: Any) -> Any:
+    """Note the call of a method of an array."""
+    return _result(Call(kind, _signature(kind, kind, tuple(map(kind_of, given))), (of, *given)))
+
+
+class Real(Value):
+    """A floating-point number: helpers are chosen by its class."""
+
+    __slots__ = ()
+
+
+_MOST_PRODUCTS = 64
+_FIELDS = {"shape": "shape", "strides": "strides", "size": "nitems"}
+_ARRAY = default_manager[types.Array(types.float64, 1, "C")]
+
+
+def _product(base: Any, exponent: int) -> Any:
+    """The power by a whole number, in the order in which Numba multiplies."""
+    result, factor = 1.0 if isinstance(base.kind, types.Float) else 1, base
+    while exponent:
+        if exponent & 1:
+            result = factor * result if isinstance(result, Value) else factor
+        exponent >>= 1
+        if exponent:
+            factor = factor * factor
+    return result
+
+
+def _two_sided(name: str, symbol: Any) -> None:
+    def forward(a: Any, b: Any) -> Any:
+        return NotImplemented if isinstance(b, tuple) else noted(symbol, a, b)
+
+    def reflected(a: Any, b: Any) -> Any:
+        return noted(symbol, b, a)
+
+    setattr(Value, f"__{name}__", forward)
+    setattr(Value, f"__r{name}__", reflected)
+
+
+def _comparison(name: str, symbol: Any) -> None:
+    setattr(Value, f"__{name}__", lambda a, b: noted(symbol, a, b))
+
+
+for _name in ("add", "sub", "mul", "truediv", "floordiv", "mod", "lshift", "rshift", "xor"):
+    _two_sided(_name, getattr(operator, _name))
+_two_sided("and", operator.and_)
+_two_sided("or", operator.or_)
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    _comparison(_name, getattr(operator, _name))
+
+
+class _Undefined:
+    """A variable without a value, or with values of several kinds."""
+
+    def __repr__(self) -> str:
+        return "a variable without one value"
+
+
+UNDEFINED = _Undefined()
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a number of a kernel, known or not: what a slot can hold."""
+    return isinstance(value, (Value, bool, int, float, np.generic))
+
+
+def has_value(given: Any) -> bool:
+    """Whether there is a proxy in it."""
+    if isinstance(given, (tuple, list)):
+        return any(map(has_value, given))
+    if isinstance(given, slice):
+        return has_value((given.start, given.stop, given.step))
+    return isinstance(given, Value)
+
+
+def kind_of(value: Any) -> Any:
+    """The type in a kernel of a constant, a proxy, or a record of them."""
+    if isinstance(value, Value):
+        return value.kind
+    if value is None:
+        return types.none
+    if isinstance(value, bool):
+        return types.boolean
+    if isinstance(value, int):
+        return types.intp
+    if type(value) is float:
+        return types.float64
+    if isinstance(value, tuple):
+        made = None if type(value) is tuple else type(value)
+        return types.BaseTuple.from_types([kind_of(part) for part in value], made)
+    if isinstance(value, _Undefined):
+        raise TraceError("a variable may be used before it has a value, or has values of several kinds")
+    try:
+        return types.unliteral(typeof(value))
+    except Exception:
+        raise TraceError(f"it uses {value!r:.60}, which no kernel has") from None
+
+
+def is_defined(value: Any) -> bool:
+    """Whether every part of it has one value."""
+    if isinstance(value, tuple):
+        return all(map(is_defined, value))
+    return not isinstance(value, _Undefined)
+
+
+def leaves(value: Any) -> list[Any]:
+    """What a record is made of, in its order."""
+    return [leaf for part in value for leaf in leaves(part)] if isinstance(value, tuple) else [value]
+
+
+def made_of(value: Any, parts: Iterable[Any]) -> Any:
+    """A tuple of the class of another."""
+    return tuple(parts) if type(value) is tuple else tuple.__new__(type(value), parts)
+
+
+def opened(kind: Any, note: Any, path: tuple[int, ...] = ()) -> Any:
+    """A value of a kernel as a record of proxies."""
+    if isinstance(kind, types.NoneType):
+        return None
+    if isinstance(kind, types.BaseTuple):
+        parts = [opened(part, note, (*path, k)) for k, part in enumerate(kind.types)]  # type: ignore[attr-defined]
+        made = getattr(kind, "instance_class", tuple)
+        return tuple(parts) if made is tuple else tuple.__new__(made, parts)
+    if isinstance(kind, types.NumberClass):
+        return np.dtype(str(kind.dtype)).type
+    kind = types.unliteral(kind)
+    return (Real if isinstance(kind, types.Float) else Value)(kind, note, path)
+
+
+# --- Noting ----------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
+    """Let a thread note what it traces; without a context that of the trace around it."""
+    before = getattr(_now, "notes", None), getattr(_now, "context", None)
+    _now.notes, _now.context = notes, context or before[1]
+    try:
+        yield
+    finally:
+        _now.notes, _now.context = before
+
+
+def context() -> Any:
+    """Numba's context of types in the trace of this thread."""
+    return _now.context
+
+
+def notes() -> list[Any]:
+    """The notes of the part that is being traced."""
+    return _now.notes  # type: ignore[no-any-return]
+
+
+def add(note: Any) -> Any:
+    """Add a note."""
+    _now.notes.append(note)
+    return note
+
+
+_signatures: dict[Any, tuple[Any, Any]] = {}
+
+
+def noted(symbol: Any, *given: Any) -> Any:
+    """Note an operation that Numba knows; its result as proxies."""
+    given = tuple(map(_sliced, given))
+    key = symbol, tuple(map(kind_of, given))
+    if key not in _signatures:
+        try:
+            kind = context().resolve_value_type(symbol)
+        except Exception as error:
+            raise TraceError(f"{name_of(symbol)} is nothing that a kernel has") from error
+        _signatures[key] = kind, _signature(symbol, kind, key[1])
+    return _result(Call(*_signatures[key], given))
+
+
+def _signature(symbol: Any, kind: Any, kinds: tuple[Any, ...]) -> Signature:
+    try:
+        signature = context().resolve_function_type(kind, kinds, {})
+    except Exception as error:
+        raise TraceError(f"{name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
+    if signature is None:
+        raise TraceError(f"there is no {name_of(symbol)} of {', '.join(map(str, kinds))}")
+    return signature  # type: ignore[no-any-return]
+
+
+def _result(note: Call) -> Any:
+    return opened(types.unliteral(note.signature.return_type), add(note))
+
+
+def _sliced(given: Any) -> Any:
+    """Slices as values of a kernel."""
+    if isinstance(given, slice):
+        parts = (given.start, given.stop) if given.step is None else (given.start, given.stop, given.step)
+        return noted(slice, *parts)
+    if isinstance(given, tuple) and any(isinstance(part, slice) for part in given):
+        return tuple(map(_sliced, given))
+    return given
+
+
+def name_of(symbol: Any) -> str:
+    """The name of an operation, for a sentence."""
+    return getattr(symbol, "__name__", str(symbol))

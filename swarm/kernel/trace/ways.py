@@ -1,0 +1,87 @@
+"""Where the ways through a helper meet: one value of a variable for several."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from numba import types
+
+from .notes import Assign, Load, Slot
+from .values import UNDEFINED, TraceError, Value, add, context, is_number, kind_of, made_of, opened
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    if a is b:
+        return True
+    if isinstance(a, Value) or isinstance(b, Value):
+        return isinstance(a, Value) and isinstance(b, Value) and a.note is b.note and a.path == b.path
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(_is_same, a, b))
+    if isinstance(a, float):
+        return a == b and math.copysign(1.0, a) == math.copysign(1.0, b)
+    try:
+        return bool(a == b)
+    except (ValueError, TypeError):
+        return False
+
+
+def all_of(answers: Iterable[bool]) -> bool:
+    """Whether all are true; all of them are asked."""
+    return all(list(answers))
+
+
+def unified(kinds: list[Any]) -> Any:
+    """The type that holds values of all these."""
+    kind = kinds[0] if all(k == kinds[0] for k in kinds) else context().unify_types(*kinds)
+    if kind is None or isinstance(kind, types.Optional):
+        raise TraceError(f"a variable is {' or '.join(map(str, kinds))}")
+    return types.unliteral(kind)
+
+
+def merged(ways: list[tuple[Assign, Any]]) -> Any:
+    """One value for several, each known on its way."""
+    first = ways[0][1]
+    if all(_is_same(value, first) for _, value in ways):
+        return first
+    values = [value for _, value in ways]
+    if all(isinstance(value, tuple) and type(value) is type(first) and len(value) == len(first) for value in values):
+        columns = [[(assign, value[k]) for assign, value in ways] for k in range(len(first))]
+        return made_of(first, map(merged, columns))
+    if not all(map(is_number, values)):
+        return UNDEFINED
+    slot = Slot(unified(list(map(kind_of, values))))
+    for assign, value in ways:
+        assign.pairs.append((slot, value))
+    return opened(slot.kind, add(Load(slot)))
+
+
+def carried(value: Any, entry: Assign, slots: Any, wider: Any, path: tuple[int, ...]) -> Any:
+    """The variables of a loop at the start of a round: every number is in a slot."""
+    if isinstance(value, tuple):
+        return made_of(value, [carried(one, entry, slots, wider, (*path, k)) for k, one in enumerate(value)])
+    if not is_number(value):
+        return value
+    slots[path] = slot = Slot(wider.get(path) or kind_of(value))
+    entry.pairs.append((slot, value))
+    return opened(slot.kind, add(Load(slot)))
+
+
+def goes_round(slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
+    """Put the variables at the end of a round into their slots; whether the types of these hold them."""
+    if isinstance(value, tuple):
+        return all_of(goes_round(slots, wider, assign, one, (*path, k)) for k, one in enumerate(value))
+    slot = slots.get(path)
+    if slot is None:
+        if is_number(value) and any(key[: len(path)] == path for key in slots):
+            raise TraceError("a variable of a loop is a number in one round and a record in another")
+        return True
+    if not is_number(value):
+        raise TraceError("a variable of a loop is a number in one round and something else in another")
+    assign.pairs.append((slot, value))
+    kind = unified([slot.kind, kind_of(value)])
+    if kind == slot.kind:
+        return True
+    wider[path] = kind
+    return False
