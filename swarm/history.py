@@ -142,6 +142,8 @@ class _Rows:
 
     def history(self, converged: bool) -> ContactHistory:
         columns: list[Any] = [np.array(column) for column in zip(*self._rows, strict=True)]
+        listed = np.argsort(self._scene.owners(), kind="stable")
+        columns[:4] = [column[:, listed] for column in columns[:4]]
         if len(self._scene.surfaces) == 1:
             columns[:4] = [column[:, 0] for column in columns[:4]]
         return ContactHistory(*columns, *[converged])

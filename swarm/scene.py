@@ -21,7 +21,7 @@ from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, chain_in, order_of
-from .surfaces.fields.many import Many, members_of
+from .surfaces.fields.many import Many, in_straight_flights, members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.free import cell_in
@@ -176,15 +176,20 @@ class Scene:
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity, self.period)
 
-    def chain(self, moment: float = 0.0, own: Sequence[Surface] = ()) -> Chain | Field | Carried | None:
-        """The surfaces as kernels take them; those that move in the frame that ends at a moment [s].
+    def chain(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Chain | Field | Carried | None:
+        """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
 
-        After them those of a body's `own`, where nothing moves.
+        For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
         """
         if self.moves():
             fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
             return carried(fields, others, moment)
-        return chain_in(self.order, self._pieces, self._groups, own)
+
+        def taken(members: Members) -> Members:
+            straight = self.gravity is None and own is None
+            return in_straight_flights(members, self.period is not None) if straight else members
+
+        return chain_in(self.order, self._pieces, self._groups, own or (), taken)
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""

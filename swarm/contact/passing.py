@@ -123,8 +123,8 @@ def _may_pass(openings, wall, path, reach):
 
 @_may_pass.register(Openings)
 def _(openings, wall, path, reach):
-    here = (wall >= 0.0) & (wall < openings.walls) & _may_enter_any(openings.volumes, path, reach)
-    return here | _may_pass(openings.rest, wall - openings.walls, path, reach)
+    here = (wall >= openings.first) & (wall < openings.last) & _may_enter_any(openings.volumes, path, reach)
+    return here | _may_pass(openings.rest, wall, path, reach)
 
 
 @by_type
@@ -196,9 +196,9 @@ def _part(openings, wall, path, near):
 
 @_part.register(Openings)
 def _(openings, wall, path, near):
-    if 0.0 <= wall < openings.walls:
+    if openings.first <= wall < openings.last:
         return _first_part(openings.volumes, path, near)
-    return _part(openings.rest, wall - openings.walls, path, near)
+    return _part(openings.rest, wall, path, near)
 
 
 @by_type

@@ -76,16 +76,7 @@ def _seek_among(members, before, gravity, lanes, live):
 
 @_seek_among.register(Few)
 def _(members, before, gravity, lanes, live):
-    _seek_among_few(gravity, members, before, lanes, live)
-
-
-@by_type
-def _seek_among_few(gravity, members, before, lanes, live):
-    """The same where each lane looks at all of them."""
-
-
-@_seek_among_few.register(Nothing)
-def _(gravity, members, before, lanes, live):
+    # Flights are straight.
     rows, course = lanes.rows, lanes.course
     for m in range(members.table.shape[0]):
         body, number = member(members, index(m)), before + m
@@ -94,11 +85,6 @@ def _(gravity, members, before, lanes, live):
             sooner = time < course[_TIME, i]
             course[_TIME, i] = select(sooner, time, course[_TIME, i])
             course[_WALL, i] = select(sooner, select(hits, number, -1.0), course[_WALL, i])
-
-
-@_seek_among_few.register(Gravity)
-def _(gravity, members, before, lanes, live):
-    _look_at_near(gravity, members, before, lanes, live)
 
 
 @_seek_among.register(Members)

@@ -24,7 +24,7 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     """The walls of a scene in the frame that ends at a moment [s]."""
     owners = np.array(scene.owners())
     rest = [surface for surface in scene.surfaces if not surface.reacts()]
-    given = Scene(rest, scene.gravity) if rest else None
+    given = Scene(rest, scene.gravity).apart("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
         None if given is None else given.chain(moment),
@@ -36,13 +36,15 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
 
 
 def _reacting(scene: Scene) -> Chain | None:
-    made, number, row = [], 0, 0
-    for surface in scene.surfaces:
+    """The walls that react, in the order of the scene's chain; rows of freedoms are in that of its surfaces."""
+    rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
+    made, number = [], 0
+    for i in dict.fromkeys(scene.owners()):
+        surface = scene.surfaces[i]
         walls = surface.walls()
         if surface.reacts():
-            freedom = _freedom(surface, row, scene.gravity or (0.0, 0.0, 0.0))
+            freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
-            row += 1
         number += len(walls)
     chain = None
     for wall in reversed(made):

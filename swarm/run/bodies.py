@@ -54,7 +54,7 @@ class BodyRun:
         self._touching = touching_of(bodies.body, self._ties, scene)
         own = own_surfaces(bodies.body)
         self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
-        self._chains = scene.chain(), scene.chain(own=own)
+        self._chains = scene.chain(own=()), scene.chain(own=own)
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), walls + len(own)
         shape = 3, points, n
         none, never = np.zeros(0), np.zeros((3, rows, n))

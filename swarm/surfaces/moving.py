@@ -54,12 +54,12 @@ row.register(Carried, lambda chain, wall: row(chain.walls, wall))
 
 def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float) -> Chain | Field | Carried | None:
     """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others."""
-    of_surfaces = [_walls_of(surface, moment) for surface in surfaces]
+    of_surfaces = [walls_of(surface, moment) for surface in surfaces]
     chain: Chain | Field | None = None
     for wall in reversed([wall for walls in of_surfaces for wall in walls]):
         chain = Chain(wall, chain)
     for field in reversed(fields):
-        chain = Field(_walls_of(field, moment)[0], chain)
+        chain = Field(walls_of(field, moment)[0], chain)
     if chain is None or all(surface.motion is None for surface in (*fields, *surfaces)):
         return chain
     if fields:
@@ -75,7 +75,7 @@ def _may_stride(walls: list[Any]) -> bool:
     return walls[0].drive.track is None and all(contract.has_levels(wall.body) for wall in walls)
 
 
-def _walls_of(surface: Surface, moment: float) -> list[Any]:
+def walls_of(surface: Surface, moment: float) -> list[Any]:
     """The walls of a surface in the frame that ends at a moment [s]."""
     first, *others = surface.walls()
     if surface.motion is None:

@@ -20,6 +20,7 @@ from . import contract, required
 from .fields.many import Many
 from .fold import Chain, Field, chain_of
 from .images import Lengths, images_of
+from .kinds import by_kind
 from .near import deepest_in_cell
 from .room import has_room
 from .surface import SIDES, Surface
@@ -31,10 +32,11 @@ _REACH = 2.0
 
 
 class Openings(NamedTuple):
-    """Of so many walls in a row the volumes in which they are open, a Chain or None; then those of the next walls."""
+    """The volumes in which some walls are open, a Chain, and their numbers, from one to before another; then others."""
 
     volumes: Any
-    walls: float
+    first: float
+    last: float
     rest: Any
 
 
@@ -48,15 +50,19 @@ def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Sur
     """
     if not any(volumes):
         return None
+    runs, number = [], 0
+    for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
+        first, number = number, number + sum(walls for _piece, walls in some)
+        runs += [(_chain_of(given), float(first), float(number))] if given else []
     found: Openings | None = None
-    for given, some in itertools.groupby(reversed(spans), lambda span: volumes[span[0]]):
-        found = Openings(_chain_of(given), float(sum(walls for _piece, walls in some)), found)
+    for run in by_kind(runs, lambda run: run[0]):
+        found = Openings(*run, found)
     return found
 
 
 def _chain_of(volumes: Sequence[Surface]) -> Chain | None:
     chain = None
-    for volume in reversed(volumes):
+    for volume in by_kind(volumes, lambda volume: volume.walls()):
         chain = Chain(Field(volume.members, None) if isinstance(volume, Many) else chain_of([volume]), chain)
     return chain
 
@@ -180,8 +186,8 @@ def is_open(openings, wall, r, near):
 
 @is_open.register(Openings)
 def _(openings, wall, r, near):
-    here = (wall >= 0.0) & (wall < openings.walls) & _is_in_any(openings.volumes, r, near)
-    return here | is_open(openings.rest, wall - openings.walls, r, near)
+    here = (wall >= openings.first) & (wall < openings.last) & _is_in_any(openings.volumes, r, near)
+    return here | is_open(openings.rest, wall, r, near)
 
 
 @by_type

@@ -51,8 +51,8 @@ def cells_of(coefficients: Floats, width: Floats) -> Cells:
     low, high = _bends(coefficients, width, around)
     rows = np.argwhere(near)
     unit = float(width.min()) / _PARTS
-    # Less a little for round-off
-    clear = 1 + np.floor(_distance(around, width) * ((1.0 - 1e-5) / unit)).astype(np.uint8)
+    # Less a little for round-off; in C's order, as it comes out of a pickle, so that kernels are compiled once.
+    clear = 1 + np.floor(_distance(around, width) * ((1.0 - 1e-5) / unit)).astype(np.uint8, order="C")
     clear[near] = 0
     row = np.zeros(near.shape, np.int32)
     row[near] = np.arange(len(rows))

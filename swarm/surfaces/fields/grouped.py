@@ -1,13 +1,16 @@
 """Which surfaces of a scene kernels take together: more than a few of one kind are one field."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from ...motion import Placed
 from ..fold import Chain, Field, Listed
+from ..kinds import by_kind
+from ..moving import walls_of
 from ..surface import Surface
 from .many import Many
-from .members import Members, can_be_member, kind_of
+from .members import Members, alike, can_be_member, kind_of
 
 # So many surfaces of one kind stay walls of their own, whose numbers are not looked up: an impact in a sphere with 6
 # balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
@@ -15,7 +18,7 @@ _FEW = 6
 
 
 class Order(NamedTuple):
-    """The surfaces of a scene, by their numbers, in the order of its chain."""
+    """The surfaces of a scene, by their numbers, in the order of its chain: by their kinds, not as they are listed."""
 
     fields: tuple[int, ...]  # each many bodies
     groups: tuple[tuple[int, ...], ...]  # each taken as one field
@@ -45,29 +48,50 @@ class Order(NamedTuple):
 
 def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
     """The order of the chain of a scene; where a surface moves, or not `together`, all are walls of their own."""
-    fields = tuple(i for i, surface in enumerate(surfaces) if isinstance(surface, Many))
+    fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, Many)]
     rest = [i for i in range(len(surfaces)) if i not in fields]
     of_kind: dict[Any, list[int]] = defaultdict(list)
     together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)
     for i in rest if together and len(rest) > _FEW else ():
         if surfaces[i].is_solid() and len(surfaces[i].walls()) == 1 and can_be_member(surfaces[i].walls()[0]):
             of_kind[kind_of(surfaces[i].walls()[0]), _laws(surfaces[i])].append(i)
-    groups = tuple(tuple(group) for group in of_kind.values() if len(group) > _FEW)
+    groups = [tuple(group) for group in of_kind.values() if len(group) > _FEW]
     grouped = {i for group in groups for i in group}
-    return Order(fields, groups, tuple(i for i in rest if i not in grouped))
+    others = [i for i in rest if i not in grouped]
+
+    def walls(i: int) -> Any:
+        one = surfaces[i]
+        # What is only looked at where it stays has no motion that kernels know.
+        return one.walls() if isinstance(one.motion, Placed) else walls_of(one, 0.0), one.motion, one.mass, one.inertia
+
+    def volumes(i: int) -> Any:
+        return [volume.walls() for volume in surfaces[i].openings]
+
+    def body(group: tuple[int, ...]) -> Any:
+        return alike([surfaces[i].walls()[0] for i in group])[0]
+
+    # Fields of few bodies may be of a kind of their own. Openings are last: which walls have them is no kind.
+    fields.sort(key=lambda i: len(surfaces[i]))  # type: ignore[arg-type]
+    groups.sort(key=len)
+    fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))
+    return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others))
 
 
 def chain_in(
-    order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface]
-) -> Chain | Field | None:
-    """The chain of a scene in which nothing moves, and of a body's own surfaces; `groups` are the order's fields."""
+    order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface],
+    taken: Callable[[Members], Members],
+) -> Chain | Field | None:  # fmt: skip
+    """The chain of a scene in which nothing moves, and of a body's own surfaces.
+
+    `groups` are the order's fields, and `taken` says how kernels take a field.
+    """
     chain: Chain | Field | None = None
     for wall in reversed([wall for one in (*(surfaces[i] for i in order.others), *own) for wall in one.walls()]):
         chain = Chain(wall, chain)
     for members in reversed(groups):
-        chain = Listed(members, chain)
+        chain = Listed(taken(members), chain)
     for i in reversed(order.fields):
-        chain = Field(surfaces[i].walls()[0], chain)
+        chain = Field(taken(surfaces[i].walls()[0]), chain)
     return chain
 
 

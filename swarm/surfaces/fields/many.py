@@ -148,10 +148,14 @@ def field_of(
 ) -> Members:
     """The field of the bodies of a table, with their bounds."""
     if len(table) <= _IN_ONE_CELL:
-        return Few(like, table, one_cell(len(table)))
-    few = _FEW_BALLS if repeated is None and isinstance(like, SphereNumbers) else _FEW
-    kind = Few if len(table) <= few else Members
-    return kind(like, table, grid_of(like, table, corners(), repeated))
+        return Members(like, table, one_cell(len(table)))
+    return Members(like, table, grid_of(like, table, corners(), repeated))
+
+
+def in_straight_flights(members: Members, repeats: bool) -> Members:
+    """A field as kernels take it where there is no gravity, and nothing moves; in a cell that repeats, or not."""
+    few = _FEW_BALLS if isinstance(members.like, SphereNumbers) and not repeats else _FEW
+    return Few(*members) if len(members.table) <= few else members
 
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:
