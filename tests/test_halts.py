@@ -14,6 +14,7 @@ import pytest
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
 from swarm.lanes import block, meet, slide
+from swarm.lanes.arrays import LANES
 from swarm.reacting import queue
 from swarm.run import reacting, turns
 from swarm.run.admission import task_of
@@ -194,6 +195,19 @@ def test_a_frame_in_two_threads_has_the_same_bits():
                 run._pace, run._watch._alone[True] = 0.0 if alone else np.inf, alone
                 assert run.advance(0.5, moment)
             ends.add((run.state.position.tobytes(), run.state.velocity.tobytes(), run.state.impacts.tobytes()))
+    assert len(ends) == 1
+
+
+def test_a_frame_of_no_time_leaves_nothing_for_the_next():
+    """Of more particles than lanes some are left when the caller's thread is freed: the next frame moves them too."""
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    start, ends = swarm.fill(scene, LANES + 44, speed=1.0, seed=1), set()
+    for alone in (1, 10**6):
+        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+            run._watch._alone[True] = alone
+            assert run.advance(0.0, 0.0)
+            assert run.advance(0.5, 0.5)
+            ends.add((run.state.position.tobytes(), run.state.impacts.tobytes()))
     assert len(ends) == 1
 
 

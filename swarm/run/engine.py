@@ -144,9 +144,9 @@ class Run:
         if status not in (Status.DONE, Status.INTERRUPTED):
             ended = Status(status), particle
             raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, self._first))
-        if status == Status.DONE and span > 0.0:
+        if status == Status.DONE:
             self._halted = lanes.none_halted(self._booked)
-            self._pace = seconds * (others + helps) / span
+            self._pace = seconds * (others + helps) / span if span > 0.0 else self._pace
         return not self._cut_short
 
     def _meet_hard(self, phase: int) -> None:
