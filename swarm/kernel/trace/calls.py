@@ -31,8 +31,14 @@ OPERATIONS: set[Any] = {
 }  # fmt: skip
 # Functions that only a kernel can do.
 INTRINSIC: set[Any] = set()
+
+
+def _length(of: Any) -> Any:
+    return of.shape[0] if isinstance(of, Value) else len(of)
+
+
 # What is called in place of a function while it is traced.
-REPLACED: dict[Any, Callable[..., Any]] = {range: Range, select: traced_select}
+REPLACED: dict[Any, Callable[..., Any]] = {len: _length, range: Range, select: traced_select}
 
 _FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}
 
