@@ -17,16 +17,13 @@ from numba.extending import lower_builtin
 from . import trace
 from .emit import emit
 from .entries import python_class
-from .trace import Argument, Frame, NotTraceable, Part, Real, Value
+from .trace import Argument, Frame, Part, Real, Value
 from .twins import twin_of
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
 # Why helpers are compiled by Numba, by their names.
 left_to_numba: dict[str, str] = {}
-
-# What Python says where a proxy is none of what a function expects.
-_FAILURES = (NotTraceable, TypeError, AttributeError, ValueError, IndexError, NotImplementedError)
 
 Choose = Callable[[Any], Any]
 
@@ -76,7 +73,7 @@ class Helper:
                         part.result = self._run(given)
                     part.kind = trace.kind_of(part.result)
                     self._whole[kinds] = part
-                except _FAILURES as error:
+                except Exception as error:  # What Python says where a proxy is not what a function expects.
                     self._leave(error)
         return self._whole[kinds]
 
@@ -94,7 +91,7 @@ class Helper:
                 try:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
-                except _FAILURES as error:
+                except Exception as error:  # What Python says where a proxy is not what a function expects.
                     self._leave(error)
         return self._parts[key]
 
@@ -103,17 +100,14 @@ class Helper:
         mark = len(notes)
         try:
             return self._run(given)
-        except _FAILURES as error:
+        except Exception as error:  # What Python says where a proxy is not what a function expects.
             del notes[mark:]
             self._leave(error)
             return trace.noted(self._function, *given)
 
     def _run(self, given: Any) -> Any:
         definition, frame = self._choose(_class_of(given[0]) if given else object), Frame()
-        twin = twin_of(definition, frame)
-        if twin is None:
-            return definition(*given)
-        twin(*given)
+        twin_of(definition, frame)(*given)
         return frame.result()
 
     def _leave(self, error: Exception) -> None:

@@ -26,14 +26,12 @@ from numba.core.datamodel import default_manager
 from numba.core.dispatcher import Dispatcher
 from numba.core.typing.templates import Signature
 
+from .twins import NotTraceable, twin_of
+
 # Rounds of a loop that are written out: a loop over the parts of a composition, the axes, the corners of a cell.
 UNROLLED = 8
 
 _now = threading.local()
-
-
-class NotTraceable(Exception):
-    """A helper does what has no notes; the text says what."""
 
 
 # --- What is noted ---------------------------------------------------------------------------------------
@@ -329,6 +327,10 @@ def has_value(given: Any) -> bool:
     return isinstance(given, Value)
 
 
+# Of a whole number that has a sign, without it.
+_BITS = 63
+
+
 def kind_of(value: Any) -> Any:
     """The type in a kernel of a constant, a proxy, or a record of them."""
     if isinstance(value, Value):
@@ -337,7 +339,7 @@ def kind_of(value: Any) -> Any:
         return types.none
     if isinstance(value, bool):
         return types.boolean
-    if isinstance(value, int):
+    if isinstance(value, int) and value.bit_length() < _BITS:
         return types.intp
     if type(value) is float:
         return types.float64
@@ -477,7 +479,7 @@ def _is_same(a: Any, b: Any) -> bool:
         return False
 
 
-def _unified(kinds: list[Any]) -> Any:
+def unified(kinds: list[Any]) -> Any:
     kind = kinds[0] if all(k == kinds[0] for k in kinds) else _now.context.unify_types(*kinds)
     if kind is None or isinstance(kind, types.Optional):
         raise NotTraceable(f"a variable is {' or '.join(map(str, kinds))}")
@@ -495,7 +497,7 @@ def _merged(ways: list[tuple[Assign, Any]]) -> Any:
         return made_of(first, map(_merged, columns))
     if not all(map(is_number, values)):
         return UNDEFINED
-    slot = Slot(_unified(list(map(kind_of, values))))
+    slot = Slot(unified(list(map(kind_of, values))))
     for assign, value in ways:
         assign.pairs.append((slot, value))
     return opened(slot.kind, add(Load(slot)))
@@ -747,8 +749,7 @@ class Frame:
             if reached is NEXT:
                 values = advance()
                 loop.nexts.append((self._ends_at(loop.head), values))
-            again = [(slots, wider, assign, value) for assign, value in loop.nexts]
-            if all([_goes_round(*one, ()) for one in again]):
+            if all([_goes_round(before, slots, wider, assign, value, ()) for assign, value in loop.nexts]):
                 break
             # A variable changes its type in the loop: once more with that which holds both.
             del noted_so_far[mark:]
@@ -767,7 +768,7 @@ class Frame:
             return noted(operator.getitem, of, place)
         return of[place]
 
-    def call(self, function: Any, *given: Any, **named: Any) -> Any:
+    def call(self, function: Any, /, *given: Any, **named: Any) -> Any:
         """`function(...)`"""
         return called(function, given, named)
 
@@ -811,19 +812,20 @@ def _carried(value: Any, entry: Assign, slots: Any, wider: Any, path: tuple[int,
     return opened(slot.kind, add(Load(slot)))
 
 
-def _goes_round(slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
+def _goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
     """Put the variables at the end of a round into their slots; whether the types of these hold them."""
-    if isinstance(value, tuple):
-        return all([_goes_round(slots, wider, assign, one, (*path, k)) for k, one in enumerate(value)])
+    if isinstance(before, _Undefined):
+        return True  # a round does not see what an earlier one has left in it
+    if isinstance(before, tuple) and type(value) is type(before) and len(value) == len(before):
+        pairs = enumerate(zip(before, value, strict=True))
+        return all([_goes_round(old, slots, wider, assign, new, (*path, k)) for k, (old, new) in pairs])
     slot = slots.get(path)
-    if slot is None:
-        if is_number(value) and any(key[: len(path)] == path for key in slots):
-            raise NotTraceable("a variable of a loop is a number in one round and a record in another")
+    if slot is None and _is_same(before, value):
         return True
-    if not is_number(value):
-        raise NotTraceable("a variable of a loop is a number in one round and something else in another")
+    if slot is None or not is_number(value):
+        raise NotTraceable("a variable of a loop is something else in the first round than later")
     assign.pairs.append((slot, value))
-    kind = _unified([slot.kind, kind_of(value)])
+    kind = unified([slot.kind, kind_of(value)])
     if kind == slot.kind:
         return True
     wider[path] = kind
@@ -840,31 +842,24 @@ OPERATIONS: set[Any] = {
         "ldexp", "lgamma", "log", "log10", "log1p", "log2", "pow", "radians", "sin", "sinh", "sqrt", "tan", "tanh",
         "trunc",
     )),
-    builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int, builtins.max, builtins.min,
+    builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int,
     builtins.pow, builtins.round,
     *(function for function in vars(operator).values() if isinstance(function, python_types.BuiltinFunctionType)),
 }  # fmt: skip
 # Functions that only a kernel can do.
 INTRINSIC: set[Any] = set()
 # What is called in place of a function while it is traced.
-REPLACED: dict[Any, Callable[..., Any]] = {range: Range}
+REPLACED: dict[Any, Callable[..., Any]] = {
+    range: Range,
+    len: lambda values: values.shape[0] if isinstance(values, Value) else len(values),
+}
+# Of NumPy: `np.array`, `np.sum` and others that are no ufuncs.
+_ARRAY_FUNCTION = type(np.sum)
+_IN_PLACE = (list, dict, set)
 
 
-_FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}
-
-
-def _extreme(farther: Any, values: Any) -> Any:
-    """The least or the largest of some numbers, by the comparisons of Python: a NaN is never taken for the first one."""
-    from .jit import select
-
-    kind = _unified(list(map(kind_of, values)))
-    first, *others = (one if kind_of(one) == kind else _cast(one, kind) for one in values)
-    for one in others:
-        first = REPLACED[select](farther(one, first), one, first)
-    return first
-
-
-def _cast(value: Any, kind: Any) -> Any:
+def cast(value: Any, kind: Any) -> Any:
+    """A number as one of another type."""
     number = np.dtype(str(kind)).type
     return noted(number, value) if isinstance(value, Value) else number(value)
 
@@ -885,34 +880,32 @@ def called(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
         return replaced(*given, **named)
     if function in INTRINSIC:
         return noted(function, *given)
-    if is_operation or isinstance(function, (np.ufunc, Dispatcher)) or _is_number_class(function):
+    if is_operation or _is_operation(function):
         if not has_value(given):
             return function(*given, **named)
         if named:
             raise NotTraceable(f"{_name_of(function)} is called by the names of its arguments")
         if function is int:
             return given[0] if isinstance(given[0].kind, types.Integer) else noted(np.int64, *given)
-        if function in _FARTHER:
-            return _extreme(_FARTHER[function], given[0] if len(given) == 1 else given)
         return noted(function, *given)
     if isinstance(function, python_types.FunctionType):
         return _plain(function, given, named)
     if isinstance(function, python_types.MethodType) and isinstance(function.__func__, python_types.FunctionType):
         return _plain(function.__func__, (function.__self__, *given), named)
+    is_python = getattr(function, "__module__", None) == "builtins"
+    if function in _IN_PLACE or (is_python and any(isinstance(one, Value) for one in given)):
+        raise NotTraceable(f"it asks {_name_of(function)} about a number that is known in the kernel only")
     return function(*given, **named)
 
 
-def _is_number_class(function: Any) -> bool:
+def _is_operation(function: Any) -> bool:
+    if isinstance(function, (np.ufunc, _ARRAY_FUNCTION, Dispatcher)) or function is np.array:
+        return True
     return isinstance(function, type) and issubclass(function, np.generic)
 
 
 def _plain(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """A Python function that nobody has prepared for kernels."""
-    from .twins import twin_of
-
     frame = Frame()
-    twin = twin_of(function, frame)
-    if twin is None:
-        return function(*given, **named)
-    twin(*given, **named)
+    twin_of(function, frame)(*given, **named)
     return frame.result()

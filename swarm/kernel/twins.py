@@ -12,42 +12,61 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
+import contextlib
 import functools
 import itertools
 import linecache
+import os
+import time
 import types
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
-from .trace import UNDEFINED, Frame, NotTraceable
+import numpy as np
 
 # Names that no function has: the syntax tree knows them, and no text does.
 _FRAME, _TWIN = ".frame", ".twin"
-_OWN = str(Path(__file__).parents[1])
+_STARTED = time.time()
 
 
-def twin_of(function: Any, frame: Frame) -> Callable[..., Any] | None:
-    """The twin of a function for one call of it; None where its source is not known.
+class NotTraceable(Exception):
+    """A helper does what has no notes; the text says what."""
+
+
+def twin_of(function: Any, frame: Any) -> Callable[..., Any]:
+    """The twin of a function for one call of it.
 
     Raises:
-        NotTraceable: it has a statement that no kernel has.
+        NotTraceable: its source is not known, or has a statement that no kernel has.
     """
-    factory = _factory(function.__code__)
-    if factory is None:
-        return None
-    make = types.FunctionType(factory, function.__globals__)
-    cells = [_content(cell) for cell in function.__closure__ or ()]
-    twin: Any = make(frame, *cells)
+    cells = [_content(cell, frame) for cell in function.__closure__ or ()]
+    twin: Any = _maker(function)(frame, *cells)
     twin.__defaults__, twin.__kwdefaults__ = function.__defaults__, function.__kwdefaults__
     return twin  # type: ignore[no-any-return]
 
 
-def _content(cell: Any) -> Any:
+@functools.cache
+def _maker(function: Any) -> Any:
+    """The function (frame, cells) that gives the twin."""
+    factory = _factory(function.__code__)
+    if factory is None:
+        raise NotTraceable(f"the source of {function.__name__} is not known")
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        # What may change later is not known when a kernel is compiled.
+        if not callable(value) and not isinstance(value, _LASTING):
+            raise NotTraceable(f"{function.__name__} uses {name}, a {type(value).__name__}")
+    return types.FunctionType(factory, function.__globals__)
+
+
+_LASTING = (tuple, str, bytes, int, float, complex, type(None), range, np.generic, np.ndarray, types.ModuleType)
+
+
+def _content(cell: Any, frame: Any) -> Any:
     try:
         return cell.cell_contents
     except ValueError:
-        return UNDEFINED
+        return frame.UNDEFINED
 
 
 _factories: dict[types.CodeType, types.CodeType | NotTraceable | None] = {}
@@ -83,13 +102,14 @@ def _compiled(node: Any, code: types.CodeType) -> types.CodeType:
 
 def _node_of(code: types.CodeType) -> Any:
     """The syntax of a function, or None where its file is not known or no longer has it."""
-    found = _nodes_at(code.co_filename, code.co_firstlineno, code.co_name)
+    text = _text(code.co_filename)
+    found = _nodes_at(text, code.co_firstlineno, code.co_name)
     for node in found:
         is_lambda = isinstance(node, ast.Lambda)
         body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
         given = ast.copy_location(_function(_TWIN, node.args, body), node)
         if len(found) == 1 or _told(_inner(_compiled(given, code))) == _told(code):
-            return given if _is_as_written(code) else None
+            return given if _is_as_written(code, text) else None
     return None
 
 
@@ -102,24 +122,33 @@ def _told(code: types.CodeType) -> Any:
     return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
 
 
-def _is_as_written(code: types.CodeType) -> bool:
-    """Whether the file of a function still has this code: a user may edit it while a session goes on."""
-    return code.co_filename.startswith(_OWN) or code in _codes(code.co_filename)
+def _text(file: str) -> str:
+    linecache.checkcache(file)
+    return "".join(linecache.getlines(file))
+
+
+def _is_as_written(code: types.CodeType, text: str) -> bool:
+    """Whether a function is still what its file says: a user may edit that while a session goes on."""
+    with contextlib.suppress(OSError):
+        found = os.stat(code.co_filename)
+        if max(found.st_mtime, found.st_ctime) < _STARTED:
+            return True  # 0.1 s sooner than by its code
+    return code in _codes(code.co_filename, text)
 
 
 @functools.cache
-def _codes(file: str) -> set[types.CodeType]:
-    found = [compile("".join(linecache.getlines(file)), file, "exec", dont_inherit=True)]
+def _codes(file: str, text: str) -> set[types.CodeType]:
+    found = [compile(text, file, "exec", dont_inherit=True)]
     for code in found:
         found.extend(one for one in code.co_consts if isinstance(one, types.CodeType))
     return set(found)
 
 
-def _nodes_at(file: str, line: int, name: str) -> list[Any]:
-    """The functions of that name that begin in a line of a file."""
+def _nodes_at(text: str, line: int, name: str) -> list[Any]:
+    """The functions of that name that begin in a line of a text."""
     if name != "<lambda>":
-        return [one for one in _definitions(file) if one.name == name and _first_line(one) == line]
-    inside = [one for one in _statements(file) if one.lineno <= line <= one.end_lineno]
+        return [one for one in _definitions(text) if one.name == name and _first_line(one) == line]
+    inside = [one for one in _statements(text) if one.lineno <= line <= one.end_lineno]
     found = (one for statement in inside for one in ast.walk(statement))
     # A lambda in a function is met in that as well as in the statement around it.
     return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
@@ -130,17 +159,17 @@ def _first_line(node: ast.FunctionDef) -> int:
 
 
 @functools.cache
-def _statements(file: str) -> list[Any]:
+def _statements(text: str) -> list[Any]:
     try:
-        return ast.parse("".join(linecache.getlines(file))).body
+        return ast.parse(text).body
     except SyntaxError:
         return []
 
 
 @functools.cache
-def _definitions(file: str) -> list[ast.FunctionDef]:
-    """The functions of a file, also those in functions, classes and branches."""
-    statements = list(_statements(file))
+def _definitions(text: str) -> list[ast.FunctionDef]:
+    """The functions of a text, also those in functions, classes and branches."""
+    statements = list(_statements(text))
     for one in statements:
         for block in ("body", "orelse", "finalbody"):
             statements.extend(getattr(one, block, ()))
@@ -199,6 +228,16 @@ def _without_arguments(body: Any) -> ast.Lambda:
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), body)
 
 
+_STATEMENTS = (
+    ast.AnnAssign, ast.Assert, ast.Assign, ast.AugAssign, ast.Break, ast.Continue, ast.Expr, ast.For, ast.FunctionDef,
+    ast.If, ast.Pass, ast.Raise, ast.Return, ast.While,
+)  # fmt: skip
+_REFUSED = (
+    ast.Await, ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.NamedExpr, ast.Set, ast.SetComp, ast.Yield,
+    ast.YieldFrom,
+)  # fmt: skip
+
+
 class _Writer(ast.NodeTransformer):
     """Writes the twin of one function."""
 
@@ -228,6 +267,12 @@ class _Writer(ast.NodeTransformer):
     def _refused(self, node: Any, what: str) -> NotTraceable:
         code = self._code
         return NotTraceable(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
+
+    def visit(self, node: Any) -> Any:
+        """What stands in the twin for a node."""
+        if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
+            raise self._refused(node, type(node).__name__)
+        return super().visit(node)
 
     # --- Statements ---
 
@@ -319,12 +364,6 @@ class _Writer(ast.NodeTransformer):
         if node.value is None:
             return ast.Pass()
         return ast.Assign([self.visit(node.target)], self.visit(node.value))
-
-    def visit_Try(self, node: ast.Try) -> Any:
-        raise self._refused(node, "`try`")
-
-    def visit_With(self, node: ast.With) -> Any:
-        raise self._refused(node, "`with`")
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
         return node
