@@ -10,6 +10,7 @@ from . import (
     bodies,
     cluster,
     compare,
+    compiling,
     contacts,
     endurance,
     fields,
@@ -21,6 +22,13 @@ from . import (
     throughput,
 )
 from .peers import race
+
+
+def _count(text: str) -> int:
+    """A number that is 1 or more."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"must be a number of 1 or more, got {text}")
+    return int(text)
 
 
 def main() -> None:
@@ -41,6 +49,14 @@ def main() -> None:
     commands.add_parser("motion", help="walls that move and walls that are moved: exactness, conservation, speed")
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
+    )
+    first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
+    first.add_argument(
+        "--scenes", metavar="NAME", nargs="+", choices=list(compiling.CASES),
+        help="the report has these alone [default: all]: " + ", ".join(compiling.CASES),
+    )  # fmt: skip
+    first.add_argument(
+        "--repeats", metavar="N", type=_count, default=compiling.REPEATS, help="of each scene [default: %(default)s]"
     )
     commands.add_parser("sweep", help="many short runs: the wall time beside its parts, the memory of a thousand")
     commands.add_parser("cluster", help="two workers against two threads, and what 200 shards take of a scheduler")
@@ -69,6 +85,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "compile": compiling,
         "sweep": sweeps,
         "cluster": cluster,
         "endurance": endurance,
@@ -76,7 +93,8 @@ def main() -> None:
     if not arguments.quick:
         report.write_to(arguments.o)
     before = report.stolen()
-    reports[arguments.command].main(quick=arguments.quick)
+    options = {name: value for name, value in vars(arguments).items() if name not in ("command", "o")}
+    reports[arguments.command].main(**options)
     print(report.told_of_others(before))
 
 

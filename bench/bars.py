@@ -6,7 +6,6 @@ comparable from machine to machine.
 """
 
 import itertools
-import os
 import statistics
 import subprocess
 import sys
@@ -21,7 +20,7 @@ import swarm
 from swarm.run.engine import Run
 
 from . import yardstick
-from .report import ROOT, Row, in_turn, repeated, show, write
+from .report import ROOT, Row, as_usual, child, in_turn, repeated, show, write
 
 SPHERE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
@@ -304,23 +303,6 @@ print(1024 * int(re.search(r"VmHWM:\\s+([0-9]+) kB", open("/proc/self/status").r
 """
 
 
-def _child(code: str, *args: str, **environment: str) -> str:
-    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-    done = subprocess.run(
-        [sys.executable, "-c", code, *args],
-        check=True,
-        capture_output=True,
-        text=True,
-        env={**_as_usual(), "PYTHONPATH": paths, **environment},
-    )
-    return done.stdout
-
-
-def _as_usual() -> dict[str, str]:
-    """The environment, but Python keeps its bytecode, as it does unless told otherwise: else a start takes 0.2 s."""
-    return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-
-
 def set_up(n: int, repeats: int) -> list[Row]:
     """What a run takes in which nothing is hit: checks, copies, and two frames observed; one thread."""
     rows = []
@@ -340,7 +322,7 @@ def set_up(n: int, repeats: int) -> list[Row]:
 
 def memory(n: int) -> list[Row]:
     """Peak bytes a particle of a whole run: caller's particles and engine's state."""
-    small, large = (float(_child(_MEMORY, str(k))) for k in (1000, n))
+    small, large = (float(child(_MEMORY, str(k))) for k in (1000, n))
     each = (large - small) / n
     return [Row(f"memory, {n:,} particles".replace(",", " "), each, each, "bytes/particle", "200")]
 
@@ -386,13 +368,13 @@ def start_up(repeats: int) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "empty_kernel.py").write_text(_EMPTY_KERNEL)
         bare = _BARE_START.format(folder=folder)
-        _child(bare, NUMBA_CACHE_DIR=folder)
+        child(bare, NUMBA_CACHE_DIR=folder)
         scene = ROOT / "examples" / "scenes" / "cavity.toml"
         code = _FIRST_FRAME.format(scene=scene, target=Path(folder) / "cavity.h5")
-        cold = float(_child(code, NUMBA_CACHE_DIR=folder))
+        cold = float(child(code, NUMBA_CACHE_DIR=folder))
         starts = {"job": code, "bare": bare}
         figures = in_turn(
-            {what: lambda one=one: float(_child(one, NUMBA_CACHE_DIR=folder)) for what, one in starts.items()}, repeats
+            {what: lambda one=one: float(child(one, NUMBA_CACHE_DIR=folder)) for what, one in starts.items()}, repeats
         )
     return [
         Row("first frame of the main job, first run", cold, cold, "s", "8"),
@@ -405,7 +387,7 @@ def start_up(repeats: int) -> list[Row]:
 def _help() -> float:
     start = time.perf_counter()
     command = [sys.executable, "-m", "swarm", "run", "--help"]
-    subprocess.run(command, check=True, capture_output=True, cwd=ROOT, env=_as_usual())
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT, env=as_usual())
     return time.perf_counter() - start
 
 

@@ -1,12 +1,19 @@
 """The benchmark runs, so that it does not rot; nothing here is timed."""
 
+import csv
+import json
+import re
+import runpy
 import subprocess
 import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from bench import compare, report
+from bench import compare, compiling, report
+from swarm.kernel import cache
 
 pytestmark = pytest.mark.physics
 
@@ -177,3 +184,81 @@ def test_sweep_quick():
     told = printed("sweep")
     for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):
         assert row in told
+
+
+def test_compile_quick():
+    """The first process compiles what the second one finds; LLVM is a part of it, and the run alone next to nothing."""
+    told = dict(re.findall(r"^ *cavity, the main job(?:, (.*?))? {2,}(\S+)", printed("compile"), re.MULTILINE))
+    told = {what: float(least) for what, least in told.items()}
+    assert told["functions compiled"] >= 2.0
+    assert told["functions compiled there"] == 0.0
+    assert 0.0 < told["of it LLVM"] < told[""]
+    assert told["the run alone"] < told["second process"] < told[""]
+
+
+def test_compile_reports_the_least_and_who_failed(tmp_path, monkeypatch):
+    """Each repeat has a cache of its own, for two processes; a scene that fails is a row, and is not tried again."""
+    asked, caches = [], []
+
+    def child(_code, name, **environment):
+        asked.append(name)
+        if name == "planes":
+            raise subprocess.CalledProcessError(1, "python", stderr="Traceback\nRecursionError: too deep\n")
+        if name == "cone":
+            raise subprocess.CalledProcessError(-11, "python", stderr="")
+        caches.append(environment["NUMBA_CACHE_DIR"])
+        k = len(caches)
+        return json.dumps([0.5, 8.0 - k, 100 if k % 2 else 0, 4.0 - 0.5 * k, 0.01 * k])
+
+    monkeypatch.setattr(compiling, "child", child)
+    monkeypatch.setattr(report, "_folder", tmp_path)
+    compiling.main(quick=False, scenes=["planes", "drum", "cone"], repeats=3)
+    assert asked == ["planes", "drum", "drum", "cone", *4 * ["drum"]]
+    assert caches[::2] == caches[1::2]
+    assert len(set(caches)) == 3
+    (path,) = tmp_path.glob("compile-*.csv")
+    with open(path, newline="") as file:
+        rows = [(row["what"], row["min"], row["median"], row["bar"]) for row in csv.DictReader(file)]
+    assert rows == [
+        ("24 planes in random directions: RecursionError: too deep", "nan", "nan", "5"),
+        ("drum", "3", "5", "10"),
+        ("  drum, functions compiled", "100", "100", ""),
+        ("  drum, of it LLVM", "1.5", "2.5", ""),
+        ("  drum, before the call", "0.5", "0.5", ""),
+        ("  drum, second process", "2", "4", ""),
+        ("  drum, functions compiled there", "0", "0", "0"),
+        ("  drum, the run alone", "0.02", "0.04", ""),
+        ("cone, friction 0.4, e = 0.5, a lid, gravity: exit code -11", "nan", "nan", "8"),
+    ]
+
+
+def test_compile_counts_the_time_of_what_is_in_another_once(monkeypatch):
+    clock = iter([1.0, 5.0, 7.0, 7.5])
+    monkeypatch.setattr(compiling, "time", SimpleNamespace(process_time=lambda: next(clock)))
+    heard = compiling.Heard()
+    for told in (heard.on_start, heard.on_start, heard.on_end, heard.on_end, heard.on_start, heard.on_end):
+        told(None)
+    assert (heard.times, heard.seconds) == (3, 4.5)
+
+
+@pytest.mark.parametrize("wrong", [["--repeats", "0"], ["--repeats", "-1"], ["--scenes", "moon"]])
+def test_compile_refuses_what_it_does_not_know(wrong, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["bench", "compile", *wrong])
+    with pytest.raises(SystemExit, match="2"):
+        runpy.run_module("bench", run_name="__main__")
+    assert wrong[-1] in capsys.readouterr().err
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", compiling.CASES)
+def test_compile_meets_every_kernel_of_a_longer_run(name):
+    """Else the report would leave something out that the run of the scene compiles."""
+    case = compiling.CASES[name]
+
+    def kernels():
+        return {(kernel.__name__, kinds) for kernel in cache._kernels for kinds in kernel.overloads}
+
+    compiling.call(case, time.process_time())
+    met = kernels()
+    compiling.call(case._replace(until=10.0 * case.until), time.process_time())
+    assert kernels() == met

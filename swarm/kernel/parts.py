@@ -26,6 +26,9 @@ from numba.core.compiler import Compiler
 # Rejected: each of some 60 folds written a second time, as a loop that is unrolled for a number of walls.
 _DEEPEST = 10_000
 
+# LLVM's level for one function by itself.
+_LITTLE = 1
+
 # Of closures, `literally`, functions that Numba itself is to inline, and expressions of whole arrays.
 _SKIPPED = (
     untyped_passes.InlineClosureLikes,
@@ -75,11 +78,33 @@ class PartCompiler(Compiler):  # type: ignore[misc]
         return pipelines
 
 
+class _Kernel(JITCodeLibrary):  # type: ignore[misc]
+    """A kernel, whose functions are made small before all of them are optimised together.
+
+    Of 10 s for a capped cylinder with restitution, under gravity, Numba spends 1.1 on passes for each function at its
+    highest level, before the module has its own; at the lowest it is half of that, and the module takes no longer.
+    Without any the module takes longer by what is saved.
+    """
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+        builder = self._codegen._pass_builder(opt=_LITTLE)
+        for function in module.functions:
+            if not function.is_declaration:
+                builder.getFunctionPassManager().run(function, builder)
+
+
 class KernelCompiler(Compiler):  # type: ignore[misc]
     """Numba's compiler for kernels: what they are made of lives until they are done, so nothing is collected.
 
     A search for garbage walks through all of it again and again, an eighth of the time.
     """
+
+    def define_pipelines(self) -> Any:
+        """Numba's passes, into a library that is a `_Kernel`."""
+        self.state.library = _Kernel(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library.enable_object_caching()
+        return super().define_pipelines()
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a kernel with its helpers."""
