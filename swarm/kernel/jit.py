@@ -180,12 +180,22 @@ def _extreme(function: Any, farther: Any, *values: Any) -> Any:
     """The least or the largest of some numbers, by the comparisons of Python: a NaN is never taken for the first one."""
     if not trace.has_value(values):
         return function(*values)
+    if len(values) == 1 and isinstance(values[0], trace.Value):
+        return trace.called(_extreme_of, (farther, values[0]), {})
     values = values[0] if len(values) == 1 else values
     kind = trace.unified(list(map(trace.kind_of, values)))
     first, *others = (one if trace.kind_of(one) == kind else trace.cast(one, kind) for one in values)
     for one in others:
         first = _traced_select(farther(one, first), one, first)
     return first
+
+
+def _extreme_of(farther: Any, values: Any) -> Any:
+    """That of an array which is not empty."""
+    found = values[0]
+    for k in range(1, values.shape[0]):
+        found = select(farther(values[k], found), values[k], found)
+    return found
 
 
 trace.REPLACED[max] = functools.partial(_extreme, max, operator.gt)
