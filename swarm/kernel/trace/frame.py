@@ -252,8 +252,7 @@ class Frame:
             if reached is NEXT:
                 values = advance()
                 loop.nexts.append((self._ends_at(loop.head), values))
-            again = [(slots, wider, assign, value) for assign, value in loop.nexts]
-            if all_of(goes_round(*one, ()) for one in again):
+            if all_of(goes_round(before, slots, wider, assign, value, ()) for assign, value in loop.nexts):
                 break
             # A variable changes its type in the loop: once more with that which holds both.
             del noted_so_far[mark:]

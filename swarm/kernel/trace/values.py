@@ -171,6 +171,10 @@ def has_value(given: Any) -> bool:
     return isinstance(given, Value)
 
 
+# Of a whole number that has a sign, without it.
+_BITS = 63
+
+
 def kind_of(value: Any) -> Any:
     """The type in a kernel of a constant, a proxy, or a record of them."""
     if isinstance(value, Value):
@@ -179,7 +183,7 @@ def kind_of(value: Any) -> Any:
         return types.none
     if isinstance(value, bool):
         return types.boolean
-    if isinstance(value, int):
+    if isinstance(value, int) and value.bit_length() < _BITS:
         return types.intp
     if type(value) is float:
         return types.float64
