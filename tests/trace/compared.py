@@ -130,5 +130,3 @@ def defined(text, file, **scope):
     scope = {"np": np, "math": math, "select": _jit.select, "Record": Record, "Inner": Inner, **scope}
     exec(compile(text, file, "exec"), scope)
     return scope
-
-

@@ -208,7 +208,9 @@ class _Writer:
         step = self.random.choice(("", "", ", -1", ", 2", ", -2"))
         bounds = (f"{self.i(2)} % 4", f"{self.i(2)} % 7 - 1")
         bounds = bounds[::-1] if "-" in step else bounds
-        self.loop(depth, f"for {{}} in range({bounds[0]}, {bounds[1]}{step}):" if step else f"for {{}} in range({bounds[1]}):")
+        self.loop(
+            depth, f"for {{}} in range({bounds[0]}, {bounds[1]}{step}):" if step else f"for {{}} in range({bounds[1]}):"
+        )
 
     def known(self, depth, _loop):
         self.loop(depth, f"for {{}} in range({self.random.randrange(-1, 2)}, {self.random.choice((3, 6, 12))}):")

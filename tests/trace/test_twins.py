@@ -110,7 +110,9 @@ def test_functions_of_functions(function):
     assert_the_same(function, *[(x, n) for x in NUMBERS for n in (0, 3)], numba_has_it=False)
 
 
-@pytest.mark.parametrize("function", [scaled, of_a_closure(3, 1.5), of_a_closure(0, -1.0)], ids=["names", "three", "none"])
+@pytest.mark.parametrize(
+    "function", [scaled, of_a_closure(3, 1.5), of_a_closure(0, -1.0)], ids=["names", "three", "none"]
+)
 def test_names_mean_what_they_mean_there(function):
     assert_the_same(function, *[(x,) for x in NUMBERS], numba_has_it=False)
 
@@ -149,7 +151,16 @@ def statements(a, n):
     fourth = fifth = second
     if (sixth := first * 2.0) > 1.0:
         fifth = sixth
-    return f"{SCALE}" == "2.5", first, second, fourth, fifth, {"k": a}["k"], [low, high][1], [2.0 * k for k in (1, 2)][0]
+    return (
+        f"{SCALE}" == "2.5",
+        first,
+        second,
+        fourth,
+        fifth,
+        {"k": a}["k"],
+        [low, high][1],
+        [2.0 * k for k in (1, 2)][0],
+    )
 
 
 def test_statements():

@@ -311,7 +311,7 @@ def test_arrays_that_are_known():
 
 def increments(a, i):
     a[i] += 1
-    a[i, ] -= 3
+    a[i,] -= 3
     a[0] *= a[i]
     a[-1] /= 2
 

@@ -1,6 +1,7 @@
 """Calls of a helper while it is traced: what is an operation of a kernel, and what is traced in its turn."""
 
 import builtins
+import functools
 import math
 import operator
 import types as python_types
@@ -25,26 +26,25 @@ OPERATIONS: set[Any] = {
         "ldexp", "lgamma", "log", "log10", "log1p", "log2", "pow", "radians", "sin", "sinh", "sqrt", "tan", "tanh",
         "trunc",
     )),
-    builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int, builtins.max, builtins.min,
-    builtins.pow, builtins.round,
+    builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int, builtins.pow, builtins.round,
     *(function for function in vars(operator).values() if isinstance(function, python_types.BuiltinFunctionType)),
 }  # fmt: skip
 # Functions that only a kernel can do.
 INTRINSIC: set[Any] = set()
 
 
-def _length(of: Any) -> Any:
-    return of.shape[0] if isinstance(of, Value) else len(of)
+def _cast(value: Any, kind: Any) -> Any:
+    number = np.dtype(str(kind)).type
+    return noted(number, value) if isinstance(value, Value) else number(value)
 
 
-# What is called in place of a function while it is traced.
-REPLACED: dict[Any, Callable[..., Any]] = {len: _length, range: Range, select: traced_select}
-
-_FARTHER: dict[Any, Any] = {max: operator.gt, min: operator.lt}
-
-
-def _extreme(farther: Any, values: Any) -> Any:
+def _extreme(function: Any, farther: Any, *values: Any) -> Any:
     """The least or the largest of some numbers, by Python's comparisons: a NaN does not take the place of another."""
+    if not has_value(values):
+        return function(*values)
+    if len(values) == 1 and isinstance(values[0], Value):
+        return traced(_extreme_of, (farther, values[0]), {})
+    values = values[0] if len(values) == 1 else values
     kind = unified(list(map(kind_of, values)))
     first, *others = (one if kind_of(one) == kind else _cast(one, kind) for one in values)
     for one in others:
@@ -52,9 +52,25 @@ def _extreme(farther: Any, values: Any) -> Any:
     return first
 
 
-def _cast(value: Any, kind: Any) -> Any:
-    number = np.dtype(str(kind)).type
-    return noted(number, value) if isinstance(value, Value) else number(value)
+def _extreme_of(farther: Any, values: Any) -> Any:
+    """That of an array which is not empty."""
+    found = values[0]
+    for k in range(1, values.shape[0]):
+        found = select(farther(values[k], found), values[k], found)
+    return found
+
+
+# What is called in place of a function while it is traced.
+REPLACED: dict[Any, Callable[..., Any]] = {
+    range: Range,
+    select: traced_select,
+    len: lambda values: values.shape[0] if isinstance(values, Value) else len(values),
+    max: functools.partial(_extreme, max, operator.gt),
+    min: functools.partial(_extreme, min, operator.lt),
+}
+# Of NumPy: `np.array`, `np.sum` and others that are no ufuncs.
+_ARRAY_FUNCTION = type(np.sum)
+_IN_PLACE = (list, dict, set)
 
 
 def operation(function: Any) -> Any:
@@ -63,7 +79,7 @@ def operation(function: Any) -> Any:
     return function
 
 
-def called(function: Any, *given: Any, **named: Any) -> Any:
+def called(function: Any, /, *given: Any, **named: Any) -> Any:
     """A call while a helper is traced."""
     try:
         replaced, is_operation = REPLACED.get(function), function in OPERATIONS
@@ -73,16 +89,21 @@ def called(function: Any, *given: Any, **named: Any) -> Any:
         return replaced(*given, **named)
     if function in INTRINSIC:
         return noted(function, *given)
-    if is_operation or isinstance(function, (np.ufunc, Dispatcher)) or _is_number_class(function):
+    if is_operation or _is_operation(function):
         return _operation(function, given, named)
     if isinstance(function, python_types.MethodType):
         function, given = function.__func__, (function.__self__, *given)
     if isinstance(function, python_types.FunctionType):
         return traced(function, given, named)
+    is_python = getattr(function, "__module__", None) == "builtins"
+    if function in _IN_PLACE or (is_python and any(isinstance(one, Value) for one in given)):
+        raise TraceError(f"it asks {name_of(function)} about a number that is known in the kernel only")
     return function(*given, **named)
 
 
-def _is_number_class(function: Any) -> bool:
+def _is_operation(function: Any) -> bool:
+    if isinstance(function, (np.ufunc, _ARRAY_FUNCTION, Dispatcher)) or function is np.array:
+        return True
     return isinstance(function, type) and issubclass(function, np.generic)
 
 
@@ -93,16 +114,11 @@ def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> 
         raise TraceError(f"{name_of(function)} is called by the names of its arguments")
     if function is int:
         return given[0] if isinstance(given[0].kind, types.Integer) else noted(np.int64, *given)
-    if function in _FARTHER:
-        return _extreme(_FARTHER[function], given[0] if len(given) == 1 else given)
     return noted(function, *given)
 
 
 def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """What a Python function gives, noting what it does."""
     frame = Frame(called)
-    twin = twin_of(function, frame)
-    if twin is None:
-        return function(*given, **named)
-    twin(*given, **named)
+    twin_of(function, frame)(*given, **named)
     return frame.result()

@@ -19,15 +19,12 @@ from .calls import traced
 from .emit import emit
 from .notes import Argument
 from .part import Part, key_of
-from .values import Real, TraceError, Value
+from .values import Real, Value
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
 # Why helpers are compiled by Numba, by their names.
 left_to_numba: dict[str, str] = {}
-
-# What Python says where a proxy is none of what a function expects, or where numbers that are known have no result.
-_FAILURES = (TraceError, TypeError, AttributeError, ValueError, IndexError, NotImplementedError, ArithmeticError)
 
 Choose = Callable[[Any], Any]
 
@@ -79,7 +76,7 @@ class Helper:
                         part.result = self._run(given)
                     part.kind = values.kind_of(part.result)
                     self._whole[kinds] = part
-                except _FAILURES as error:
+                except Exception as error:  # What Python says where a proxy is not what a function expects.
                     self._leave(error)
         return self._whole[kinds]
 
@@ -97,7 +94,7 @@ class Helper:
                 try:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
-                except _FAILURES as error:
+                except Exception as error:  # What Python says where a proxy is not what a function expects.
                     self._leave(error)
         return self._parts[key]
 
@@ -106,7 +103,7 @@ class Helper:
         mark = len(notes)
         try:
             return self._run(given)
-        except _FAILURES as error:
+        except Exception as error:  # What Python says where a proxy is not what a function expects.
             del notes[mark:]
             self._leave(error)
             return values.noted(self._function, *given)

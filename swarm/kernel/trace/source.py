@@ -1,13 +1,15 @@
 """The syntax of a function that Python has compiled: where its source is, and whether it is still that."""
 
 import ast
+import contextlib
 import functools
 import linecache
+import os
+import time
 import types
-from pathlib import Path
 from typing import Any
 
-_OWN = str(Path(__file__).parents[2])
+_STARTED = time.time()
 
 # Names that no function has: the syntax tree knows them, and no text does.
 FRAME, _TWIN = ".frame", ".twin"
@@ -15,13 +17,14 @@ FRAME, _TWIN = ".frame", ".twin"
 
 def node_of(code: types.CodeType) -> Any:
     """The syntax of a function, or None where its file is not known or no longer has it."""
-    found = _nodes_at(code.co_filename, code.co_firstlineno, code.co_name)
+    text = _text(code.co_filename)
+    found = _nodes_at(text, code.co_firstlineno, code.co_name)
     for node in found:
         is_lambda = isinstance(node, ast.Lambda)
         body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
         given = ast.copy_location(definition(_TWIN, node.args, body), node)
         if len(found) == 1 or _told(_inner(compiled(given, code))) == _told(code):
-            return given if _is_as_written(code) else None
+            return given if _is_as_written(code, text) else None
     return None
 
 
@@ -52,24 +55,33 @@ def _told(code: types.CodeType) -> Any:
     return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
 
 
-def _is_as_written(code: types.CodeType) -> bool:
-    """Whether the file of a function still has this code: a user may edit it while a session goes on."""
-    return code.co_filename.startswith(_OWN) or code in _codes(code.co_filename)
+def _text(file: str) -> str:
+    linecache.checkcache(file)
+    return "".join(linecache.getlines(file))
+
+
+def _is_as_written(code: types.CodeType, text: str) -> bool:
+    """Whether a function is still what its file says: a user may edit that while a session goes on."""
+    with contextlib.suppress(OSError):
+        found = os.stat(code.co_filename)
+        if max(found.st_mtime, found.st_ctime) < _STARTED:
+            return True  # 0.1 s sooner than by its code
+    return code in _codes(code.co_filename, text)
 
 
 @functools.cache
-def _codes(file: str) -> set[types.CodeType]:
-    found = [compile("".join(linecache.getlines(file)), file, "exec", dont_inherit=True)]
+def _codes(file: str, text: str) -> set[types.CodeType]:
+    found = [compile(text, file, "exec", dont_inherit=True)]
     for code in found:
         found.extend(one for one in code.co_consts if isinstance(one, types.CodeType))
     return set(found)
 
 
-def _nodes_at(file: str, line: int, name: str) -> list[Any]:
-    """The functions of that name that begin in a line of a file."""
+def _nodes_at(text: str, line: int, name: str) -> list[Any]:
+    """The functions of that name that begin in a line of a text."""
     if name != "<lambda>":
-        return [one for one in _definitions(file) if one.name == name and _first_line(one) == line]
-    inside = [one for one in _statements(file) if one.lineno <= line <= one.end_lineno]
+        return [one for one in _definitions(text) if one.name == name and _first_line(one) == line]
+    inside = [one for one in _statements(text) if one.lineno <= line <= one.end_lineno]
     found = (one for statement in inside for one in ast.walk(statement))
     # A lambda in a function is met in that as well as in the statement around it.
     return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
@@ -80,17 +92,17 @@ def _first_line(node: ast.FunctionDef) -> int:
 
 
 @functools.cache
-def _statements(file: str) -> list[Any]:
+def _statements(text: str) -> list[Any]:
     try:
-        return ast.parse("".join(linecache.getlines(file))).body
+        return ast.parse(text).body
     except SyntaxError:
         return []
 
 
 @functools.cache
-def _definitions(file: str) -> list[ast.FunctionDef]:
-    """The functions of a file, also those in functions, classes and branches."""
-    statements = list(_statements(file))
+def _definitions(text: str) -> list[ast.FunctionDef]:
+    """The functions of a text, also those in functions, classes and branches."""
+    statements = list(_statements(text))
     for one in statements:
         for block in ("body", "orelse", "finalbody"):
             statements.extend(getattr(one, block, ()))

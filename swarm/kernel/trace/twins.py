@@ -12,28 +12,27 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
+import functools
 import itertools
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
+
+import numpy as np
 
 from .frame import Frame
 from .source import FRAME, compiled, definition, node_of
 from .values import UNDEFINED, TraceError
 
 
-def twin_of(function: Any, frame: Frame) -> Callable[..., Any] | None:
-    """The twin of a function for one call of it; None where its source is not known.
+def twin_of(function: Any, frame: Frame) -> Callable[..., Any]:
+    """The twin of a function for one call of it.
 
     Raises:
-        TraceError: it has a statement that no kernel has.
+        TraceError: its source is not known, or has a statement that no kernel has.
     """
-    factory = _factory(function.__code__)
-    if factory is None:
-        return None
-    make = types.FunctionType(factory, function.__globals__)
     cells = [_content(cell) for cell in function.__closure__ or ()]
-    twin: Any = make(frame, *cells)
+    twin: Any = _maker(function)(frame, *cells)
     twin.__defaults__, twin.__kwdefaults__ = function.__defaults__, function.__kwdefaults__
     return twin  # type: ignore[no-any-return]
 
@@ -43,6 +42,23 @@ def _content(cell: Any) -> Any:
         return cell.cell_contents
     except ValueError:
         return UNDEFINED
+
+
+# What a function may refer to: what may change later is not known when a kernel is compiled.
+_LASTING = (tuple, str, bytes, int, float, complex, type(None), range, np.generic, np.ndarray, types.ModuleType)
+
+
+@functools.cache
+def _maker(function: Any) -> Any:
+    """The function (frame, cells) that gives the twin."""
+    factory = _factory(function.__code__)
+    if factory is None:
+        raise TraceError(f"the source of {function.__name__} is not known")
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if not callable(value) and not isinstance(value, _LASTING):
+            raise TraceError(f"{function.__name__} uses {name}, a {type(value).__name__}")
+    return types.FunctionType(factory, function.__globals__)
 
 
 _factories: dict[types.CodeType, types.CodeType | TraceError | None] = {}
@@ -86,16 +102,6 @@ def _inside(node: ast.AST) -> Iterator[ast.AST]:
         yield from _inside(child)
 
 
-def _leaves(statements: Any) -> bool:
-    """Whether a loop with these statements has `break` or `continue`."""
-    for node in statements:
-        if isinstance(node, (ast.Break, ast.Continue)):
-            return True
-        if not isinstance(node, (ast.For, ast.While, ast.FunctionDef)) and _leaves(ast.iter_child_nodes(node)):
-            return True
-    return False
-
-
 def _load(name: str) -> ast.Name:
     return ast.Name(name, ast.Load())
 
@@ -106,6 +112,16 @@ def _of_frame(name: str, *given: ast.expr) -> ast.Call:
 
 def _without_arguments(body: Any) -> ast.Lambda:
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), body)
+
+
+_STATEMENTS = (
+    ast.AnnAssign, ast.Assert, ast.Assign, ast.AugAssign, ast.Break, ast.Continue, ast.Expr, ast.For, ast.FunctionDef,
+    ast.If, ast.Pass, ast.Raise, ast.Return, ast.While,
+)  # fmt: skip
+_REFUSED = (
+    ast.Await, ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.NamedExpr, ast.Set, ast.SetComp, ast.Yield,
+    ast.YieldFrom,
+)  # fmt: skip
 
 
 class _Writer(ast.NodeTransformer):
@@ -137,6 +153,12 @@ class _Writer(ast.NodeTransformer):
     def _refused(self, node: Any, what: str) -> TraceError:
         code = self._code
         return TraceError(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
+
+    def visit(self, node: Any) -> Any:
+        """What stands in the twin for a node."""
+        if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
+            raise self._refused(node, type(node).__name__)
+        return super().visit(node)
 
     # --- Statements ---
 
@@ -215,7 +237,7 @@ class _Writer(ast.NodeTransformer):
         )
         body = self._as_function(f".body{number}", node.body)
         names_of = [f"{one}{number}" for one in (".take", ".body", ".get", ".put")]
-        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of), ast.Constant(_leaves(node.body)))
+        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of))
         return [take, body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_Break(self, node: ast.Break) -> Any:
@@ -228,12 +250,6 @@ class _Writer(ast.NodeTransformer):
         if node.value is None:
             return ast.Pass()
         return ast.Assign([self.visit(node.target)], self.visit(node.value))
-
-    def visit_Try(self, node: ast.Try) -> Any:
-        raise self._refused(node, "`try`")
-
-    def visit_With(self, node: ast.With) -> Any:
-        raise self._refused(node, "`with`")
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
         return node

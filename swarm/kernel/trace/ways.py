@@ -68,17 +68,18 @@ def carried(value: Any, entry: Assign, slots: Any, wider: Any, path: tuple[int, 
     return opened(slot.kind, add(Load(slot)))
 
 
-def goes_round(slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
+def goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
     """Put the variables at the end of a round into their slots; whether the types of these hold them."""
-    if isinstance(value, tuple):
-        return all_of(goes_round(slots, wider, assign, one, (*path, k)) for k, one in enumerate(value))
+    if before is UNDEFINED:
+        return True  # a round does not see what an earlier one has left in it
+    if isinstance(before, tuple) and type(value) is type(before) and len(value) == len(before):
+        pairs = enumerate(zip(before, value, strict=True))
+        return all_of(goes_round(old, slots, wider, assign, new, (*path, k)) for k, (old, new) in pairs)
     slot = slots.get(path)
-    if slot is None:
-        if is_number(value) and any(key[: len(path)] == path for key in slots):
-            raise TraceError("a variable of a loop is a number in one round and a record in another")
+    if slot is None and _is_same(before, value):
         return True
-    if not is_number(value):
-        raise TraceError("a variable of a loop is a number in one round and something else in another")
+    if slot is None or not is_number(value):
+        raise TraceError("a variable of a loop is something else in the first round than later")
     assign.pairs.append((slot, value))
     kind = unified([slot.kind, kind_of(value)])
     if kind == slot.kind:

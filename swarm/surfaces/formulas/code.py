@@ -9,12 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba.extending import overload
 
 from ... import checks
 from ...errors import SceneError
 from ...kernel.frozen import Frozen
 from ...kernel.jit import _INLINE, inlined
+from ...kernel.trace.helpers import prepare
 from ...kernel.vector import Symmetric, Vec
 from .. import contract
 from .numbers import OwnNumbers
@@ -106,8 +106,7 @@ def _taking_arrays(function: Function, count: int) -> Function:
         return function(parameters, x, y, z)
 
     # What a user writes may make arrays.
-    options: Any = {**_INLINE, "_nrt": True}
-    overload(in_python, jit_options=options)(lambda parameters, x, y, z: in_kernels)
+    prepare(in_python, {**_INLINE, "_nrt": True}, outlined=False, choose=lambda made: in_kernels)
     return in_python
 
 

@@ -1,7 +1,9 @@
 """What is derived from a formula: derivatives by SymPy, functions of them; their bounds, and its box, by intervals."""
 
 import functools
+import hashlib
 import itertools
+import linecache
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -159,7 +161,10 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
     results = ", ".join(map(writer.name_of, rows))
     lines = [f"def {name}(p, x, y, z):", *writer.lines, f"return {results}"]
     scope: dict[str, Any] = {"np": np, "__name__": __name__}
-    exec("\n    ".join(lines), scope)
+    text = "\n    ".join(lines)
+    file = f"<{name} {hashlib.sha256(text.encode()).hexdigest()}>"
+    linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file  # kernels are made of its text
+    exec(compile(text, file, "exec"), scope)
     scope[name].same_in_python = writer.same_in_python
     return scope[name]
 
