@@ -76,7 +76,7 @@ def expressions(x, n):
 
 
 def evaluated_on_their_way_only(x, n):
-    numbers = np.array([1.0, 2.0]) if False else (1.0, 2.0, 3.0)
+    numbers = (1.0, 2.0, 3.0)
     good = 0 <= n < 3 and numbers[n] > 1.5
     return good, numbers[n] if 0 <= n < 3 else x
 
@@ -93,9 +93,8 @@ def cases():
 @pytest.mark.parametrize("is_outlined", [False, True], ids=["inlined", "outlined"])
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda one: one.__name__)
 def test_decisions(function, is_outlined):
-    numba_has_it = function is not evaluated_on_their_way_only
     loose = cases() if function is not becomes_another_type else [one for one in cases() if one[0] > 0.5]
-    assert_the_same(function, *loose, outlined=is_outlined, numba_has_it=numba_has_it)
+    assert_the_same(function, *loose, outlined=is_outlined)
 
 
 def is_written_on_its_way_only(x, n, seen):

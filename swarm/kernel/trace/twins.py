@@ -61,7 +61,7 @@ def _maker(function: Any) -> Any:
     return types.FunctionType(factory, function.__globals__)
 
 
-_factories: dict[types.CodeType, types.CodeType | TraceError | None] = {}
+_factories: dict[types.CodeType, types.CodeType | str | None] = {}
 
 
 def _factory(code: types.CodeType) -> types.CodeType | None:
@@ -71,10 +71,10 @@ def _factory(code: types.CodeType) -> types.CodeType | None:
         try:
             _factories[code] = None if node is None else compiled(_Writer(node, code).written(), code)
         except TraceError as refused:
-            _factories[code] = refused
+            _factories[code] = str(refused)
     found = _factories[code]
-    if isinstance(found, TraceError):
-        raise found
+    if isinstance(found, str):
+        raise TraceError(found)
     return found
 
 
@@ -157,7 +157,7 @@ class _Writer(ast.NodeTransformer):
     def visit(self, node: Any) -> Any:
         """What stands in the twin for a node."""
         if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
-            raise self._refused(node, type(node).__name__)
+            raise self._refused(node, f"`{type(node).__name__.lower()}`")
         return super().visit(node)
 
     # --- Statements ---
