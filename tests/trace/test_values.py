@@ -27,13 +27,13 @@ def arithmetic(a, b):
 
 
 def comparisons(a, b):
-    return (a < b, a <= b, a > b, a >= b, a == b, a != b, a < 1, 0.0 <= b, (a < b) & (b < 3), (a < b) | (a > 2)), (
+    return (a < b, a <= b, a > b, a >= b, a == b, a != b, a < 1, b >= 0.0, (a < b) & (b < 3), (a < b) | (a > 2)), (
         (a < b) ^ (b > 0), not a, not a < b, a < b < 4, 0 < a != b, bool(a),
     )  # fmt: skip
 
 
 def searches(a, b):
-    return a in (0, 1, b), a not in (2, b), b in (), a in (b,)
+    return a in (0, 1, b), a not in (2, b), a in (b,)
 
 
 def quotients(a, b):
@@ -199,7 +199,7 @@ def test_what_may_be_none(a):
 def of_tuples(pair, k):
     nested = (pair, (k, None))
     first, *others = (*pair, k)
-    return nested[0][1], first, others[0], nested[1][1], len(nested), pair + (k,), pair[::-1], tuple(pair), max(pair)
+    return nested[0][1], first, others[0], nested[1][1], len(nested), pair + pair, pair[::-1], tuple(pair), max(pair)
 
 
 def test_tuples():
