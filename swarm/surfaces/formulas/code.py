@@ -13,8 +13,8 @@ import numpy as np
 from ... import checks
 from ...errors import SceneError
 from ...kernel.frozen import Frozen
-from ...kernel.trace.helpers import prepare
 from ...kernel.jit import _INLINE, inlined
+from ...kernel.trace.helpers import prepare
 from ...kernel.vector import Symmetric, Vec
 from .. import contract
 from .numbers import OwnNumbers
