@@ -11,7 +11,7 @@ from .notes import Assign, Branch, Jump, Label, Slot
 from .values import UNDEFINED, TraceError, Value, add, has_value, is_defined, kind_of, noted, notes
 from .ways import all_of, carried, goes_round, merged
 
-# Rounds of a loop that are written out: a loop over the parts of a composition, the axes, the corners of a cell.
+# Rounds of a loop that are written out where it cannot be a loop of the kernel.
 UNROLLED = 8
 
 # How a block of statements ends: at the next statement, or elsewhere.
@@ -173,18 +173,29 @@ class Frame:
         """`while test(): body()`"""
         return self._rounds(test, body, get, put, get)
 
-    def each(
-        self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put, leaves: bool
-    ) -> bool:
+    def each(self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put) -> bool:
         """`for value in values: body()`; the values of a `range` may be known in the kernel only."""
         if isinstance(values, Value):
             whole = values
-            return self.each(Range(whole.shape[0]), lambda k: take(whole[k]), body, get, put, leaves)
+            return self.each(Range(whole.shape[0]), lambda k: take(whole[k]), body, get, put)
         if not isinstance(values, Range):
             return self._written_out(values, take, body, get, put)
-        known = values.known()
-        if known is not None and len(known) <= UNROLLED and not leaves:
-            return self._written_out(known, take, body, get, put)
+        mark, gives, before, depth, loops = len(notes()), len(self._gives), get(), self._depth, len(self._loops)
+        try:
+            return self._counted(values, take, body, get, put)
+        except TraceError:
+            known = values.known()
+            if known is None or len(known) > UNROLLED:
+                raise
+        # What is done in each round depends on its number.
+        del notes()[mark:], self._gives[gives:], self._loops[loops:]
+        self._depth = depth
+        put(before)
+        return self._written_out(known, take, body, get, put)
+
+    def _counted(
+        self, values: "Range", take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put
+    ) -> bool:
         start, stop, step = values.numbers()
         counter = [start]
 

@@ -103,16 +103,6 @@ def _inside(node: ast.AST) -> Iterator[ast.AST]:
         yield from _inside(child)
 
 
-def _leaves(statements: Any) -> bool:
-    """Whether a loop with these statements has `break` or `continue`."""
-    for node in statements:
-        if isinstance(node, (ast.Break, ast.Continue)):
-            return True
-        if not isinstance(node, (ast.For, ast.While, ast.FunctionDef)) and _leaves(ast.iter_child_nodes(node)):
-            return True
-    return False
-
-
 def _load(name: str) -> ast.Name:
     return ast.Name(name, ast.Load())
 
@@ -248,7 +238,7 @@ class _Writer(ast.NodeTransformer):
         )
         body = self._as_function(f".body{number}", node.body)
         names_of = [f"{one}{number}" for one in (".take", ".body", ".get", ".put")]
-        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of), ast.Constant(_leaves(node.body)))
+        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of))
         return [take, body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_Break(self, node: ast.Break) -> Any:
