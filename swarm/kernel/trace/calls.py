@@ -60,8 +60,18 @@ def _extreme_of(farther: Any, values: Any) -> Any:
     return found
 
 
+def _is_instance(value: Any, made: Any) -> bool:
+    """Whether a value is of a class; a number of a kernel is no record."""
+    classes = made if isinstance(made, tuple) else (made,)
+    if isinstance(value, Value) and not all(isinstance(one, type) and issubclass(one, _RECORDS) for one in classes):
+        raise TraceError("it asks of which class a number is that is known in the kernel only")
+    return isinstance(value, made)
+
+
+_RECORDS = (tuple, type(None))
 # What is called in place of a function while it is traced.
 REPLACED: dict[Any, Callable[..., Any]] = {
+    isinstance: _is_instance,
     range: Range,
     select: traced_select,
     len: lambda values: values.shape[0] if isinstance(values, Value) else len(values),

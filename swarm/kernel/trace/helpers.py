@@ -43,6 +43,8 @@ class Helper:
         self._function, self._choose, self._outlined = function, choose, outlined
         self.signature = inspect.signature(function)
         self.name: str = function.__name__
+        kinds = self.signature.parameters.values()
+        self._keywords = [one.name for one in kinds if one.kind is inspect.Parameter.KEYWORD_ONLY]
         self._parts: dict[Any, Part | None] = {}
         self._whole: dict[Any, Part | None] = {}
 
@@ -51,7 +53,7 @@ class Helper:
         if named or len(given) < len(self.signature.parameters):
             bound = self.signature.bind(*given, **named)
             bound.apply_defaults()
-            given = bound.args
+            given = (*bound.args, *bound.kwargs.values())
         if not self._outlined:
             return self._inlined(given)
         part = self._part(given)
@@ -108,17 +110,20 @@ class Helper:
             return values.noted(self._function, *given)
 
     def _run(self, given: Any) -> Any:
-        return traced(self._choose(_class_of(given[0]) if given else object), given, {})
+        first = len(given) - len(self._keywords)
+        named = dict(zip(self._keywords, given[first:], strict=True))
+        return traced(self._choose(_class_of(given[0]) if given else object), given[:first], named)
 
     def _leave(self, error: Exception) -> None:
-        left_to_numba.setdefault(self.name, f"{type(error).__name__}: {error} ({_place_of(error)})")
+        left_to_numba.setdefault(self.name, f"{type(error).__name__}: {error} ({self._place_of(error)})")
         _LOG.debug("%s is compiled by Numba: %s", self.name, error, exc_info=error)
 
-
-def _place_of(error: Exception) -> str:
-    """The line of a helper that an error is about."""
-    frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
-    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else "no line"
+    def _place_of(self, error: Exception) -> str:
+        """The line that an error is about, or where the function begins."""
+        frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
+        code = inspect.unwrap(self._function).__code__
+        places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]
+        return "{}, line {}".format(*places[-1])
 
 
 def _class_of(given: Any) -> Any:

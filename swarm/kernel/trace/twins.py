@@ -158,7 +158,7 @@ class _Writer(ast.NodeTransformer):
     def visit(self, node: Any) -> Any:
         """What stands in the twin for a node."""
         if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
-            raise self._refused(node, type(node).__name__)
+            raise self._refused(node, f"`{type(node).__name__.lower()}`")
         return super().visit(node)
 
     # --- Statements ---

@@ -108,6 +108,7 @@ class Real(Value):
 
 
 _MOST_PRODUCTS = 64
+_INTS = np.iinfo(np.int64)
 _FIELDS = {"shape": "shape", "strides": "strides", "size": "nitems"}
 _ARRAY = default_manager[types.Array(types.float64, 1, "C")]
 
@@ -177,10 +178,6 @@ def has_value(given: Any) -> bool:
     return isinstance(given, Value)
 
 
-# Of a whole number that has a sign, without it.
-_BITS = 63
-
-
 def kind_of(value: Any) -> Any:
     """The type in a kernel of a constant, a proxy, or a record of them."""
     if isinstance(value, Value):
@@ -189,7 +186,9 @@ def kind_of(value: Any) -> Any:
         return types.none
     if isinstance(value, bool):
         return types.boolean
-    if isinstance(value, int) and value.bit_length() < _BITS:
+    if isinstance(value, int):
+        if not _INTS.min <= value <= _INTS.max:
+            raise TraceError("an int that is known has more than 64 bits")
         return types.intp
     if type(value) is float:
         return types.float64
@@ -244,7 +243,9 @@ def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
     before = getattr(_now, "notes", None), getattr(_now, "context", None)
     _now.notes, _now.context = notes, context or before[1]
     try:
-        yield
+        # Of numbers that are known: kernels do not warn.
+        with np.errstate(all="ignore"):
+            yield
     finally:
         _now.notes, _now.context = before
 

@@ -1,0 +1,272 @@
+"""What kernels take from Numba that is not documented: each fails when Numba changes under this package."""
+
+import ast
+import functools
+import inspect
+import operator
+import pkgutil
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from compared import Record, compiled_only, in_kernel
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel.registry import default_manager
+from numba.core.typing.templates import Signature
+
+import swarm
+from swarm.kernel import cache, jit, parts
+from swarm.kernel.internals import ALL
+
+pytestmark = compiled_only
+PACKAGE = Path(swarm.__file__).parent
+DOCUMENTED = {"numba", "numba.extending"}
+
+
+@functools.cache
+def contexts():
+    """Numba's context of types and that of what they are in a kernel."""
+    target = numba.njit(lambda: None).targetdescr
+    target.typing_context.refresh()
+    target.target_context.refresh()
+    return target.typing_context, target.target_context
+
+
+# --- The list --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_it_is_there_with_its_parameters(name):
+    found = pkgutil.resolve_name(f"numba.{name}")
+    if ALL[name] is not None:
+        has = [str(one).split("=")[0] for one in inspect.signature(found).parameters.values()]
+        wanted = ALL[name].split()
+        assert [one for one in has if one in wanted] == wanted
+
+
+def taken_from_numba():
+    """What the package imports from modules of Numba that are not documented."""
+    for path in PACKAGE.rglob("*.py"):
+        text = path.read_text()
+        for node in ast.walk(ast.parse(text)) if "numba" in text else ():
+            module = getattr(node, "module", None) or ""
+            if isinstance(node, ast.ImportFrom) and module.split(".")[0] == "numba" and module not in DOCUMENTED:
+                yield from ((path, f"{module}.{one.name}") for one in node.names)
+
+
+def test_the_list_is_complete():
+    found = list(taken_from_numba())
+    assert len(found) > 10
+    for path, name in found:
+        name = name.removeprefix("numba.")
+        known = name in ALL or pkgutil.resolve_name(f"numba.{name}") is numba.np.linalg
+        assert known, f"{path} takes {name}, which swarm/kernel/internals.py does not have"
+
+
+# --- Types -----------------------------------------------------------------------------------------------
+
+
+def signature_of(symbol, *kinds):
+    typing, _target = contexts()
+    return typing.resolve_function_type(typing.resolve_value_type(symbol), kinds, {})
+
+
+def test_an_operation_has_a_signature():
+    found = signature_of(operator.add, types.float64, types.int64)
+    assert (found.return_type, found.args, found.recvr) == (types.float64, (types.float64, types.float64), None)
+    assert signature_of(np.sqrt, types.float64).return_type == types.float64
+    assert Signature(types.none, (), recvr=None).return_type == types.none
+
+
+def test_an_operation_that_there_is_not_has_none_or_says_so():
+    try:
+        assert signature_of(operator.add, types.float64, types.none) is None
+    except numba.core.errors.TypingError as error:
+        assert str(error).strip().splitlines()[0]
+
+
+def test_attributes_have_types():
+    typing, _target = contexts()
+    row = types.Array(types.float64, 2, "C")
+    assert typing.resolve_getattr(row, "ndim") == types.intp
+    assert isinstance(typing.resolve_getattr(row, "sum"), types.BoundFunction)
+    assert typing.resolve_getattr(row, "nothing") is None
+
+
+def test_types_unify():
+    typing, _target = contexts()
+    assert typing.unify_types(types.int64, types.float64) == types.float64
+    assert typing.unify_types(types.boolean, types.int64) == types.int64
+    assert isinstance(typing.unify_types(types.none, types.float64), types.Optional)
+    assert typing.unify_types(types.int64, types.Array(types.float64, 1, "C")) is None
+
+
+def test_records_are_made_of_types():
+    kinds = [types.float64, types.int64]
+    assert types.BaseTuple.from_types(kinds, Record).instance_class is Record
+    assert types.BaseTuple.from_types(kinds, None) == types.Tuple(kinds)
+    assert types.unliteral(types.literal(3)) == types.int64
+
+
+# --- Instructions ----------------------------------------------------------------------------------------
+
+
+def builder_of(target, *kinds):
+    """A function that is being built, of arguments of such types."""
+    module = ir.Module()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [target.get_value_type(kind) for kind in kinds]), "f")
+    return ir.IRBuilder(function.append_basic_block()), function.args
+
+
+def test_an_operation_is_an_instruction():
+    _typing, target = contexts()
+    builder, args = builder_of(target, types.float64, types.float64)
+    found = signature_of(operator.add, types.float64, types.float64)
+    added = target.get_function(operator.add, found)(builder, args, loc=numba.core.ir.unknown_loc)
+    assert added.opname == "fadd"
+    assert target.cast(builder, args[0], types.float64, types.int64).type == ir.IntType(64)
+    assert target.get_constant_generic(builder, types.int64, 7).constant == 7
+    assert target.get_constant(types.float64, 0.5).constant == 0.5
+
+
+def test_the_fields_of_an_array():
+    _typing, target = contexts()
+    kind = types.Array(types.float64, 2, "F")
+    names = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
+    assert [default_manager[kind].get_field_position(name) for name in names] == list(range(len(names)))
+    fields = target.get_value_type(kind).elements
+    assert fields[4] == ir.DoubleType().as_pointer()
+    assert fields[5] == fields[6] == ir.ArrayType(ir.IntType(64), 2)
+    assert default_manager[types.Array(types.float64, 1, "C")].get_field_position("nitems") == 2
+
+
+@pytest.mark.parametrize("kind", [types.float64, types.boolean, types.int32])
+def test_an_element_is_loaded_and_stored(kind):
+    """A bool is a byte in memory and a bit in a kernel."""
+    _typing, target = contexts()
+    array = types.Array(kind, 1, "C")
+    builder, (row,) = builder_of(target, array)
+    place = builder.extract_value(row, default_manager[array].get_field_position("data"))
+    value = numba.np.arrayobj.load_item(target, builder, array, place)
+    assert value.type == target.get_value_type(kind)
+    numba.np.arrayobj.store_item(target, builder, array, value, place)
+    assert builder.block.instructions[-1].opname == "store"
+
+
+def test_a_function_takes_the_places_of_its_result_and_of_an_error_first():
+    _typing, target = contexts()
+    kind = target.call_conv.get_function_type(types.none, (types.float64,))
+    assert kind.return_type == ir.IntType(32)
+    assert len(kind.args) == 3
+    function = ir.Function(ir.Module(), kind, "f")
+    assert target.call_conv._get_excinfo_argument(function) is function.args[1]
+    assert all(isinstance(one, ir.PointerType) for one in kind.args[:2])
+
+
+def test_a_variable_of_a_function_is_made_where_it_begins():
+    _typing, target = contexts()
+    builder, _args = builder_of(target)
+    first = builder.block
+    builder.position_at_end(builder.append_basic_block())
+    made = cgutils.alloca_once(builder, ir.DoubleType())
+    assert made in first.instructions
+
+
+# --- Templates and passes --------------------------------------------------------------------------------
+
+
+def doubled(x):
+    return x * 2.0
+
+
+def test_a_template_says_how_a_call_is_typed_and_found():
+    typing, _target = contexts()
+    base = numba.core.typing.templates.make_overload_template(doubled, lambda x: doubled, {}, False, "never")
+    template = base(typing)
+    assert template.context is typing
+    found = template.generic((types.float64,), {})
+    assert found.return_type == types.float64
+    assert callable(template.get_impl_key(found))
+
+
+def test_a_helper_has_as_many_arguments_as_it_likes():
+    """One lowering for any number of them: `lower_builtin` with VarArg."""
+
+    def none():
+        return 1.5
+
+    def many(a, b, c, d, e, f, g):
+        return a + b + c + d + e + f + g
+
+    assert in_kernel(none)() == 1.5
+    assert in_kernel(many)(1, 2, 3, 4, 5, 6, 7.0) == 28.0
+
+
+@jit.outlined
+def part_of_it(x):
+    return x + 1.0
+
+
+def a_kernel(x):
+    return part_of_it(x) * 2.0
+
+
+def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
+    """And each of the hooks of `parts.py` is called."""
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    asked = []
+    ours = parts._Kernel._optimize_functions
+
+    def seen(self, module):
+        asked.append(sum(not function.is_declaration for function in module.functions))
+        ours(self, module)
+
+    monkeypatch.setattr(parts._Kernel, "_optimize_functions", seen)
+    kernel = jit.kernel(a_kernel)
+    assert kernel(1.0) == 4.0
+    assert asked
+    assert min(asked) > 0
+
+
+def untraceable(x):
+    for k in range(3):
+        if k > x:
+            break
+    else:
+        return -1.0
+    return x + k
+
+
+def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_path):
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    made = []
+    for step in ("_optimize_final_module", "_finalize_final_module", "get_pointer_to_function"):
+        ours = getattr(parts._Part, step)
+        monkeypatch.setattr(
+            parts._Part, step, lambda self, *given, ours=ours, step=step: made.append(step) or ours(self, *given)
+        )
+    helper = jit.inlined(untraceable)
+    assert jit.kernel(calls_it)(1.0) == 3.0
+    assert helper is untraceable
+    assert set(made) == {"_optimize_final_module", "_finalize_final_module", "get_pointer_to_function"}
+
+
+def calls_it(x):
+    return untraceable(x)
+
+
+def test_passes_that_helpers_skip_are_numbas():
+    """A pass of another name would no longer be skipped."""
+    passes = []
+
+    class Seen(numba.core.compiler.Compiler):
+        def define_pipelines(self):
+            pipelines = super().define_pipelines()
+            passes.extend(one[0] for made in pipelines for one in made.passes)
+            return pipelines
+
+    assert numba.njit(pipeline_class=Seen)(doubled)(1.0) == 2.0
+    assert set(parts._SKIPPED) - set(passes) == set()
