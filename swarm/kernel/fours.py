@@ -11,6 +11,7 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 
 from .jit import inlined
+from .trace.calls import operation
 
 
 class Four(NamedTuple):
@@ -28,6 +29,7 @@ def sum_of(w, c):
     return (w.a * c.a + w.b * c.b) + (w.c * c.c + w.d * c.d)
 
 
+@operation
 def over_block(table: Any, place: Any, x: Any, y: Any) -> Four:
     """Along the third axis, the sums with the weights x and y over the first two, of the block that begins at a place.
 

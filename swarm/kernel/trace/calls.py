@@ -15,7 +15,7 @@ from numba.core.dispatcher import Dispatcher
 from .frame import Frame, Range
 from .selection import select, traced_select
 from .twins import twin_of
-from .values import TraceError, Value, has_value, kind_of, name_of, noted
+from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
 from .ways import unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
@@ -101,6 +101,8 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
         return noted(function, *given)
     if is_operation or _is_operation(function):
         return _operation(function, given, named)
+    if any(one is UNDEFINED for one in given):
+        bool(UNDEFINED)
     if isinstance(function, python_types.MethodType):
         function, given = function.__func__, (function.__self__, *given)
     if isinstance(function, python_types.FunctionType):

@@ -126,17 +126,23 @@ class Frame:
         """`first and second()`"""
         if not isinstance(first, Value):
             return first and second()
-        return self.choose(first, lambda: self.test(second()), lambda: False)
+        return self.choose(first, second, lambda: False if isinstance(first.kind, types.Boolean) else first)
 
     def either(self, first: Any, second: Callable[[], Any]) -> Any:
         """`first or second()`"""
         if not isinstance(first, Value):
             return first or second()
-        return self.choose(first, lambda: True, lambda: self.test(second()))
+        return self.choose(first, lambda: True if isinstance(first.kind, types.Boolean) else first, second)
 
     def negate(self, value: Any) -> Any:
         """`not value`"""
         return noted(operator.not_, value) if isinstance(value, Value) else not value
+
+    def same(self, first: Any, second: Any) -> bool:
+        """`first is second`"""
+        if first is UNDEFINED or second is UNDEFINED:
+            bool(UNDEFINED)
+        return first is second
 
     def contains(self, values: Any, value: Any) -> Any:
         """`value in values`"""
@@ -218,7 +224,9 @@ class Frame:
         for value in values:
             loop.head, loop.nexts = Label(), []
             take(value)
+            self._depth += 1  # a round before may have left the loop
             reached = body()
+            self._depth -= 1
             if loop.nexts:
                 if reached is NEXT:
                     loop.nexts.append((self._ends_at(loop.head), get()))

@@ -13,6 +13,7 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import Signature, infer, infer_global, make_overload_template
 from numba.extending import lower_builtin
 
+from ..cache import is_disabled
 from ..entries import python_class
 from . import calls, values
 from .calls import traced
@@ -134,6 +135,8 @@ def _class_of(given: Any) -> Any:
 
 def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None = None) -> None:
     """Let traces and Numba call a helper; `choose` gives the definitions of a family."""
+    if is_disabled():
+        return
     helper = Helper(function, choose or (lambda made: function), outlined)
     calls.REPLACED[function] = helper.called
     base: Any = make_overload_template(function, _definition(function, choose), options, choose is not None, "never")

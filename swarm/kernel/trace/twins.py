@@ -12,6 +12,7 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
+import copy
 import functools
 import itertools
 import types
@@ -280,14 +281,18 @@ class _Writer(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> Any:
         if len(node.ops) == 1:
-            made = self.generic_visit(node)
-            if not isinstance(node.ops[0], (ast.In, ast.NotIn)):
+            made, (asked,) = self.generic_visit(node), node.ops
+            if isinstance(asked, (ast.In, ast.NotIn)):
+                found = _of_frame("contains", node.comparators[0], node.left)
+            elif isinstance(asked, (ast.Is, ast.IsNot)):
+                found = _of_frame("same", node.left, node.comparators[0])
+            else:
                 return made
-            found = _of_frame("contains", node.comparators[0], node.left)
-            found = found if isinstance(node.ops[0], ast.In) else _of_frame("negate", found)
+            found = _of_frame("negate", found) if isinstance(asked, (ast.NotIn, ast.IsNot)) else found
             return ast.copy_location(found, node)
         terms = [node.left, *node.comparators]
-        pairs = zip(terms, node.ops, terms[1:], strict=False)
+        # Of a term that stands in two comparisons each has its own.
+        pairs = zip(terms, node.ops, map(copy.deepcopy, terms[1:]), strict=False)
         return self.visit(
             ast.copy_location(ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in pairs]), node)
         )

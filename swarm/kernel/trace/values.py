@@ -154,6 +154,12 @@ class _Undefined:
     def __repr__(self) -> str:
         return "a variable without one value"
 
+    def _used(self, *_: Any) -> Any:
+        raise TraceError("a variable may be used before it has a value, or has values of several kinds")
+
+    __bool__ = __eq__ = _used  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]
+
 
 UNDEFINED = _Undefined()
 
