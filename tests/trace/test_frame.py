@@ -98,7 +98,7 @@ def test_decisions(function, is_outlined):
 
 
 def is_written_on_its_way_only(x, n, seen):
-    found = x > 1.0 and written(seen, 0) or n > 1 and written(seen, 1)
+    found = (x > 1.0 and written(seen, 0)) or (n > 1 and written(seen, 1))
     chosen = written(seen, 2) if x < 0.0 else False
     if n == 2:
         written(seen, 3)

@@ -6,7 +6,7 @@ import warnings
 import numba
 import numpy as np
 import pytest
-from compared import FLAGS, Inner, Record, as_kernels_take_it, bits, compiled_only, copied
+from compared import FLAGS, Inner, Record, bits, compiled_only, copied
 from conftest import METHODS, every_surface, scene_of
 from numba.core.errors import TypingError
 

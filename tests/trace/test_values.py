@@ -27,7 +27,7 @@ def arithmetic(a, b):
 
 
 def comparisons(a, b):
-    return (a < b, a <= b, a > b, a >= b, a == b, a != b, a < 1, 0.0 <= b, (a < b) & (b < 3), (a < b) | (a > 2)), (
+    return (a < b, a <= b, a > b, a >= b, a == b, a != b, a < 1, b >= 0.0, (a < b) & (b < 3), (a < b) | (a > 2)), (
         (a < b) ^ (b > 0), not a, not a < b, a < b < 4, 0 < a != b, bool(a),
     )  # fmt: skip
 
