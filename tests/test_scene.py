@@ -169,6 +169,11 @@ def entries(chain):
     return [] if chain is None else [chain.first, *entries(chain.rest)]
 
 
+def by_surface(scene, chain):
+    """The entries of a chain with the surface of each, in the order of the surfaces."""
+    return sorted(zip(scene.owners(), entries(chain), strict=True))
+
+
 def test_a_scene_without_a_law_has_none():
     assert Scene([Box((1, 1, 1)), BALL]).laws() is None
     assert Scene([Sphere(1.0, restitution=1, friction=0, accommodation=1)]).laws() is None
@@ -177,13 +182,15 @@ def test_a_scene_without_a_law_has_none():
 def test_every_wall_has_the_laws_of_its_surface():
     """A box has three walls; what no surface has is None, and is compiled to nothing."""
     box = {"half_widths": (1.0, 1.0, 1.0)}
-    lossy = Scene([Sphere(0.5, side="outside"), Box(**box, restitution=0.5)]).laws()
-    assert (entries(lossy.restitution), lossy.friction, lossy.thermal) == ([1.0, 0.5, 0.5, 0.5], None, None)
-    rough = Scene([Box(**box, friction=0.3), Sphere(0.5, side="outside", friction=0.1)]).laws()
-    assert (rough.restitution, entries(rough.friction), rough.thermal) == (None, [0.3, 0.3, 0.3, 0.1], None)
+    lossy = Scene([Sphere(0.5, side="outside"), Box(**box, restitution=0.5)])
+    assert by_surface(lossy, lossy.laws().restitution) == [(0, 1.0), *3 * [(1, 0.5)]]
+    assert lossy.laws()[1:] == (None, None, None)
+    rough = Scene([Box(**box, friction=0.3), Sphere(0.5, side="outside", friction=0.1)])
+    assert by_surface(rough, rough.laws().friction) == [*3 * [(0, 0.3)], (1, 0.1)]
+    assert (rough.laws().restitution, rough.laws().thermal) == (None, None)
     hot = Scene([Plane((0, 0, 1), 1.0), Box(**box, temperature=300.0, accommodation=0.25), Sphere(9.0, temperature=0)])
     assert hot.laws()[:2] == (None, None)
-    assert entries(hot.laws().thermal) == [(0.0, 0.0), *3 * [(300.0, 0.25)], (0.0, 1.0)]
+    assert by_surface(hot, hot.laws().thermal) == [(0, (0.0, 0.0)), *3 * [(1, (300.0, 0.25))], (2, (0.0, 1.0))]
 
 
 # --- Far corners -----------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from . import cache
 from .frozen import registered
-from .parts import KernelCompiler, PartCompiler
+from .parts import KernelCompiler, LongKernelCompiler, PartCompiler
 from .trace import calls
 from .trace.helpers import prepare
 from .trace.selection import select as select
@@ -44,7 +44,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 # through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 # C calls no kernel.
-_KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": KernelCompiler, **_FLAGS}
+_KERNEL: Any = {"no_cfunc_wrapper": True, **_FLAGS}
 # Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
 _OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
@@ -74,6 +74,15 @@ _find_scipy_only()
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
+    return _kernel(function, KernelCompiler)
+
+
+def long_kernel(function: F) -> F:
+    """`kernel` for what is not flights: many short loops, see `parts.py`."""
+    return _kernel(function, LongKernelCompiler)
+
+
+def _kernel(function: F, compiler: Any) -> F:
     if cache.is_disabled():
         return function
     # Numba keeps what it knows of a function by its identity: a kernel that is made again has one of its own.
@@ -81,7 +90,7 @@ def kernel(function: F) -> F:
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )
     prepare(traced, _INLINE, outlined=False)
-    compiled: F = cache.kept(function, _KERNEL, cache.calling(traced))
+    compiled: F = cache.kept(function, {**_KERNEL, "pipeline_class": compiler}, cache.calling(traced))
     return compiled
 
 

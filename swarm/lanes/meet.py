@@ -9,7 +9,7 @@ from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift, split_at
 from ..contact.reflection import given, loses_energy, wall_velocity
 from ..kernel.gravity import potential
-from ..kernel.jit import by_type, by_type_outlined, kernel, outlined, scratch
+from ..kernel.jit import by_type, by_type_outlined, long_kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
@@ -33,7 +33,7 @@ _MOST_SHORT_STEPS = 1e7
 _MOVED = 1e-9
 
 
-@kernel
+@long_kernel
 def meet_block(method, chain, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)
@@ -165,7 +165,7 @@ def _spare(moving, chain, state, i, found, wall):
     state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
 
 
-@kernel
+@long_kernel
 def careful_block(method, chain, gravity, share):
     """A short step of each particle that several walls hold: (status, particle, drawn)."""
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)

@@ -16,7 +16,7 @@ from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
 from ..contact.passing import part_until_open
 from ..contact.reflection import wall_velocity
 from ..kernel.gravity import potential
-from ..kernel.jit import by_type, index, inlined, kernel, outlined
+from ..kernel.jit import by_type, index, inlined, long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
@@ -72,7 +72,7 @@ _FIRST = 1e-3
 _RETRY = 0.25
 
 
-@kernel
+@long_kernel
 def slide_block(kind, method, chain, gravity, share, lanes):
     """Advance the particles of this kind, `One` or `Two`, that a thread draws: (status, particle, drawn).
 

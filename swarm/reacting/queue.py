@@ -13,7 +13,7 @@ import numpy as np
 from ..contact.reflection import Energy, exact
 from ..kernel.gravity import Nothing, accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
-from ..kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
+from ..kernel.jit import Array, by_type, index, inlined, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
@@ -185,7 +185,7 @@ def _soon(clock):
     return (clock[BEFORE] + clock[NOW]) / (1.0 + clock[STRIKES])
 
 
-@kernel
+@long_kernel
 def predict(scenery, freedoms, queue, clock, rule, first, last):
     """What is next for the particles from `first` to before `last`; no other is touched.
 
@@ -200,21 +200,21 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
         queue.heap.key[i] = _next(scenery, freedoms, queue, i, now, rule.end, _soon(clock))
 
 
-@kernel
+@long_kernel
 def arrive(scenery, queue, rule, first, last):
     """Bring the particles from `first` to before `last` to the end of the frame."""
     for k in range(first, last):
         _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)])
 
 
-@kernel
+@long_kernel
 def lease(scenery, freedoms, clock):
     """New leases of the walls, from the time of the clock on."""
     renew_all(scenery.reacting, freedoms, clock[NOW])
     clock[TAKEN] = 0.0
 
 
-@kernel
+@long_kernel
 def settle(scenery, freedoms, t):
     """Bring the walls to a time of the frame."""
     settle_all(scenery.reacting, freedoms, t)
@@ -279,7 +279,7 @@ def _listed(queue):
     return close
 
 
-@kernel
+@long_kernel
 def take(scenery, freedoms, queue, clock, rule):
     """Take event after event until the end of the frame: (status, particle).
 

@@ -16,7 +16,7 @@ from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
 from ..surfaces.shapes.rotated import own as rotated_own
-from ..surfaces.shapes.slab import SlabNumbers
+from ..surfaces.shapes.slab import SlabNumbers, along
 from ..surfaces.shapes.solid import SolidNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
 from .freedoms import Hinged, arm_of, axis_of, pose_of
@@ -122,6 +122,14 @@ _across.register(Vec, lambda axis, n: abs(dot(axis, n)))
 
 
 @by_type
+def _across_slab(axis, n):
+    return 1.0
+
+
+_across_slab.register(Vec, lambda axis, n: abs(along(n, axis)))
+
+
+@by_type
 def _reach(body, seen):
     # Of any shape the distance is all that is known.
     clear = max(_clear(body, seen.r), 0.0)
@@ -138,8 +146,8 @@ def _(body, seen):
 @_reach.register(SlabNumbers)
 def _(body, seen):
     n = body.normal
-    x, u, a = dot(n, seen.r) - body.offset, dot(n, seen.v), 0.5 * dot(n, seen.pull)
-    width = seen.width * _across(seen.axis, n)
+    x, u, a = along(n, seen.r) - body.offset, along(n, seen.v), 0.5 * along(n, seen.pull)
+    width = seen.width * _across_slab(seen.axis, n)
     # To the wall on the one side and on the other; of a plate the particle is on one side.
     up = rise_time(body.side * (x - body.radius), 0.5 * (body.side * u + width), body.side * a)
     down = rise_time(body.side * (-x - body.radius), 0.5 * (-body.side * u + width), -body.side * a)

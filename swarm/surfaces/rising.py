@@ -23,7 +23,7 @@ from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
 from .shapes.rotated import own as rotated_own
 from .shapes.rotated import scene as rotated_scene
-from .shapes.slab import SlabNumbers
+from .shapes.slab import SlabNumbers, along, scaled
 from .shapes.solid import SolidNumbers, noise
 from .shapes.sphere import SphereNumbers
 
@@ -101,8 +101,8 @@ def _(body, seen):
 @level_of.register(SlabNumbers)
 def _(body, seen):
     # Of the two planes: a bound of f''' of the square would be ten times as far from it.
-    half = 0.5 * dot(body.normal, seen.v)
-    x, bend = dot(body.normal, seen.r) - body.offset, 0.5 * dot(body.normal, seen.a)
+    half = 0.5 * along(body.normal, seen.v)
+    x, bend = along(body.normal, seen.r) - body.offset, 0.5 * along(body.normal, seen.a)
     # Without a speed the plane behind is the near one, from which it leaves.
     sign = math.copysign(1.0, select(half == 0.0, -x, half))
     return Between(sign * x, abs(half), sign * bend, body.radius)
@@ -137,7 +137,7 @@ def flat_normal(body):
 
 
 flat_normal.register(PlaneNumbers, lambda body: body.normal)
-flat_normal.register(SlabNumbers, lambda body: body.normal)
+flat_normal.register(SlabNumbers, lambda body: scaled(body.normal, 1.0))
 flat_normal.register(Rotated, lambda body: _in_wall(flat_normal(body.body), body))
 
 
@@ -236,9 +236,9 @@ contract.has_levels.register(SlabNumbers, lambda surface: surface.side > 0.0)
 
 @safe_step.register(SlabNumbers)
 def _(body, drive, seen, longest):
-    x, side = dot(body.normal, seen.r) - body.offset, body.side
+    x, side = along(body.normal, seen.r) - body.offset, body.side
     sign = select(x > 0.0, 1.0, -1.0)
-    x, half, bend = sign * x, 0.5 * sign * dot(body.normal, seen.v), 0.5 * sign * dot(body.normal, seen.a)
+    x, half, bend = sign * x, 0.5 * sign * along(body.normal, seen.v), 0.5 * sign * along(body.normal, seen.a)
     here, other = (
         Level(side * (x - body.radius), side * half, side * bend, 1.0, 0.0),
         Level(-x - body.radius, -half, -bend, 1.0, 0.0),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import inlined, kernel, next_of, scratch, select
+from ...kernel.jit import inlined, long_kernel, next_of, scratch, select
 from ...kernel.vector import Vec
 from ...status import Status
 from ...surfaces import fold as walls
@@ -24,7 +24,7 @@ _WAITS = 20
 _AFRESH = 32
 
 
-@kernel
+@long_kernel
 def advance_bodies(body, chains, rule, state, ticket, size, halt):
     """Advance all bodies that this thread draws: (status, number of the body).
 

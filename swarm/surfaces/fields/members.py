@@ -16,7 +16,7 @@ from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
 from ..shapes.ellipsoid import EllipsoidNumbers
 from ..shapes.quadratic import QuadricNumbers
-from ..shapes.slab import SlabNumbers
+from ..shapes.slab import AlongX, AlongY, AlongZ, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereNumbers
 from .grid import Grid, cell_of, until_next
@@ -75,6 +75,8 @@ def can_be_member(wall: Any) -> bool:
 def kind_of(wall: Any) -> Any:
     """What numbers have in common that a field may hold: their types, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
+    if isinstance(wall, Vec | AlongX | AlongY | AlongZ):
+        return Vec
     return (type(wall), *map(kind_of, wall)) if isinstance(wall, tuple) else type(wall)
 
 
@@ -92,9 +94,11 @@ def _type_of(wall: Any) -> Any:
 
 def _in_general(wall: Any, turned: bool) -> Any:
     """The same numbers, of the type that a body turned in any way has."""
+    if isinstance(wall, AlongX | AlongY | AlongZ):
+        return Vec(*(float(isinstance(wall, axis)) for axis in (AlongX, AlongY, AlongZ)))
     if isinstance(wall, Rotated):
         return wall._replace(body=_in_general(wall.body, False))
-    if isinstance(wall, Chain | SolidNumbers):
+    if isinstance(wall, SlabNumbers | Chain | SolidNumbers):
         parts = [_in_general(part, isinstance(wall, Chain) and _is_round(part)) for part in wall]
         return type(wall)(*parts)
     return Rotated(wall, *_AXES) if turned else wall
@@ -263,6 +267,9 @@ gathered.register(Nothing, lambda like, table, m, k: None)
 width.register(Nothing, lambda like: 0)
 gathered.register(Vec, lambda like, table, m, k: Vec(table[m, k], table[m, k + 1], table[m, k + 2]))
 width.register(Vec, lambda like: 3)
+gathered.register(AlongX, lambda like, table, m, k: AlongX(1.0))
+gathered.register(AlongY, lambda like, table, m, k: AlongY(1.0))
+gathered.register(AlongZ, lambda like, table, m, k: AlongZ(1.0))
 
 
 @gathered.register(SphereNumbers)

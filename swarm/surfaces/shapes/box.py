@@ -10,7 +10,6 @@ from ...checks import Vector, length, one_of, vector
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
-from ..kinds import by_kind
 from ..surface import Box as Bounds
 from ..surface import HalfSpace, Surface, box_around, farthest, rotated_box, side_sign
 from .plane import PlaneNumbers
@@ -62,8 +61,6 @@ class Box(Surface):
                 parts.append(_face((x, y, z), half, self.center))
             elif not low:
                 parts.append(_face((-x, -y, -z), half, self.center))
-        # Of one kind whichever of its faces is open
-        parts = by_kind(parts, lambda part: part)
         if self.side == "inside":
             return tuple(parts)
         return (body(parts, math.hypot(*self.center)),)

@@ -1,13 +1,14 @@
 """Slab: phi = |n.(r - c)| - h, the distance; inner function q = (n.(r - c))^2: the sphere of one dimension."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...checks import Vector, length
-from ...kernel.jit import inlined, select
+from ...kernel.jit import by_type, inlined, select
 from ...kernel.vector import Vec, dot, vec
 from .. import contract
 from ..course import rise_time
@@ -73,6 +74,67 @@ class Slab(Surface):
         return farthest(self.center) + self.half_width
 
 
+# --- The normal: along an axis it costs no multiplication ------------------------------------------------
+
+# So each axis is a kind of its own: with a vector for all an impact in a box takes half as long again, and a third in a
+# fall that loses energy.
+
+
+class AlongX(NamedTuple):
+    """The x axis."""
+
+    x: float
+
+
+class AlongY(NamedTuple):
+    """The y axis."""
+
+    y: float
+
+
+class AlongZ(NamedTuple):
+    """The z axis."""
+
+    z: float
+
+
+Normal = Vec | AlongX | AlongY | AlongZ
+
+
+def normal_of(vector: Sequence[float]) -> Normal:
+    """What kernels take for a unit vector, or for the opposite one where that is an axis."""
+    x, y, z = vector
+    if y == 0.0 and z == 0.0:
+        return AlongX(1.0)
+    if z == 0.0 and x == 0.0:
+        return AlongY(1.0)
+    if x == 0.0 and y == 0.0:
+        return AlongZ(1.0)
+    return vec(vector)
+
+
+@by_type
+def along(normal, r):
+    """n.r"""
+    raise NotImplementedError
+
+
+@by_type
+def scaled(normal, k):
+    """k n"""
+    raise NotImplementedError
+
+
+along.register(Vec, lambda normal, r: dot(normal, r))
+scaled.register(Vec, lambda normal, k: k * normal)
+along.register(AlongX, lambda normal, r: r.x)
+scaled.register(AlongX, lambda normal, k: Vec(k, 0.0, 0.0))
+along.register(AlongY, lambda normal, r: r.y)
+scaled.register(AlongY, lambda normal, k: Vec(0.0, k, 0.0))
+along.register(AlongZ, lambda normal, r: r.z)
+scaled.register(AlongZ, lambda normal, k: Vec(0.0, 0.0, k))
+
+
 # --- The numbers -----------------------------------------------------------------------------------------
 
 
@@ -81,7 +143,7 @@ class Slab(Surface):
 class SlabNumbers(NamedTuple):
     """What kernels know of a slab."""
 
-    normal: Vec
+    normal: Normal
     offset: float  # n.c
     radius: float  # the half width
     radius2: float
@@ -90,19 +152,19 @@ class SlabNumbers(NamedTuple):
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
     """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
-    across = vec(normal)
-    return SlabNumbers(across, float(dot(across, vec(center))), half, half * half, side)
+    across = normal_of(normal)
+    return SlabNumbers(across, float(along(across, vec(center))), half, half * half, side)
 
 
 @inlined
 def _off(surface, r):
     """The signed distance from the middle."""
-    return dot(surface.normal, r) - surface.offset
+    return along(surface.normal, r) - surface.offset
 
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.gradient.register(SlabNumbers, lambda surface, r: np.copysign(1.0, _off(surface, r)) * surface.normal)
+contract.gradient.register(SlabNumbers, lambda surface, r: scaled(surface.normal, np.copysign(1.0, _off(surface, r))))
 
 
 @contract.inner.register(SlabNumbers)
@@ -111,18 +173,18 @@ def _(surface, r):
     return d * d
 
 
-contract.slope.register(SlabNumbers, lambda surface, r: 2.0 * _off(surface, r) * surface.normal)
+contract.slope.register(SlabNumbers, lambda surface, r: scaled(surface.normal, 2.0 * _off(surface, r)))
 
 
 @contract.unit_normal.register(SlabNumbers)
 def _(surface, r):
-    return math.copysign(1.0, surface.side * _off(surface, r)) * surface.normal
+    return scaled(surface.normal, math.copysign(1.0, surface.side * _off(surface, r)))
 
 
 @contract.settle.register(SlabNumbers)
 def _(surface, r):
     d = _off(surface, r)
-    return r - (d - math.copysign(surface.radius, d)) * surface.normal
+    return r - scaled(surface.normal, d - math.copysign(surface.radius, d))
 
 
 @contract.outward_acceleration.register(SlabNumbers)
@@ -138,7 +200,7 @@ contract.flat.register(SlabNumbers, lambda surface: True)
 
 @contract.first_hit.register(SlabNumbers)
 def _(surface, r, v):
-    d, u = _off(surface, r), dot(surface.normal, v)
+    d, u = _off(surface, r), along(surface.normal, v)
     # Between the walls the one ahead, outside of them the one on the side where the flight comes from
     time = (surface.side * math.copysign(surface.radius, u) - d) / u
     meets = select(surface.side > 0.0, abs(u), -d * u) > 0.0
@@ -150,7 +212,7 @@ def near_face_hit(surface, r, v, pull):
     """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
     d = _off(surface, r)
     sign = math.copysign(0.5, d)
-    b, a = sign * dot(surface.normal, v), sign * dot(surface.normal, pull)
+    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
     return rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
 
 
@@ -159,7 +221,7 @@ def _(surface, r, v, pull):
     near = near_face_hit(surface, r, v, pull)
     d = _off(surface, r)
     sign = math.copysign(0.5, d)
-    b, a = sign * dot(surface.normal, v), sign * dot(surface.normal, pull)
+    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
     # Between them the far one too
     far = rise_time(-abs(d) - surface.radius, -b, -a)
     return select((surface.side > 0.0) & (far < near), far, near), True
@@ -177,7 +239,7 @@ def _(surface, r, v, pull):
 @contract.inner_gradient.register(SlabNumbers)
 def _(surface, r0, r1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    return (_off(surface, r0) + _off(surface, r1)) * surface.normal
+    return scaled(surface.normal, _off(surface, r0) + _off(surface, r1))
 
 
 contract.step_normal.register(SlabNumbers, lambda surface, r0, r1: contract.unit_normal(surface, r0))
@@ -186,14 +248,14 @@ contract.step_normal.register(SlabNumbers, lambda surface, r0, r1: contract.unit
 @contract.push.register(SlabNumbers)
 def _(surface, r0, p, kappa):
     # r1 = r0 + p - kappa (s0 + s1) n
-    k = kappa * (2.0 * _off(surface, r0) + dot(surface.normal, p)) / (1.0 + kappa)
-    return r0 + (p - k * surface.normal)
+    k = kappa * (2.0 * _off(surface, r0) + along(surface.normal, p)) / (1.0 + kappa)
+    return r0 + (p - scaled(surface.normal, k))
 
 
 @contract.rise.register(SlabNumbers)
 def _(surface, r0, p, kappa):
     # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
-    d, u = _off(surface, r0), dot(surface.normal, p)
+    d, u = _off(surface, r0), along(surface.normal, p)
     w = 1.0 / (1.0 + kappa)
     both, change = (2.0 * d + u) * w, (u - 2.0 * kappa * d) * w
     risen = both * change
@@ -203,17 +265,17 @@ def _(surface, r0, p, kappa):
 
 @contract.resolve.register(SlabNumbers)
 def _(surface, r, strength):
-    return r - (2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, r)) * surface.normal
+    return r - scaled(surface.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, r))
 
 
 # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-contract.chord_guess.register(SlabNumbers, lambda surface, r, p: 0.5 * dot(surface.normal, p) / _off(surface, r))
+contract.chord_guess.register(SlabNumbers, lambda surface, r, p: 0.5 * along(surface.normal, p) / _off(surface, r))
 
 
 @contract.chord_normal.register(SlabNumbers)
 def _(surface, r, p, kappa):
-    d = 2.0 * _off(surface, r) + dot(surface.normal, p)
-    return math.copysign(1.0, surface.side * d) * surface.normal
+    d = 2.0 * _off(surface, r) + along(surface.normal, p)
+    return scaled(surface.normal, math.copysign(1.0, surface.side * d))
 
 
 # H = n n^T: for walls that move other than uniformly
