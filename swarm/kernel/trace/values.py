@@ -284,11 +284,11 @@ def noted(symbol: Any, *given: Any) -> Any:
 
 def _signature(symbol: Any, kind: Any, kinds: tuple[Any, ...]) -> Signature:
     try:
-        signature = context().resolve_function_type(kind, kinds, {})
+        signature, cause = context().resolve_function_type(kind, kinds, {}), None
     except Exception as error:
-        raise TraceError(f"{name_of(symbol)}: {str(error).strip().splitlines()[0]}") from error
+        signature, cause = None, error
     if signature is None:
-        raise TraceError(f"there is no {name_of(symbol)} of {', '.join(map(str, kinds))}")
+        raise TraceError(f"there is no {name_of(symbol)} of {', '.join(map(str, kinds))}") from cause
     return signature  # type: ignore[no-any-return]
 
 
