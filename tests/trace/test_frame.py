@@ -81,8 +81,19 @@ def evaluated_on_their_way_only(x, n):
     return good, numbers[n] if 0 <= n < 3 else x
 
 
+def of_constants(x, n):
+    zero = 0.0 if x > 0.5 else -0.0
+    if n > 2:
+        return zero, x, 1
+    if n == 1:
+        return zero, x, 1
+    if n == 0:
+        return -0.0, x, 1
+    return 0.0, 2.0, 3
+
+
 FUNCTIONS = [
-    ways, first_assigned_in_a_branch, records_of_ways, becomes_another_type, expressions, evaluated_on_their_way_only,
+    of_constants, ways, first_assigned_in_a_branch, records_of_ways, becomes_another_type, expressions, evaluated_on_their_way_only,
 ]  # fmt: skip
 
 
@@ -426,6 +437,16 @@ def nothing_comes_back(row, x):
         row[0] = x
         return
     row[1] = x
+
+
+def of_known_ints(x):
+    return lowered(x, 1), lowered(x, 3), lowered(x, 0), lowered(x, True)
+
+
+def test_a_part_is_made_for_each_int_that_is_known():
+    traced = in_kernel(of_known_ints)
+    for x in NUMBERS:
+        assert bits(traced(x)) == bits(of_known_ints(x))
 
 
 def test_a_function_that_gives_nothing():
