@@ -89,7 +89,14 @@ def as_kernels_take_it(value):
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if type(value) in (float, int):
         return {float: np.float64, int: np.int64}[type(value)](value)
-    return value.copy() if isinstance(value, np.ndarray) else value
+    return copied_array(value) if isinstance(value, np.ndarray) else value
+
+
+def copied_array(array):
+    """A copy with the same distances between its elements."""
+    whole = array if array.base is None else array.base
+    start = array.ctypes.data - whole.ctypes.data
+    return np.ndarray(array.shape, array.dtype, whole.copy(order="K"), start, array.strides)
 
 
 def bits(value):

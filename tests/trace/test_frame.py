@@ -253,7 +253,8 @@ def new_in_a_loop(x, n):
 
 
 LOOPS = [
-    leaves_early, while_loops, ranges, known_ranges, the_counter_is_assigned, carries, swaps, over_tuples, new_in_a_loop,
+    leaves_early, while_loops, ranges, known_ranges, the_counter_is_assigned, carries, swaps, over_tuples,
+    new_in_a_loop,
 ]  # fmt: skip
 
 

@@ -153,15 +153,20 @@ def is_given_text(a):
     return a + "text"
 
 
-@pytest.mark.parametrize(
-    ("function", "said"), [(asks_a_stranger, "is nothing that a kernel has"), (is_given_text, "there is no add of float64, unicode_type")]
-)  # fmt: skip
+NEITHER = [
+    (asks_a_stranger, "is nothing that a kernel has"),
+    (is_given_text, "there is no add of float64, unicode_type"),
+]
+
+
+@pytest.mark.parametrize(("function", "said"), NEITHER)
 def test_what_neither_can_do_is_said_in_one_sentence(function, said, left):
     helper = jit.inlined(copied(function))
     with pytest.raises(TypingError):
         numba.njit(**FLAGS)(cache.calling(helper))(1.0)
     (reason,) = left.values()
     assert "\n" not in reason
+    assert said in reason
     assert f"{__file__}, line {function.__code__.co_firstlineno + 1}" in reason
 
 

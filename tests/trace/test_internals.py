@@ -82,10 +82,9 @@ def test_an_operation_has_a_signature():
 
 
 def test_an_operation_that_there_is_not_has_none_or_says_so():
-    try:
-        assert signature_of(operator.add, types.float64, types.none) is None
-    except numba.core.errors.TypingError as error:
-        assert str(error).strip().splitlines()[0]
+    assert signature_of(operator.add, types.float64, types.none) is None
+    with pytest.raises(numba.core.errors.TypingError):
+        signature_of(np.sqrt, types.none)
 
 
 def test_attributes_have_types():
@@ -125,8 +124,8 @@ def test_an_operation_is_an_instruction():
     _typing, target = contexts()
     builder, args = builder_of(target, types.float64, types.float64)
     found = signature_of(operator.add, types.float64, types.float64)
-    added = target.get_function(operator.add, found)(builder, args, loc=numba.core.ir.unknown_loc)
-    assert added.opname == "fadd"
+    with target.push_code_library(target.codegen().create_library("added")):
+        assert target.get_function(operator.add, found)(builder, args).opname == "fadd"
     assert target.cast(builder, args[0], types.float64, types.int64).type == ir.IntType(64)
     assert target.get_constant_generic(builder, types.int64, 7).constant == 7
     assert target.get_constant(types.float64, 0.5).constant == 0.5
