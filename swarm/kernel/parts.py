@@ -1,47 +1,27 @@
-"""Helpers of kernels are compiled to LLVM's text only, and a kernel optimises all that it calls as one module.
+"""A kernel is one module of LLVM, which is optimised as a whole, and how much of that pays.
 
 By itself Numba optimises each function, with all that it calls, and makes machine code of it, which never runs: a
-kernel links the text. For the 180 functions of `Impact` in an ellipsoid around a ball, under gravity, that was 3.9 of
-11.2 s. A kernel is no slower this way: 11.3 instead of 13.3 ns an impact of a fall in a sphere, 20.5 instead of 22.0 ns
-with Uzawa's loop, 5.4 and 5.4 ns in a sphere.
-
-What is left is Numba's own Python, 40 ms a helper. So helpers skip the passes that find nothing in them, and nothing is
-collected while a kernel compiles. Tried, and no faster: LLVM's passes of each function left to those of the kernel.
+kernel links the text. So what a trace leaves to Numba is compiled to LLVM's text only. Nothing is collected while a
+kernel compiles.
 """
 
 import contextlib
 import gc
-import inspect
 import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-# Frames that the compiler may nest. A fold over the walls of a scene is a function of the first that calls itself for
-# the others, up to 58 frames a wall: 24 planes, the most that a scene has, nest 1600, in less than 512 kB of a stack.
-# Rejected: each of some 60 folds written a second time, as a loop that is unrolled for a number of walls.
+# Frames that a trace may nest. A fold over the walls of a scene is a function of the first that calls itself for the
+# others: 24 planes, the most that a scene has, nest 1600, in less than 512 kB of a stack.
 _DEEPEST = 10_000
 
 # LLVM's levels: for one function by itself, and for a module.
 _LITTLE, _MOST = 1, 3
-
-# Of closures, `literally`, functions that Numba itself is to inline, and expressions of whole arrays.
-_SKIPPED = (
-    untyped_passes.InlineClosureLikes,
-    untyped_passes.MakeFunctionToJitFunction,
-    untyped_passes.InlineInlinables,
-    untyped_passes.FindLiterallyCalls,
-    untyped_passes.LiteralUnroll,
-    untyped_passes.LiteralPropagationSubPipelinePass,
-    typed_passes.InlineOverloads,
-    typed_passes.NopythonRewrites,
-    typed_passes.DumpParforDiagnostics,
-)
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]
@@ -65,18 +45,12 @@ class _Part(JITCodeLibrary):  # type: ignore[misc]
 
 
 class PartCompiler(Compiler):  # type: ignore[misc]
-    """Numba's compiler for helpers, by `pipeline_class`, an option of `jit`."""
+    """Numba's compiler for helpers that are not traced, by `pipeline_class`, an option of `jit`."""
 
     def define_pipelines(self) -> Any:
-        """The passes of Numba that a helper needs, into a library that is a `_Part`."""
+        """Numba's passes, into a library that is a `_Part`."""
         self.state.library = _Part(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        pipelines: Any = super().define_pipelines()
-        # A user's function may have functions in it.
-        if not any(map(inspect.iscode, self.state.func_id.code.co_consts)):
-            for pipeline in pipelines:
-                pipeline.passes = [each for each in pipeline.passes if each[0] not in _SKIPPED]
-                pipeline.finalize()
-        return pipelines
+        return super().define_pipelines()
 
 
 class _Kernel(JITCodeLibrary):  # type: ignore[misc]

@@ -254,17 +254,3 @@ def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_pat
 
 def calls_it(x):
     return untraceable(x)
-
-
-def test_passes_that_helpers_skip_are_numbas():
-    """A pass of another name would no longer be skipped."""
-    passes = []
-
-    class Seen(numba.core.compiler.Compiler):
-        def define_pipelines(self):
-            pipelines = super().define_pipelines()
-            passes.extend(one[0] for made in pipelines for one in made.passes)
-            return pipelines
-
-    assert numba.njit(pipeline_class=Seen)(doubled)(1.0) == 2.0
-    assert set(parts._SKIPPED) - set(passes) == set()
