@@ -49,7 +49,7 @@ class Helper:
         self._whole: dict[Any, Part | None] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
-        """What a call of it gives, in a values."""
+        """What a call of it gives, in a trace."""
         if named or len(given) < len(self.signature.parameters):
             bound = self.signature.bind(*given, **named)
             bound.apply_defaults()
