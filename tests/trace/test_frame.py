@@ -93,7 +93,8 @@ def of_constants(x, n):
 
 
 FUNCTIONS = [
-    of_constants, ways, first_assigned_in_a_branch, records_of_ways, becomes_another_type, expressions, evaluated_on_their_way_only,
+    of_constants, ways, first_assigned_in_a_branch, records_of_ways, becomes_another_type, expressions,
+    evaluated_on_their_way_only,
 ]  # fmt: skip
 
 

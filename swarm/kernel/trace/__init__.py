@@ -1,13 +1,13 @@
 """Helpers of kernels, traced into the kernel that calls them: Numba compiles none of them.
 
 Numba takes 40 ms of its own Python for each helper that it compiles, however small it is: a cone with friction had 520
-of them. Here a helper runs once in plain Python on proxies of numbers and arrays, which note what is done with them, and
+of them. Here a helper runs once in plain Python on proxies of numbers and arrays, which note what is done with them;
 the notes are emitted as instructions of LLVM where the kernel calls it. Types and instructions of an operation are
 Numba's own, so that a kernel computes what it would compute if Numba compiled the helper, bit for bit.
 
 What Python knows while a helper is traced leaves no note: dispatch on classes, `if law is None`, loops over tuples,
-methods of records, recursion over walls. What is known in the kernel only is a way among the notes, and is written as in
-any Python: `if`, `while`, `for`, `break`, `return`, `and`, `or`, `not`, `in`. Rejected: control flow as functions of
+methods of records, recursion over walls. What is known in the kernel only is a way among the notes, and is written as
+in any Python: `if`, `while`, `for`, `break`, `return`, `and`, `or`, `not`, `in`. Rejected: control flow as functions of
 functions, `cond(x > 0.0, first, second)` and `loop(condition, body, state)`: 700 branches and loops of the package, and
 all of its users, would have to be written so, and plain Python would pay for their calls.
 
