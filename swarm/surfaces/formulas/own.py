@@ -117,7 +117,7 @@ def _compiled_gradient(surface, r):
 
 
 def require_compiled(surfaces: Sequence[Surface]) -> None:
-    """Raise a `SceneError` where Numba cannot compile a function: sooner than in a kernel, where it is one line of many."""
+    """Raise a `SceneError` where Numba cannot compile a function: sooner than in a kernel."""
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return
     for surface in surfaces:
