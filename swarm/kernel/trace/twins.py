@@ -85,22 +85,23 @@ def _factory(code: types.CodeType) -> types.CodeType | None:
 def _assigned(statements: Any) -> list[str]:
     """The names that statements assign, in their order."""
     names: dict[str, None] = {}
-    for statement in statements:
-        for node in _inside(statement):
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                names[node.id] = None
-            elif isinstance(node, ast.FunctionDef):
-                names[node.name] = None
+    for one in statements:
+        if isinstance(one, ast.FunctionDef):
+            names[one.name] = None
+        elif isinstance(one, (ast.If, ast.While, ast.For)):
+            names |= dict.fromkeys(_assigned([*one.body, *one.orelse]))
+        targets = one.targets if isinstance(one, ast.Assign) else [getattr(one, "target", one)]
+        names |= dict.fromkeys(name for target in targets for name in _names(target))
     return list(names)
 
 
-def _inside(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a statement, without those of functions in it."""
-    yield node
-    if isinstance(node, (ast.FunctionDef, ast.Lambda, ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp)):
-        return
-    for child in ast.iter_child_nodes(node):
-        yield from _inside(child)
+def _names(target: Any) -> Iterator[str]:
+    """The variables in what is assigned to."""
+    if isinstance(target, ast.Name):
+        yield target.id
+    elif isinstance(target, (ast.Tuple, ast.Starred)):
+        for part in ast.iter_child_nodes(target):
+            yield from _names(part)
 
 
 def _load(name: str) -> ast.Name:
@@ -231,8 +232,8 @@ class _Writer(ast.NodeTransformer):
         if node.orelse:
             raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
-        names = [one for one in _assigned([node.target, *node.body]) if one in self._locals]
-        taken = [one for one in _assigned([node.target]) if one in self._locals]
+        names = [one for one in _assigned([node]) if one in self._locals]
+        taken = [one for one in _names(node.target) if one in self._locals]
         take = self._plain(
             f".take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load(".value"))], ".value"
         )
