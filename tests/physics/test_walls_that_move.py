@@ -527,10 +527,11 @@ def test_walls_that_close_say_where_and_when(tmp_path, monkeypatch):
 def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
     """A particle at a wall at rest, and a floor that shakes far below it."""
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.05), 2.0))
-    chain = swarm.Scene([swarm.Slab((0.0, 1.0, 0.0), 0.5), floor], DOWN).chain(1.0)
+    scene = swarm.Scene([swarm.Slab((0.0, 1.0, 0.0), 0.5), floor], DOWN)
+    chain = scene.chain(1.0)
     gravity = swarm.Scene([floor], DOWN).pull()
     for left in (0.0, 0.5):
         with np.errstate(all="ignore"):
             hit = safe.first_hit(chain, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left)
         assert hit.time == 0.0
-        assert hit.wall == 0.0
+        assert scene.owners()[int(hit.wall)] == 0
