@@ -42,6 +42,11 @@ def chain_of(surfaces: Sequence[Surface]) -> Chain | None:
     return chain
 
 
+def each(chain):
+    """The links of a chain, first to last: none of None. `link.first` is a wall, or in a `Field` many of them."""
+    return () if chain is None else (chain, *each(chain.rest))
+
+
 @by_type
 def is_end(chain):
     """Whether there are no walls: a constant for the compiler."""
