@@ -17,7 +17,6 @@ from .surfaces import contract as surfaces
 from .surfaces import flights
 from .surfaces.fold import Field
 from .surfaces.moving import at
-from .surfaces.near import deepest_in_cell
 from .surfaces.period import Period
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
@@ -38,7 +37,7 @@ def penetration(chain, r):
 
 @penetration.register(Field)
 def _(chain, r):
-    distance, other = deepest_in_cell(chain.first, r), penetration(chain.rest, r)
+    distance, other = chain.first.deepest_in_cell(r), penetration(chain.rest, r)
     return select(distance > other, distance, other)
 
 

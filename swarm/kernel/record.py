@@ -4,7 +4,8 @@ Numba passes a named tuple in registers and knows its class. Python's own `Named
 """
 
 import collections
-from typing import Any, dataclass_transform
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Self, dataclass_transform
 
 _named: Any = collections.namedtuple
 
@@ -41,3 +42,8 @@ class Record(metaclass=_RecordType):
     >>> Square(3.0).twice(), Square(3.0)
     (18.0, Square(edge=3.0))
     """
+
+    if TYPE_CHECKING:
+
+        def _replace(self, **changes: Any) -> Self: ...
+        def __iter__(self) -> Iterator[Any]: ...

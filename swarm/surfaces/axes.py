@@ -4,12 +4,11 @@ A length is a float, `Free` where all walls are the same along the axis, or None
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from ..kernel.gravity import Gravity, Nothing
-from ..kernel.jit import by_type, inlined, outlined, select
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
 from .course import rise_time
 
 # What leaves goes so far beyond the face, in lengths of the cell; a step that ends within twice that has left well.
@@ -20,7 +19,7 @@ CELLS = 2.0**40
 _LATER = 1e-4
 
 
-class Free(NamedTuple):
+class Free(Record):
     """The length of the cell along an axis along which all walls are the same: its faces end no flight."""
 
     length: float
@@ -29,27 +28,21 @@ class Free(NamedTuple):
 # --- Where it is -----------------------------------------------------------------------------------------
 
 
-@by_type
 def length_of(length):
     """The length of the cell along an axis, 0 where it does not repeat."""
-    return length
+    return 0.0 if length is None else length.length if isinstance(length, Free) else length
 
 
-length_of.register(Free, lambda length: length.length)
-length_of.register(Nothing, lambda length: 0.0)
-
-
-@by_type
 def image_of(length, x):
     """How many lengths to the cell a coordinate is."""
+    if length is None:
+        return 0.0
+    length = length_of(length)
     # Below 0 by so little that the other face is what it rounds to: there it is on this one.
-    n = select(x >= length_of(length), 1.0, select((x < 0.0) & (x + length_of(length) < length_of(length)), -1.0, 0.0))
-    if -length_of(length) < x < 2.0 * length_of(length):
+    n = select(x >= length, 1.0, select((x < 0.0) & (x + length < length), -1.0, 0.0))
+    if -length < x < 2.0 * length:
         return n
-    return _whole_lengths(length_of(length), x)
-
-
-image_of.register(Nothing, lambda length, x: 0.0)
+    return _whole_lengths(length, x)
 
 
 @outlined
@@ -62,165 +55,109 @@ def _whole_lengths(length, x):
     return n + select(x - n * length >= length, 1.0, 0.0)
 
 
-@by_type
 def inside(length, x, n):
     """The coordinate of the same place in the cell, which is so many lengths away."""
+    if length is None:
+        return x
     # One length beyond the face the difference is exact.
     back = x - n * length_of(length)
     return select(back < 0.0, 0.0, back)
 
 
-inside.register(Nothing, lambda length, x, n: x)
-
-
-@by_type
 def is_out(length, x):
     """Whether a coordinate is outside the cell."""
-    return (x >= length_of(length)) | (x < 0.0)
+    return False if length is None else (x >= length_of(length)) | (x < 0.0)
 
 
-is_out.register(Nothing, lambda length, x: False)
-
-
-@by_type
 def is_free(length):
     """Whether all walls are the same along an axis: a constant for the compiler."""
-    return False
+    return isinstance(length, Free)
 
 
-is_free.register(Free, lambda length: True)
+def has_faces(length):
+    """Whether the faces of the cell across an axis end flights: a constant for the compiler."""
+    return not (length is None or isinstance(length, Free))
 
 
-@by_type
 def is_beyond_face(length, x):
     """Whether a coordinate is farther outside than what leaves goes."""
-    return False
-
-
-@is_beyond_face.register(float)
-def _(length, x):
+    if not has_faces(length):
+        return False
     beyond = 2.0 * _BEYOND * length
     return (x > length + beyond) | (x < -beyond)
 
 
-@by_type
 def excess(length, x):
     """By how much a coordinate is beyond the place where a step that leaves is to end; below 0 within."""
-    return -math.inf
-
-
-@excess.register(float)
-def _(length, x):
-    return abs(x - 0.5 * length) - (0.5 + _BEYOND) * length
+    return abs(x - 0.5 * length) - (0.5 + _BEYOND) * length if has_faces(length) else -math.inf
 
 
 # --- When it leaves --------------------------------------------------------------------------------------
 
 
-@by_type
 def time_to_leave(length, x, v, pull):
     """When a coordinate is a little beyond the faces."""
-    return math.inf
-
-
-@time_to_leave.register(float)
-def _(length, x, v, pull):
-    return _time_beyond(pull, length, x, v)
-
-
-time_to_leave.register(Free, lambda length, x, v, pull: time_far(length, x, v, pull))
-
-
-@by_type
-def _time_beyond(pull, length, x, v):
-    """The same without gravity."""
-    edge = select(v > 0.0, length + _BEYOND * length, -_BEYOND * length)
-    # Divisions are what a pass takes here: one an axis, which gaps ask for again.
-    return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
-
-
-@_time_beyond.register(float)
-def _(pull, length, x, v):
+    if not has_faces(length):
+        return time_far(length, x, v, pull)
+    if pull is None:
+        edge = select(v > 0.0, length + _BEYOND * length, -_BEYOND * length)
+        # Divisions are what a pass takes here: one an axis, which gaps ask for again.
+        return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
     beyond = _BEYOND * length
     up = rise_time(x - length - beyond, 0.5 * v, 0.5 * pull)
     down = rise_time(-x - beyond, -0.5 * v, -0.5 * pull)
     return select(up < down, up, down)
 
 
-@by_type
 def time_out(pull, ends, x, v):
-    """When a coordinate that is between two ends leaves them, without gravity."""
+    """When a coordinate that is between two ends leaves them."""
     low, high = ends
-    edge = select(v > 0.0, high, low)
-    return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
-
-
-@time_out.register(float)
-def _(pull, ends, x, v):
-    low, high = ends
+    if pull is None:
+        edge = select(v > 0.0, high, low)
+        return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
     up, down = rise_time(x - high, 0.5 * v, 0.5 * pull), rise_time(low - x, -0.5 * v, -0.5 * pull)
     return select(up < down, up, down)
 
 
-@by_type
 def time_far(length, x, v, pull):
     """When a coordinate is as many cells away as a flight may go."""
+    if length is None:
+        return math.inf
     far = CELLS * length_of(length)
     return time_out(pull, (-far, far), x, v)
 
 
-time_far.register(Nothing, lambda length, x, v, pull: math.inf)
-
-
-@by_type
 def room_along(length):
     """How much farther along an axis a flight may end for the sake of its time."""
-    return math.inf
+    return _LATER * length if has_faces(length) else math.inf
 
 
-room_along.register(float, lambda length: _LATER * length)
-
-
-@by_type
 def fastest(pull, v, t):
     """A speed that is not exceeded within a time t."""
-    return abs(v)
+    return abs(v) if pull is None else abs(v) + abs(pull) * t
 
 
-fastest.register(float, lambda pull, v, t: abs(v) + abs(pull) * t)
-
-
-@by_type
 def along_x(gravity):
     """Gravity along x, None where there is none at all."""
-    return
+    return None if gravity is None else gravity.x
 
 
-@by_type
 def along_y(gravity):
     """The same along y."""
-    return
+    return None if gravity is None else gravity.y
 
 
-@by_type
 def along_z(gravity):
     """The same along z."""
-    return
+    return None if gravity is None else gravity.z
 
 
-along_x.register(Gravity, lambda gravity: gravity.x)
-along_y.register(Gravity, lambda gravity: gravity.y)
-along_z.register(Gravity, lambda gravity: gravity.z)
-
-
-@inlined
 def least(x, y, z):
     """The least of three."""
     first = select(x < y, x, y)
     return select(first < z, first, z)
 
 
-@inlined
 def most(x, y, z):
     """The greatest of three."""
     first = select(x > y, x, y)

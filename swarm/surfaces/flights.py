@@ -3,11 +3,11 @@
 import math
 from typing import NamedTuple
 
-from ..kernel.gravity import Gravity, Nothing, as_vector
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.gravity import as_vector
+from ..kernel.jit import by_type, select
 from . import contract
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Chain, Field, count, member, outside
+from .fold import Chain, Field, count, each, member, outside
 
 
 class Hit(NamedTuple):
@@ -36,43 +36,25 @@ def of_steps(falls):
     return *free, contract.inner, contract.level_of
 
 
-@by_type
 def hit(gravity, surface, r, v):
     """When the free flight leaves the admissible side of one wall: (time, whether it does then)."""
-    raise NotImplementedError
+    if gravity is None:
+        return contract.first_hit(surface, r, v)
+    return contract.falling_hit(surface, r, v, as_vector(gravity))
 
 
-hit.register(Nothing, lambda gravity, surface, r, v: contract.first_hit(surface, r, v))
-hit.register(Gravity, lambda gravity, surface, r, v: contract.falling_hit(surface, r, v, as_vector(gravity)))
-
-
-@by_type
 def first_hit(chain, gravity, r, v):
     """The first `Hit` of a free flight."""
-    raise NotImplementedError
+    first = NEVER
+    for link in reversed(each(chain)):
+        if isinstance(link, Field):
+            first = soonest(link.first.first_hit(gravity, r, v), first, count(link.first))
+        else:
+            time, found = hit(gravity, link.first, r, v)
+            first = sooner(time, found, first)
+    return first
 
 
-@first_hit.register(Chain)
-def _(chain, gravity, r, v):
-    time, found = hit(gravity, chain.first, r, v)
-    return sooner(time, found, first_hit(chain.rest, gravity, r, v))
-
-
-@first_hit.register(Field)
-def _(chain, gravity, r, v):
-    return soonest(field_hit(chain.first, gravity, r, v), first_hit(chain.rest, gravity, r, v), count(chain.first))
-
-
-first_hit.register(Nothing, lambda chain, gravity, r, v: NEVER)
-
-
-@by_type
-def field_hit(members, gravity, r, v):
-    """The first `Hit` of a free flight with the bodies of a field, or how far it is surely free."""
-    raise NotImplementedError
-
-
-@inlined
 def soonest(hit, later, before):
     """The sooner one of two hits, the second with a wall that has so many more walls before it."""
     first = hit.time <= later.time
@@ -80,7 +62,6 @@ def soonest(hit, later, before):
     return Hit(select(first, hit.time, later.time), select(first, hit.wall, behind))
 
 
-@inlined
 def sooner(time, found, later):
     """The sooner one of the hit of the first wall and that of the rest."""
     sooner = later.time < time
@@ -104,26 +85,16 @@ def in_steps(surface):
     return
 
 
-in_steps.register(Chain, lambda surface: _one_of(in_steps(surface.first), surface.rest))
+@in_steps.register(Chain)
+def _(surface):
+    steps = in_steps(surface.first)
+    return in_steps(surface.rest) if steps is None else steps
 
 
-@by_type
-def _one_of(steps, rest):
-    return steps
-
-
-_one_of.register(Nothing, lambda steps, rest: in_steps(rest))
-
-
-@by_type
 def begin(chain, gravity, course, row, lane, r, v):
     """The start of a flight for every wall into course[row:, lane]."""
-
-
-@begin.register(Chain)
-def _(chain, gravity, course, row, lane, r, v):
-    begin_wall(chain.first, gravity, course, row, lane, r, v)
-    begin(chain.rest, gravity, course, row + COURSE, lane, r, v)
+    for k, link in enumerate(each(chain)):
+        begin_wall(link.first, gravity, course, row + k * COURSE, lane, r, v)
 
 
 @by_type
@@ -132,52 +103,29 @@ def begin_wall(surface, gravity, course, row, lane, r, v):
     begin_whole(gravity, surface, course, row, lane, r, v)
 
 
-@by_type
 def begin_whole(gravity, surface, course, row, lane, r, v):
     """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
-    time, found = hit(gravity, surface, r, v)
-    course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
-
-
-@begin_whole.register(Gravity)
-def _(gravity, surface, course, row, lane, r, v):
-    pull = as_vector(gravity)
-    if contract.is_quartic(surface):
-        level = contract.course(surface, r, v, pull)
+    if gravity is not None and contract.is_quartic(surface):
+        level = contract.course(surface, r, v, as_vector(gravity))
         course[row, lane], course[row + 1, lane], course[row + 2, lane] = level.c, level.b, level.a2
         course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane] = level.a3, level.a4, level.window
         course[row + TIME, lane], course[row + LAST, lane] = leave(level)
         course[row + _CLOSE, lane] = close(level.window)
     else:
-        time, found = contract.falling_hit(surface, r, v, pull)
+        time, found = hit(gravity, surface, r, v)
         course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
 
 
-@by_type
 def step(chain, gravity, course, row, lane, r, v):
     """One safe step of every wall that needs steps, of the flight that starts at r."""
-
-
-@step.register(Chain)
-def _(chain, gravity, course, row, lane, r, v):
-    step_wall(chain.first, gravity, course, row, lane, r, v)
-    step(chain.rest, gravity, course, row + COURSE, lane, r, v)
+    for k, link in enumerate(each(chain)):
+        step_wall(link.first, gravity, course, row + k * COURSE, lane, r, v)
 
 
 @by_type
 def step_wall(surface, gravity, course, row, lane, r, v):
-    """The same of one wall."""
-    _step_whole(gravity, surface, course, row, lane)
-
-
-@by_type
-def _step_whole(gravity, surface, course, row, lane):
-    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
-
-
-@_step_whole.register(Gravity)
-def _(gravity, surface, course, row, lane):
-    if contract.is_quartic(surface):
+    """The same of one wall: of one whose level along the flight is known as a whole, or whose hit is."""
+    if gravity is not None and contract.is_quartic(surface):
         level = Quartic(
             course[row, lane], course[row + 1, lane], course[row + 2, lane],
             course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane],
@@ -188,112 +136,57 @@ def _(gravity, surface, course, row, lane):
         )  # fmt: skip
 
 
-@by_type
 def end(chain, course, row, lane):
     """`first_hit` from the course."""
-    raise NotImplementedError
-
-
-@end.register(Chain)
-def _(chain, course, row, lane):
-    found = arrived(course[row + LAST, lane])
-    return sooner(course[row + TIME, lane], found, end(chain.rest, course, row + COURSE, lane))
-
-
-end.register(Nothing, lambda chain, course, row, lane: NEVER)
+    first = NEVER
+    for k, _link in reversed(tuple(enumerate(each(chain)))):
+        at = row + k * COURSE
+        first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), first)
+    return first
 
 
 # --- Of one wall, and of all but one ---------------------------------------------------------------------
 
 
-@by_type
 def hit_of(chain, gravity, wall, r, v):
     """`hit` of the wall with this number."""
-    raise NotImplementedError
-
-
-@hit_of.register(Chain)
-def _(chain, gravity, wall, r, v):
-    time, found = hit(gravity, chain.first, r, v)
-    other, found_other = hit_of(chain.rest, gravity, wall - 1.0, r, v)
-    here = wall == 0.0
+    if chain is None:
+        return math.inf, True
+    if isinstance(chain, Field):
+        many = count(chain.first)
+        surface, here, rest = member(chain.first, wall), wall < many, wall - many
+    else:
+        surface, here, rest = chain.first, wall == 0.0, wall - 1.0
+    time, found = hit(gravity, surface, r, v)
+    other, found_other = hit_of(chain.rest, gravity, rest, r, v)
     return select(here, time, other), (here & found) | ((not here) & found_other)
 
 
-@hit_of.register(Field)
-def _(chain, gravity, wall, r, v):
-    time, found = hit(gravity, member(chain.first, wall), r, v)
-    other, found_other = hit_of(chain.rest, gravity, wall - count(chain.first), r, v)
-    here = wall < count(chain.first)
-    return select(here, time, other), (here & found) | ((not here) & found_other)
-
-
-hit_of.register(Nothing, lambda chain, gravity, wall, r, v: (math.inf, True))
-
-
-@by_type
 def other_hit(chain, wall, r, v):
     """The first hit of a straight flight with any wall but this one, which is one of the chain's."""
-    raise NotImplementedError
-
-
-other_hit.register(Chain, lambda chain, wall, r, v: _other_hit(chain.rest, chain, wall, r, v))
-
-
-@by_type
-def _other_hit(rest, chain, wall, r, v):
-    raise NotImplementedError
-
-
-# The only wall has no other: without this the compiler would compute its hit and throw it away at run time.
-_other_hit.register(Nothing, lambda rest, chain, wall, r, v: NEVER)
-_other_hit.register(Chain, lambda rest, chain, wall, r, v: _hit_but(chain, wall, r, v))
-
-
-@by_type
-def _hit_but(chain, wall, r, v):
-    raise NotImplementedError
-
-
-@_hit_but.register(Chain)
-def _(chain, wall, r, v):
-    time, _found = contract.first_hit(chain.first, r, v)
-    other = _hit_but(chain.rest, wall - 1.0, r, v)
-    use = (other.time < time) | (wall == 0.0)
-    return Hit(select(use, other.time, time), select(use, other.wall + 1.0, 0.0))
-
-
-_hit_but.register(Nothing, lambda chain, wall, r, v: NEVER)
+    first, links = NEVER, each(chain)
+    # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
+    for k, link in reversed(tuple(enumerate(links if len(links) > 1 else ()))):
+        time, _found = contract.first_hit(link.first, r, v)
+        use = (first.time < time) | (wall == k)
+        first = Hit(select(use, first.time, time), select(use, first.wall + 1.0, 0.0))
+    return first
 
 
 # --- Free time, with and without gravity -----------------------------------------------------------------
 
 
-@by_type
 def free_time(gravity, chain, r, v):
     """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
-    raise NotImplementedError
+    if gravity is None:
+        return select(outside(chain, -1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
+    return safe_time(chain, r, v, as_vector(gravity))
 
 
-@free_time.register(Nothing)
-def _(gravity, chain, r, v):
-    return select(outside(chain, -1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
-
-
-free_time.register(Gravity, lambda gravity, chain, r, v: safe_time(chain, r, v, as_vector(gravity)))
-
-
-@by_type
 def safe_time(chain, r, v, pull):
     """The smallest safe time of all walls."""
-    raise NotImplementedError
-
-
-@safe_time.register(Chain)
-def _(chain, r, v, pull):
-    time = contract.safe_time(chain.first, r, v, pull)
-    other = safe_time(chain.rest, r, v, pull)
-    return select(other < time, other, time)
-
-
-safe_time.register(Nothing, lambda chain, r, v, pull: math.inf)
+    shortest = math.inf
+    for link in reversed(each(chain)):
+        time = contract.safe_time(link.first, r, v, pull)
+        shortest = select(shortest < time, shortest, time)
+    return shortest

@@ -1,16 +1,13 @@
 """All walls of a scene at once: the functions of one surface, folded over the chain of its walls.
 
-A fold ends at None, and its neutral element (no hit, no gap) is a constant that the compiler removes. Fields come
-before all other walls: whether a scene has one is the type of its chain.
+Fields come before all other walls: whether a scene has one is the type of its chain.
 """
 
-import inspect
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, select
+from ..kernel.jit import select
 from ..kernel.vector import ZERO
 from . import contract
 from .surface import Surface
@@ -47,87 +44,44 @@ def each(chain):
     return () if chain is None else (chain, *each(chain.rest))
 
 
-@by_type
-def is_end(chain):
-    """Whether there are no walls: a constant for the compiler."""
-    return False
-
-
-is_end.register(Nothing, lambda chain: True)
-
-
-@by_type
-def length(chain):
-    """How many rows there are of what walls give, one for a field: a constant for the compiler if none is `Listed`."""
-    raise NotImplementedError
-
-
-length.register(Chain, lambda chain: 1 + length(chain.rest))
-length.register(Field, lambda chain: 1 + length(chain.rest))
-length.register(Listed, lambda chain: int(count(chain.first)) + length(chain.rest))
-length.register(Nothing, lambda chain: 0)
-
-
-@by_type
 def count(members):
     """How many walls a field has."""
-    raise NotImplementedError
+    return members.count()
 
 
-@by_type
 def member(members, wall):
     """One of them, as a surface."""
-    raise NotImplementedError
+    return members.wall(wall)
 
 
-@by_type
-def outside_of_any(members, wall, r):
-    """Whether a point is in any body of a field but the one with this number."""
-    raise NotImplementedError
+def length(chain):
+    """How many rows there are of what walls give, one for a field: a constant for the compiler if none is `Listed`."""
+    rows = (int(count(link.first)) if isinstance(link, Listed) else 1 for link in each(_walls(chain)))
+    return sum(rows)
 
 
-@by_type
-def others(chain):
-    """The walls of a chain that are in no field: they come after all fields."""
-    return chain
-
-
-others.register(Field, lambda chain: others(chain.rest))
-
-
-@by_type
-def count_in_fields(chain):
-    """How many walls its fields have."""
-    return 0.0
-
-
-count_in_fields.register(Field, lambda chain: count(chain.first) + count_in_fields(chain.rest))
-
-
-@by_type
 def row(chain, wall):
     """The row in which it is booked what this wall gives: a field has one."""
-    return int(wall)
+    chain = _walls(chain)
+    if not isinstance(chain, Field) or isinstance(chain, Listed):
+        return int(wall)
+    many = count(chain.first)
+    return select(wall < many, 0, 1 + row(chain.rest, wall - many))
 
 
-@row.register(Field)
-def _(chain, wall):
-    return select(wall < count(chain.first), 0, 1 + row(chain.rest, wall - count(chain.first)))
+def _walls(chain):
+    """The chain of walls some of which move, or itself."""
+    return getattr(chain, "walls", chain)
 
 
-row.register(Listed, lambda chain, wall: int(wall))
+def others(chain):
+    """The walls of a chain that are in no field: they come after all fields."""
+    return others(chain.rest) if isinstance(chain, Field) else chain
 
 
-@by_type
-def shortest_pace(chain):
-    """The shortest pace of all walls."""
-    return math.inf
-
-
-@shortest_pace.register(Chain)
-@shortest_pace.register(Field)
-def _(chain):
-    return min(contract.pace(chain.first), shortest_pace(chain.rest))
+def count_in_fields(chain):
+    """How many walls its fields have."""
+    return sum((count(link.first) for link in each(chain) if isinstance(link, Field)), 0.0)
 
 
 # --- A function of one wall ------------------------------------------------------------------------------
@@ -137,114 +91,19 @@ def of_wall(function: Callable[..., Any], neutral: Any) -> Any:
     """The fold (chain, wall, ...) that is function(surface, ...) of the wall with this number.
 
     For any other number it is the function of the last wall: a caller that has no wall ignores the result. `neutral` is
-    any value of the type of the result.
+    that of no walls.
     """
-    count = len(inspect.signature(function).parameters) - 1
-    return {0: _of_wall_0, 1: _of_wall_1, 2: _of_wall_2, 3: _of_wall_3, 4: _of_wall_4}[count](function, neutral)
 
-
-# One factory for each number of arguments: with one for `*rest` an impact with chords takes 10 % longer to compile.
-def _of_wall_0(function: Any, neutral: Any) -> Any:
-    @by_type
-    def fold(chain, wall):
-        raise NotImplementedError
-
-    @fold.register(Chain)
-    def _(chain, wall):
-        here = (wall == 0.0) | (length(chain) == 1)
-        return select(here, function(chain.first), fold(chain.rest, wall - 1.0))
-
-    @fold.register(Field)
-    def _(chain, wall):
-        here = (wall < count(chain.first)) | (is_end(chain.rest))
-        other = fold(chain.rest, wall - count(chain.first))
-        return select(here, function(member(chain.first, wall)), other)
-
-    fold.register(Nothing, lambda chain, wall: neutral)
-
-    return fold
-
-
-def _of_wall_1(function: Any, neutral: Any) -> Any:
-    @by_type
-    def fold(chain, wall, a):
-        raise NotImplementedError
-
-    @fold.register(Chain)
-    def _(chain, wall, a):
-        here = (wall == 0.0) | (length(chain) == 1)
-        return select(here, function(chain.first, a), fold(chain.rest, wall - 1.0, a))
-
-    @fold.register(Field)
-    def _(chain, wall, a):
-        here = (wall < count(chain.first)) | (is_end(chain.rest))
-        other = fold(chain.rest, wall - count(chain.first), a)
-        return select(here, function(member(chain.first, wall), a), other)
-
-    fold.register(Nothing, lambda chain, wall, a: neutral)
-
-    return fold
-
-
-def _of_wall_2(function: Any, neutral: Any) -> Any:
-    @by_type
-    def fold(chain, wall, a, b):
-        raise NotImplementedError
-
-    @fold.register(Chain)
-    def _(chain, wall, a, b):
-        here = (wall == 0.0) | (length(chain) == 1)
-        return select(here, function(chain.first, a, b), fold(chain.rest, wall - 1.0, a, b))
-
-    @fold.register(Field)
-    def _(chain, wall, a, b):
-        here = (wall < count(chain.first)) | (is_end(chain.rest))
-        other = fold(chain.rest, wall - count(chain.first), a, b)
-        return select(here, function(member(chain.first, wall), a, b), other)
-
-    fold.register(Nothing, lambda chain, wall, a, b: neutral)
-
-    return fold
-
-
-def _of_wall_3(function: Any, neutral: Any) -> Any:
-    @by_type
-    def fold(chain, wall, a, b, c):
-        raise NotImplementedError
-
-    @fold.register(Chain)
-    def _(chain, wall, a, b, c):
-        here = (wall == 0.0) | (length(chain) == 1)
-        return select(here, function(chain.first, a, b, c), fold(chain.rest, wall - 1.0, a, b, c))
-
-    @fold.register(Field)
-    def _(chain, wall, a, b, c):
-        here = (wall < count(chain.first)) | (is_end(chain.rest))
-        other = fold(chain.rest, wall - count(chain.first), a, b, c)
-        return select(here, function(member(chain.first, wall), a, b, c), other)
-
-    fold.register(Nothing, lambda chain, wall, a, b, c: neutral)
-
-    return fold
-
-
-def _of_wall_4(function: Any, neutral: Any) -> Any:
-    @by_type
-    def fold(chain, wall, a, b, c, d):
-        raise NotImplementedError
-
-    @fold.register(Chain)
-    def _(chain, wall, a, b, c, d):
-        here = (wall == 0.0) | (length(chain) == 1)
-        return select(here, function(chain.first, a, b, c, d), fold(chain.rest, wall - 1.0, a, b, c, d))
-
-    @fold.register(Field)
-    def _(chain, wall, a, b, c, d):
-        here = (wall < count(chain.first)) | (is_end(chain.rest))
-        other = fold(chain.rest, wall - count(chain.first), a, b, c, d)
-        return select(here, function(member(chain.first, wall), a, b, c, d), other)
-
-    fold.register(Nothing, lambda chain, wall, a, b, c, d: neutral)
+    def fold(chain, wall, *given):
+        if chain is None:
+            return neutral
+        if isinstance(chain, Field):
+            many = count(chain.first)
+            surface, here, other = member(chain.first, wall), wall < many, wall - many
+        else:
+            surface, here, other = chain.first, wall == 0.0, wall - 1.0
+        value = function(surface, *given)
+        return value if chain.rest is None else select(here, value, fold(chain.rest, other, *given))
 
     return fold
 
@@ -270,51 +129,41 @@ chord_normal = of_wall(contract.chord_normal, ZERO)
 # --- Of all walls ----------------------------------------------------------------------------------------
 
 
-@by_type
+def shortest_pace(chain):
+    """The shortest pace of all walls."""
+    shortest = math.inf
+    for link in reversed(each(chain)):
+        shortest = min(contract.pace(link.first), shortest)
+    return shortest
+
+
 def chord_sweeps(chain):
     """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
-    raise NotImplementedError
+    return max((0, *(contract.chord_sweeps(link.first) for link in each(chain))))
 
 
-chord_sweeps.register(Chain, lambda chain: max(contract.chord_sweeps(chain.first), chord_sweeps(chain.rest)))
-chord_sweeps.register(Nothing, lambda chain: 0)
-
-
-@by_type
 def outside(chain, wall, r):
     """Whether a point is outside any wall but this one (-1: any at all)."""
-    raise NotImplementedError
+    found = False
+    for link in each(chain):
+        if isinstance(link, Field):
+            found = link.first.is_in_another(wall, r) | found
+            wall = wall - count(link.first)
+        else:
+            here = contract.level_of(link.first, contract.inner(link.first, r)) > 0.0
+            found = (here & (wall != 0.0)) | found
+            wall = wall - 1.0
+    return found
 
 
-@outside.register(Chain)
-def _(chain, wall, r):
-    here = contract.level_of(chain.first, contract.inner(chain.first, r)) > 0.0
-    return (here & (wall != 0.0)) | outside(chain.rest, wall - 1.0, r)
-
-
-@outside.register(Field)
-def _(chain, wall, r):
-    return outside_of_any(chain.first, wall, r) | outside(chain.rest, wall - count(chain.first), r)
-
-
-outside.register(Nothing, lambda chain, wall, r: False)
-
-
-@by_type
 def pushes(chain, wall, kappa):
     """Whether this wall can push with kappa: in its direction and short of the pole."""
-    raise NotImplementedError
-
-
-@pushes.register(Chain)
-def _(chain, wall, kappa):
-    farthest = contract.farthest_push(chain.first)
-    here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
-    other = pushes(chain.rest, wall - 1.0, kappa)
-    return ((wall == 0.0) & here) | ((wall != 0.0) & other)
-
-
-pushes.register(Nothing, lambda chain, wall, kappa: False)
+    found = False
+    for k, link in enumerate(each(chain)):
+        farthest = contract.farthest_push(link.first)
+        here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
+        found = ((wall == k) & here) | found
+    return found
 
 
 class Touched(NamedTuple):
@@ -324,21 +173,13 @@ class Touched(NamedTuple):
     number: float
 
 
-@by_type
 def touched(chain, r, p):
     """The walls that a step with free displacement p is in contact with."""
-    raise NotImplementedError
-
-
-@touched.register(Chain)
-def _(chain, r, p):
-    surface = chain.first
-    before = contract.level_of(surface, contract.inner(surface, r))
-    after = contract.level_of(surface, contract.end_inner(surface, r + p))
-    contact = (before > 0.0) | (after > 0.0)
-    rest = touched(chain.rest, r, p)
-    later = select(rest.number > 0.0, rest.wall + 1.0, -1.0)
-    return Touched(select(contact, 0.0, later), rest.number + select(contact, 1.0, 0.0))
-
-
-touched.register(Nothing, lambda chain, r, p: Touched(-1.0, 0.0))
+    found = Touched(-1.0, 0.0)
+    for link in reversed(each(chain)):
+        before = contract.level_of(link.first, contract.inner(link.first, r))
+        after = contract.level_of(link.first, contract.end_inner(link.first, r + p))
+        contact = (before > 0.0) | (after > 0.0)
+        later = select(found.number > 0.0, found.wall + 1.0, -1.0)
+        found = Touched(select(contact, 0.0, later), found.number + select(contact, 1.0, 0.0))
+    return found

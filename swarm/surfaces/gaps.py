@@ -5,10 +5,10 @@ axis that passes all walls of a cell passes those of every cell.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..kernel.gravity import Gravity, Nothing
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.jit import select
+from ..kernel.record import Record
 from .axes import CELLS, Free, along_x, along_y, along_z, least, length_of, most, time_far, time_out
 from .course import rise_time
 from .flights import Hit
@@ -17,21 +17,21 @@ from .flights import Hit
 _AT_FACE = 5e-4
 
 
-class Gap(NamedTuple):
+class Gap(Record):
     """The coordinates along an axis between which no wall is that has images; it may go on beyond the upper face."""
 
     low: float
     high: float
 
 
-class Beside(NamedTuple):
+class Beside(Record):
     """The coordinates below and above which no wall is that has images, along an axis that does not repeat."""
 
     low: float
     high: float
 
 
-class Gaps(NamedTuple):
+class Gaps(Record):
     """The gap along each axis, None where there is none; and whether there are walls without images, None for no."""
 
     x: Any
@@ -43,41 +43,29 @@ class Gaps(NamedTuple):
 # --- Along one axis --------------------------------------------------------------------------------------
 
 
-@by_type
 def _time_in(gap, length, x, v, pull):
-    """How long a coordinate stays in a gap; 0 where it is not in it."""
-    return 0.0
-
-
-@_time_in.register(Gap)
-def _(gap, length, x, v, pull):
-    x = x + select(x < gap.low, length_of(length), 0.0)
-    return select((x > gap.low) & (x < gap.high), time_out(pull, (gap.low, gap.high), x, v), 0.0)
-
-
-@_time_in.register(Beside)
-def _(gap, length, x, v, pull):
+    """How long a coordinate stays in a gap; 0 where it is not in it, or there is none."""
+    if gap is None:
+        return 0.0
+    if isinstance(gap, Gap):
+        x = x + select(x < gap.low, length_of(length), 0.0)
+        return select((x > gap.low) & (x < gap.high), time_out(pull, (gap.low, gap.high), x, v), 0.0)
     below, above = x < gap.low, x > gap.high
     # Below is what is above of -x.
     far, towards = select(below, x - gap.low, gap.high - x), select(below, v, -v)
     return select(below | above, _time_to_reach(pull, far, towards, below), 0.0)
 
 
-@by_type
 def _time_to_reach(pull, far, v, below):
-    """When a coordinate so far below 0 reaches it, without gravity."""
-    return select(v > 0.0, -far * (1.0 / v), math.inf)
-
-
-@_time_to_reach.register(float)
-def _(pull, far, v, below):
+    """When a coordinate so far below 0 reaches it."""
+    if pull is None:
+        return select(v > 0.0, -far * (1.0 / v), math.inf)
     return rise_time(far, 0.5 * v, select(below, 0.5 * pull, -0.5 * pull))
 
 
 # --- Of a flight -----------------------------------------------------------------------------------------
 
 
-@inlined
 def _time_in_gaps(gaps, period, gravity, motion):
     """How long a flight stays in a gap."""
     r, v = motion
@@ -87,62 +75,46 @@ def _time_in_gaps(gaps, period, gravity, motion):
     return most(x, y, z)
 
 
-@by_type
 def longer(gaps, period, gravity, motion, ends):
     """The first of `ends`, or when the gap ends in which it flies, less the second."""
-    time, _late = ends
-    return time
-
-
-@longer.register(Gaps)
-def _(gaps, period, gravity, motion, ends):
     time, late = ends
+    if gaps is None:
+        return time
     longest = _time_in_gaps(gaps, period, gravity, motion) - late
     return select(longest > time, longest, time)
 
 
-@by_type
 def over_faces(gaps, period, gravity, motion, ends):
     """When a flight leaves the cell, or the gap in which it goes on over faces; and its hit.
 
     `ends` are the first of these, the hit, and by how much the flight may end later.
     """
-    first, hit, _late = ends
-    return first, hit
-
-
-@over_faces.register(Gaps)
-def _(gaps, period, gravity, motion, ends):
     leaves, hit, late = ends
+    if gaps is None:
+        return leaves, hit
     longest = _time_in_gaps(gaps, period, gravity, motion) - late
-    longest = select(_is_line(gravity, period, motion, leaves, hit.time), math.inf, longest)
+    if gravity is None:
+        longest = select(_is_line(period, motion, leaves, hit.time), math.inf, longest)
     far = _far(gravity, period, motion, leaves)
     longest = select(longest < far, longest, far)
     goes_on = longest > leaves
-    return select(goes_on, longest, leaves), _hit_in(gaps.walls, goes_on, hit)
+    if gaps.walls is None:
+        # Of a fall it may be known for a part of its way only that it is free.
+        hit = Hit(select(goes_on, math.inf, hit.time), select(goes_on, -1.0, hit.wall))
+    return select(goes_on, longest, leaves), hit
 
 
-@by_type
 def _far(gravity, period, motion, leaves):
     """When a flight is surely no more cells away than it may go; `leaves` is when it leaves this one."""
-    return CELLS * leaves
-
-
-@_far.register(Gravity)
-def _(gravity, period, motion, leaves):
+    if gravity is None:
+        return CELLS * leaves
     r, v = motion
     x, y = time_far(period.x, r.x, v.x, gravity.x), time_far(period.y, r.y, v.y, gravity.y)
     return least(x, y, time_far(period.z, r.z, v.z, gravity.z))
 
 
-@by_type
-def _is_line(gravity, period, motion, leaves, free):
-    """Whether a flight that leaves then, and is free for so long, goes through each cell as through this one."""
-    return False
-
-
-@_is_line.register(Nothing)
-def _(gravity, period, motion, leaves, free):
+def _is_line(period, motion, leaves, free):
+    """Whether a straight flight that leaves then, and is free for so long, goes through each cell as through this."""
     _r, v = motion
     x, y, z = _is_kept(period.x, v.x), _is_kept(period.y, v.y), _is_kept(period.z, v.z)
     # That of the only component; axis by axis this would cost 4 ns a flight.
@@ -153,40 +125,16 @@ def _(gravity, period, motion, leaves, free):
     return ((x & y) | (x & z) | (y & z)) & begins & (free > (1.0 + 2.0 * _AT_FACE) * leaves)
 
 
-@by_type
 def _is_kept(length, v):
     """Whether the walls along this axis are the same for it in every cell."""
-    return v == 0.0
+    return True if isinstance(length, Free) else v == 0.0
 
 
-_is_kept.register(Free, lambda length, v: True)
-
-
-@by_type
 def _across(length, v):
     """The component of a velocity along which walls change."""
-    return v
+    return 0.0 if isinstance(length, Free) else v
 
 
-_across.register(Free, lambda length, v: 0.0)
-
-
-@by_type
 def _passed(length):
     """How far it is from a face to the other; there is none where nothing repeats."""
-    return length_of(length)
-
-
-_passed.register(Nothing, lambda length: math.inf)
-
-
-@by_type
-def _hit_in(walls, goes_on, hit):
-    """The hit of a flight that goes on over faces, or not."""
-    return hit
-
-
-@_hit_in.register(Nothing)
-def _(walls, goes_on, hit):
-    # Of a fall it may be known for a part of its way only that it is free.
-    return Hit(select(goes_on, math.inf, hit.time), select(goes_on, -1.0, hit.wall))
+    return math.inf if length is None else length_of(length)

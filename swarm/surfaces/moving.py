@@ -8,18 +8,23 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..kernel.jit import by_type
+from ..kernel.record import Record
 from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of, pose
-from .fold import Chain, Field, count, length, member, row
+from .fold import Chain, Field
 from .posed import Drifting, Posed
 from .surface import Surface
 
 
-class Moving(NamedTuple):
-    """A wall and its motion."""
+class Moving(Record):
+    """A wall, or a field of them, and its motion."""
 
     body: Any
     drive: Drive
+
+    def count(self):
+        """How many walls a field has."""
+        return self.body.count()
 
 
 class Translated(Moving):
@@ -45,9 +50,6 @@ class Marched(Carried):
 class Strided(Marched):
     """The same where all of these steps are taken in lanes: see strides.py."""
 
-
-length.register(Carried, lambda chain: length(chain.walls))
-row.register(Carried, lambda chain, wall: row(chain.walls, wall))
 
 # --- From a description ----------------------------------------------------------------------------------
 
@@ -148,9 +150,3 @@ def _with(last, body):
 
 _with.register(Posed, lambda last, body: Posed(body, last.pose, last.end, last.drive, last.left, last.after))
 _with.register(Drifting, lambda last, body: Drifting(body, last.pose, last.end, last.drive, last.left, last.after))
-
-# --- Of a field that moves -------------------------------------------------------------------------------
-
-count.register(Moving, lambda members: count(members.body))
-count.register(Posed, lambda members: count(members.body))
-member.register(Posed, lambda members, wall: _with(members, member(members.body, wall)))

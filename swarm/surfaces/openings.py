@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, select
+from ..kernel.jit import select
 from . import contract, required
 from .fields.many import Many
-from .fold import Chain, Field, chain_of
+from .fold import Chain, Field, chain_of, each
 from .images import Lengths, images_of
 from .kinds import by_kind
-from .near import deepest_in_cell
 from .room import has_room
 from .surface import SIDES, Surface
 
@@ -158,43 +156,29 @@ def are_open(volumes: Sequence[Surface], points: NDArray[np.float64]) -> NDArray
 # --- In kernels ------------------------------------------------------------------------------------------
 
 
-@by_type
 def outside(volume, r):
     """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
 
     What is neither a `Chain` of walls nor a `Field` is the inside of one body of a field, whose admissible side is
     outside of it.
     """
-    return -contract.distance(volume, r)
+    if isinstance(volume, Field):
+        return -volume.first.deepest_in_cell(r)
+    if volume is not None and not isinstance(volume, Chain):
+        return -contract.distance(volume, r)
+    farthest = -math.inf
+    for link in reversed(each(volume)):
+        here = contract.distance(link.first, r)
+        farthest = select(here <= farthest, farthest, here)
+    return farthest
 
 
-@outside.register(Chain)
-def _(volume, r):
-    here, other = contract.distance(volume.first, r), outside(volume.rest, r)
-    return select(here <= other, other, here)
-
-
-outside.register(Nothing, lambda volume, r: -math.inf)
-outside.register(Field, lambda volume, r: -deepest_in_cell(volume.first, r))
-
-
-@by_type
 def is_open(openings, wall, r, near):
     """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
-    return False
-
-
-@is_open.register(Openings)
-def _(openings, wall, r, near):
-    here = (wall >= openings.first) & (wall < openings.last) & _is_in_any(openings.volumes, r, near)
+    if openings is None:
+        return False
+    found = False
+    for volume in reversed(each(openings.volumes)):
+        found = (outside(volume.first, r) <= near) | found
+    here = (wall >= openings.first) & (wall < openings.last) & found
     return here | is_open(openings.rest, wall, r, near)
-
-
-@by_type
-def _is_in_any(volumes, r, near):
-    return False
-
-
-@_is_in_any.register(Chain)
-def _(volumes, r, near):
-    return (outside(volumes.first, r) <= near) | _is_in_any(volumes.rest, r, near)

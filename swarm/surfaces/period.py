@@ -7,9 +7,10 @@ any number of cells, which are counted at its end.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..kernel.jit import by_type, inlined, outlined, select
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
 from .axes import (
     along_x,
@@ -35,7 +36,7 @@ _EPSILON = 2.220446049250313e-16
 _HALVINGS = 60
 
 
-class Period(NamedTuple):
+class Period(Record):
     """The cell: its length along each axis [m], None where it does not repeat.
 
     `fall` is the potential energy per mass of one image along each axis, None where gravity pulls along none of them;
@@ -49,37 +50,28 @@ class Period(NamedTuple):
     gaps: Any = None
 
 
-class Return(NamedTuple):
+class Return(Record):
     """A position in the cell, and by how many images along each axis it has come back."""
 
     r: Vec
     images: Vec
 
 
-@by_type
 def into(period, r):
     """The `Return` of a position into the cell."""
-    return Return(r, ZERO)
-
-
-@into.register(Period)
-def _(period, r):
+    if period is None:
+        return Return(r, ZERO)
     n = Vec(image_of(period.x, r.x), image_of(period.y, r.y), image_of(period.z, r.z))
     return Return(Vec(inside(period.x, r.x, n.x), inside(period.y, r.y, n.y), inside(period.z, r.z, n.z)), n)
 
 
-@by_type
 def has_left(period, r):
     """Whether a position is outside the cell."""
-    return False
-
-
-@has_left.register(Period)
-def _(period, r):
+    if period is None:
+        return False
     return is_out(period.x, r.x) | is_out(period.y, r.y) | is_out(period.z, r.z)
 
 
-@by_type
 def keeps_walls(period, r):
     """Whether the walls at a position outside the cell are those of its place in the cell, not images of others."""
     x = is_free(period.x) | (not is_out(period.x, r.x))
@@ -89,25 +81,17 @@ def keeps_walls(period, r):
     return (is_free(period.x) | is_free(period.y) | is_free(period.z)) & x & y & z
 
 
-@by_type
 def is_beyond(period, r):
     """Whether a position is farther outside than walls are known."""
-    return False
-
-
-@is_beyond.register(Period)
-def _(period, r):
+    if period is None:
+        return False
     return is_beyond_face(period.x, r.x) | is_beyond_face(period.y, r.y) | is_beyond_face(period.z, r.z)
 
 
-@by_type
 def cut(period, gravity, motion, left, hit):
     """The `Hit` of a flight (r, v), or that it leaves the cell before; `left` is the time until the frame ends."""
-    return hit
-
-
-@cut.register(Period)
-def _(period, gravity, motion, left, hit):
+    if period is None:
+        return hit
     r, v = motion
     x, y = time_to_leave(period.x, r.x, v.x, along_x(gravity)), time_to_leave(period.y, r.y, v.y, along_y(gravity))
     z = time_to_leave(period.z, r.z, v.z, along_z(gravity))
@@ -123,24 +107,19 @@ def _(period, gravity, motion, left, hit):
     return Hit(select(leaves, time, hit.time), select(leaves, -1.0, hit.wall))
 
 
-@inlined
 def _fastest(gravity, v, t):
     """The greatest speed along an axis, which is not exceeded within a time t."""
     x, y = fastest(along_x(gravity), v.x, t), fastest(along_y(gravity), v.y, t)
     return most(x, y, fastest(along_z(gravity), v.z, t))
 
 
-@by_type
 def on_time(period, gravity, motion, left, time, room):
     """When a flight (r, v) among bodies ends that is free until `time`, and may go on by `room` along each axis.
 
     Where nothing repeats that is then.
     """
-    return time
-
-
-@on_time.register(Period)
-def _(period, gravity, motion, left, time, room):
+    if period is None:
+        return time
     _r, v = motion
     # As in `cut`: cells of a grid are as many as faces.
     late = _EPSILON * left
@@ -149,15 +128,9 @@ def _(period, gravity, motion, left, time, room):
     return longer(period.gaps, period, gravity, motion, (select(short, exact, time), 2.0 * late))
 
 
-@by_type
 def part_until(period, step):
     """The part of a step after which it leaves; `step` is the polynomial r0 + s (a + s (b + s c)) as (r0, a, b, c)."""
-    return math.inf
-
-
-@part_until.register(Period)
-def _(period, step):
-    return _part_until(period, step)
+    return math.inf if period is None else _part_until(period, step)
 
 
 @outlined
@@ -172,7 +145,6 @@ def _part_until(period, step):
     return high
 
 
-@inlined
 def _has_gone(period, step, s):
     r0, a, b, c = step
     r = r0 + s * (a + s * (b + s * c))

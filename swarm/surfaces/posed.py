@@ -3,16 +3,17 @@
 Of a flight only a wall in uniform translation is asked: it ends there as at a wall at rest.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..kernel.jit import by_type, inlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from . import contract
 from .drive import Drive, Pose, Rows
 
 
-class Posed(NamedTuple):
-    """A wall at one instant, or over one step."""
+class Posed(Record):
+    """A wall at one instant, or over one step, or a field of them."""
 
     body: Any
     pose: Pose
@@ -21,9 +22,38 @@ class Posed(NamedTuple):
     left: float  # of the frame [s]
     after: float  # of the frame, at the end of the step [s]
 
+    # --- Of a field: see `Members` ---
+
+    def count(self):
+        return self.body.count()
+
+    def wall(self, number):
+        return self._replace(body=self.body.wall(number))
+
+    def is_in_another(self, number, r):
+        return self.body.is_in_another(number, own_place(self, r))
+
+    def count_in_cell(self, r):
+        return self.body.count_in_cell(own_place(self, r))
+
+    def list_in_cell(self, k, before, r, into):
+        return self.body.list_in_cell(k, before, own_place(self, r), into)
+
+    def one_in_cell(self, k, r):
+        return self.body.one_in_cell(k, own_place(self, r))
+
+    def deepest_in_cell(self, r):
+        return self.body.deepest_in_cell(own_place(self, r))
+
 
 class Drifting(Posed):
     """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
+
+    def first_hit(self, gravity, r, v):
+        return self.body.first_hit(gravity, r - self.pose.shift, v - self.pose.velocity)
+
+    def until_next_cell(self, r, v):
+        return self.body.until_next_cell(r - self.pose.shift, v - self.pose.velocity)
 
 
 # --- The frame of a wall ---------------------------------------------------------------------------------

@@ -12,10 +12,9 @@ from .drive import drive_of
 from .fields.grid import cell_of
 from .fields.members import Members, member
 from .fields.moved import until_next_in_frame
-from .flights import NEVER, Hit, field_hit, hit, sooner, soonest
+from .flights import NEVER, Hit, hit, sooner, soonest
 from .fold import Chain, Field, count
 from .moving import Following, Marched, Moving, Translated, at
-from .near import until_next_cell
 from .posed import Drifting, Posed
 from .relative import Framed, bounds_of, flight_of, motion_of, seen_at
 from .rising import safe_step
@@ -263,11 +262,11 @@ def _(chain, gravity, r, v):
 
 @by_type
 def _closed_in_field(field, gravity, r, v):
-    return field_hit(field, gravity, r, v)
+    return field.first_hit(gravity, r, v)
 
 
 _closed_in_field.register(Posed, lambda field, gravity, r, v: NEVER)
-_closed_in_field.register(Drifting, lambda field, gravity, r, v: field_hit(field, gravity, r, v))
+_closed_in_field.register(Drifting, lambda field, gravity, r, v: field.first_hit(gravity, r, v))
 
 
 @by_type
@@ -297,12 +296,15 @@ def _field_alone(field, r, v, pull):
     return march(chain, flight_of(r, v, pull, field.left), field.left)
 
 
-@field_hit.register(Posed)
-def _(members, gravity, r, v):
+def _first_hit_of_field(members, gravity, r, v):
     return _field_alone(members, r, v, accelerated(gravity, ZERO, 1.0))
 
 
-@until_next_cell.register(Posed)
-def _(members, r, v):
+def _until_next_cell(members, r, v):
     seen = seen_at(members.drive, flight_of(r, v, ZERO, members.left), 0.0)
     return until_next_in_frame(members.body.grid, members.drive, seen, members.left)
+
+
+# What takes safe steps is known only here.
+Posed.first_hit = _first_hit_of_field  # type: ignore[attr-defined]
+Posed.until_next_cell = _until_next_cell  # type: ignore[attr-defined]

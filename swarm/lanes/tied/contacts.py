@@ -5,7 +5,6 @@ import numpy as np
 from ...kernel.jit import by_type, by_type_outlined, inlined
 from ...kernel.vector import Vec, cross, dot, norm
 from ...surfaces import fold as walls
-from ...surfaces.near import count_in_cell, one_in_cell
 
 # A contact this many times round-off away from its wall is at it.
 NEAR = 64.0
@@ -59,7 +58,7 @@ def _count_in_cells(chain, c):
 
 @_count_in_cells.register(walls.Field)
 def _(chain, c):
-    return int(count_in_cell(chain.first, c)) + _count_in_cells(chain.rest, c)
+    return int(chain.first.count_in_cell(c)) + _count_in_cells(chain.rest, c)
 
 
 @by_type
@@ -81,9 +80,9 @@ def _wall_of_cells(chain, j, before, c):
 
 @_wall_of_cells.register(walls.Field)
 def _(chain, j, before, c):
-    here = int(count_in_cell(chain.first, c))
+    here = int(chain.first.count_in_cell(c))
     if j < here:
-        return before + int(one_in_cell(chain.first, j, c))
+        return before + int(chain.first.one_in_cell(j, c))
     return _wall_of_cells(chain.rest, j - here, before + int(walls.count(chain.first)), c)
 
 

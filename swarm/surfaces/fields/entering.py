@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from ...kernel import cache
-from ...kernel.jit import by_type, index, inlined, kernel
-from ...kernel.vector import Vec, dot, highest, vec
+from ...kernel.jit import index, kernel
+from ...kernel.vector import ZERO, Vec, dot, highest, vec
 from ..shapes.sphere import SphereNumbers
 from .grid import MARGIN, Floats, Grid, cells_of
 from .members import gathered
@@ -63,20 +63,15 @@ def _enter(like, table, bounds, grid, place, entries):
                         place[cell] += 1
 
 
-@inlined
 def _layers(begin, end, width, count):
     """The layers of cells between two places, from the first to the one after the last."""
     first, last = np.floor(begin / width), np.floor(end / width)
     return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1
 
 
-@by_type
 def may_reach(body, low, high):
     """Whether a body may have a point in common with a box; its bounds do."""
-    return True
-
-
-@may_reach.register(SphereNumbers)
-def _(body, low, high):
-    off = highest(highest(low - body.center, body.center - high), Vec(0.0, 0.0, 0.0))
+    if not isinstance(body, SphereNumbers):
+        return True
+    off = highest(highest(low - body.center, body.center - high), ZERO)
     return dot(off, off) <= body.radius2

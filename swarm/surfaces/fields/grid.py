@@ -1,12 +1,10 @@
 """A uniform grid of cells around many bodies, and which of them reach into each."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel.gravity import Gravity, Nothing
-from ...kernel.jit import Array, by_type, inlined, select
+from ...kernel.jit import Array, select
+from ...kernel.record import Record
 from ...kernel.vector import Vec
 from ..course import rise_time
 from ..relative import Bounds
@@ -22,7 +20,7 @@ _ENDLESS = 1e200
 Floats = NDArray[np.float64]
 
 
-class Grid(NamedTuple):
+class Grid(Record):
     """Cells from `low` on, numbered along z first; the one after the last stands for all that is outside."""
 
     low: Vec
@@ -34,7 +32,7 @@ class Grid(NamedTuple):
     entries: Array  # int32, the bodies
 
 
-class Cell(NamedTuple):
+class Cell(Record):
     """The cell of a point: its number, its place along x, y, z, and whether it is one of the grid."""
 
     number: int
@@ -45,7 +43,6 @@ class Cell(NamedTuple):
 # --- Where a flight is -----------------------------------------------------------------------------------
 
 
-@inlined
 def cell_of(grid, r):
     """The `Cell` of a point."""
     n, d = grid.shape, r - grid.low
@@ -56,7 +53,6 @@ def cell_of(grid, r):
     return Cell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
 
 
-@inlined
 def _place(d, inverse, count):
     """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther.
 
@@ -68,7 +64,7 @@ def _place(d, inverse, count):
     return select(place < -0.5 * MARGIN, -1.0, select(place >= count + 0.5 * MARGIN, count, layer))
 
 
-class Block(NamedTuple):
+class Block(Record):
     """Cells from one place on, so many along x, y, z."""
 
     x: int
@@ -79,7 +75,6 @@ class Block(NamedTuple):
     along_z: int
 
 
-@inlined
 def block_of(grid, low, high):
     """The cells of the grid that a box with these corners reaches into."""
     first, last = cell_of(grid, low).place, cell_of(grid, high).place
@@ -92,20 +87,17 @@ def block_of(grid, low, high):
     )  # fmt: skip
 
 
-@inlined
 def size_of(block):
     """How many cells a block has."""
     return max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)
 
 
-@inlined
 def in_block(grid, block, k):
     """The number of cell k of a block."""
     x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
     return int(((block.x + x) * grid.shape.y + block.y + y) * grid.shape.z + block.z + z)
 
 
-@inlined
 def until_next(gravity, grid, cell, r, v):
     """When a flight is beyond the wall of its cell; from outside, until when it surely does not come into the grid."""
     p, n = cell.place, grid.shape
@@ -118,56 +110,38 @@ def until_next(gravity, grid, cell, r, v):
     return select(cell.inside, select(z < leaves, z, leaves), select(in_z > enters, in_z, enters))
 
 
-@inlined
 def _comes(time, place, count):
     """When a flight comes into the layers of cells, 0 where it is in them."""
     return select((place >= 0.0) & (place < count), 0.0, time)
 
 
-@by_type
 def _along(gravity, axis, cells, place, x, v):
     """When a flight leaves its layer of cells, (low, width, margin, how many) of which are given.
 
-    Of a flight beside them, before when it does not come in.
+    Of a flight beside them, before when it does not come in. Where of its acceleration there is only a bound, at the
+    soonest.
     """
-    raise NotImplementedError
-
-
-@_along.register(Nothing)
-def _(gravity, axis, cells, place, x, v):
     low, width, margin, count = cells
-    ahead = v > 0.0
-    edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
-    never = (v == 0.0) | select(ahead, place >= count, place < 0.0)
-    return select(never, np.inf, (edge - x) / v)
-
-
-@_along.register(Gravity)
-def _(gravity, axis, cells, place, x, v):
-    low, width, margin, count = cells
-    b, a = 0.5 * v, 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
+    if gravity is None:
+        ahead = v > 0.0
+        edge = low + (place + select(ahead, 1.0, 0.0)) * width + select(ahead, margin, -margin)
+        never = (v == 0.0) | select(ahead, place >= count, place < 0.0)
+        return select(never, np.inf, (edge - x) / v)
     among, below = (place >= 0.0) & (place < count), place < 0.0
     sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
+    b = 0.5 * v
+    if isinstance(gravity, Bounds):
+        # Whatever its direction
+        ahead = towards = back = 0.5 * gravity.acceleration
+    else:
+        a = 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
+        ahead, towards, back = a, sign * a, -a
     up = rise_time(
         select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)),
         select(among, b, sign * b),
-        select(among, a, sign * a),
+        select(among, ahead, towards),
     )
-    down = rise_time(low + place * width - margin - x, -b, -a)
-    return select(among & (down < up), down, up)
-
-
-@_along.register(Bounds)
-def _(gravity, axis, cells, place, x, v):
-    # At the soonest: the acceleration, along whatever axis, is no more than its bound.
-    low, width, margin, count = cells
-    b, a = 0.5 * v, 0.5 * gravity.acceleration
-    among, below = (place >= 0.0) & (place < count), place < 0.0
-    sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
-    up = rise_time(
-        select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)), select(among, b, sign * b), a
-    )
-    down = rise_time(low + place * width - margin - x, -b, a)
+    down = rise_time(low + place * width - margin - x, -b, back)
     return select(among & (down < up), down, up)
 
 

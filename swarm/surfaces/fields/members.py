@@ -2,59 +2,120 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel.gravity import Nothing
-from ...kernel.jit import Array, by_type, index, inlined, kernel, outlined, select
+from ...kernel.jit import Array, index, inlined, kernel, outlined, select
+from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
-from .. import contract, flights, fold, near
+from .. import contract, flights
 from ..fold import Chain
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
-from ..shapes.ellipsoid import EllipsoidNumbers
 from ..shapes.quadratic import QuadricNumbers
-from ..shapes.slab import AlongX, AlongY, AlongZ, SlabNumbers
+from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
-from ..shapes.sphere import SphereNumbers
+from ..shapes.sphere import SphereNumbers, ball
 from .grid import Grid, cell_of, until_next
 
 # The rows of a rotation that turns nothing.
-_AXES = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
+_UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # Bytes of a line of the cache.
 _LINE = 64
+# What has fields of its own in a table, beside vectors and balls.
+_KINDS = (CapsuleNumbers, QuadricNumbers, SlabNumbers, Rotated, Chain, SolidNumbers)
 
 
-class Members(NamedTuple):
+class Members(Record):
     """The bodies of a field: solids, outside of all of which is admissible."""
 
     like: Any  # the numbers of one of them, which say of what kind they are
     table: Array  # (members, width) the numbers of each
     grid: Grid
 
+    def count(self):
+        """How many they are."""
+        return float(self.table.shape[0])
+
+    def wall(self, number):
+        """One of them, as a surface; of a number that none has the first or the last."""
+        last = self.table.shape[0] - 1.0
+        return member(self, index(int(select(number < 0.0, 0.0, select(number > last, last, number)))))
+
+    def is_in_another(self, number, r):
+        """Whether a point is in any but the one with this number."""
+        return _is_in_another(self, number, r)
+
+    def first_hit(self, gravity, r, v):
+        """The first `Hit` of a free flight, or how far it is surely free."""
+        return _first_hit(self, gravity, r, v)
+
+    # --- Of those in the cell of a point ---
+
+    def count_in_cell(self, r):
+        """How many they are."""
+        first, stop = _entries_at(self.grid, r)
+        return int(stop - first)
+
+    def list_in_cell(self, k, before, r, into):
+        """Their numbers, with so many walls before them, into into[k:], and how many they are."""
+        first, stop = _entries_at(self.grid, r)
+        for i in range(first, stop):
+            into[k + i - first] = before + self.grid.entries[i]
+        return int(stop - first)
+
+    def one_in_cell(self, k, r):
+        """The number of one of them."""
+        first, _stop = _entries_at(self.grid, r)
+        return self.grid.entries[first + k]
+
+    def until_next_cell(self, r, v):
+        """When a straight flight may meet another one."""
+        return until_next(None, self.grid, cell_of(self.grid, r), r, v)
+
+    def deepest_in_cell(self, r):
+        """The largest distance into any of them."""
+        return _deepest(self, r)
+
 
 class Few(Members):
     """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
 
 
-@inlined
+def _entries_at(grid, r):
+    """Where the entries of the cell of a point begin and end."""
+    cell = index(cell_of(grid, r).number)
+    return grid.first[cell], grid.first[cell + 1]
+
+
 def member(members, m):
     """The numbers of one body."""
     return gathered(members.like, members.table, m, 0)
 
 
-@by_type
 def gathered(like, table, m, k):
-    """What is like that, from row m of a table, from column k on."""
-    return table[m, k]
+    """Numbers of one kind with `like`, from row m of a table, from column k on."""
+    if isinstance(like, SphereNumbers):
+        # Four numbers of it are half a line of the cache; the others follow from them.
+        return ball(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
+    if isinstance(like, AXES):
+        return type(like)(1.0)
+    if not isinstance(like, tuple):
+        return None if like is None else table[m, k]
+    parts: tuple[Any, ...] = ()
+    for part in like:
+        parts = (*parts, gathered(part, table, m, k))
+        k += width(part)
+    return type(like)(*parts)
 
 
-@by_type
 def width(like):
     """How many columns it takes: a constant for the compiler."""
-    return 1
+    if isinstance(like, SphereNumbers):
+        return 4
+    return sum(map(width, like)) if isinstance(like, tuple) else 0 if like is None else 1
 
 
 def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
@@ -68,14 +129,13 @@ def can_be_member(wall: Any) -> bool:
         return True
     if isinstance(wall, (SphereNumbers, Vec)):
         return True
-    known = gathered.dispatch(type(wall)) is not gathered.dispatch(object)
-    return known and all(map(can_be_member, wall))
+    return isinstance(wall, (*_KINDS, *AXES)) and all(map(can_be_member, wall))
 
 
 def kind_of(wall: Any) -> Any:
     """What numbers have in common that a field may hold: their types, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
-    if isinstance(wall, Vec | AlongX | AlongY | AlongZ):
+    if isinstance(wall, (Vec, *AXES)):
         return Vec
     return (type(wall), *map(kind_of, wall)) if isinstance(wall, tuple) else type(wall)
 
@@ -94,14 +154,14 @@ def _type_of(wall: Any) -> Any:
 
 def _in_general(wall: Any, turned: bool) -> Any:
     """The same numbers, of the type that a body turned in any way has."""
-    if isinstance(wall, AlongX | AlongY | AlongZ):
-        return Vec(*(float(isinstance(wall, axis)) for axis in (AlongX, AlongY, AlongZ)))
+    if isinstance(wall, AXES):
+        return Vec(*(float(isinstance(wall, axis)) for axis in AXES))
     if isinstance(wall, Rotated):
         return wall._replace(body=_in_general(wall.body, False))
     if isinstance(wall, SlabNumbers | Chain | SolidNumbers):
         parts = [_in_general(part, isinstance(wall, Chain) and _is_round(part)) for part in wall]
         return type(wall)(*parts)
-    return Rotated(wall, *_AXES) if turned else wall
+    return Rotated(wall, *_UNTURNED) if turned else wall
 
 
 def _is_round(part: Any) -> bool:
@@ -127,71 +187,27 @@ def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return copy
 
 
-# --- As walls of a chain ---------------------------------------------------------------------------------
-
-fold.count.register(Members, lambda members: float(members.table.shape[0]))
-
-
-@fold.member.register(Members)
-def _(members, wall):
-    last = members.table.shape[0] - 1.0
-    return member(members, index(int(select(wall < 0.0, 0.0, select(wall > last, last, wall)))))
-
-
-@fold.outside_of_any.register(Members)
-def _(members, wall, r):
-    return _is_in_any(members, wall, r)
+# --- Outlined, of the cell of a point --------------------------------------------------------------------
 
 
 @outlined
-def _is_in_any(members, wall, r):
-    grid = members.grid
-    cell = index(cell_of(grid, r).number)
-    for k in range(grid.first[cell], grid.first[cell + 1]):
-        m = grid.entries[k]
+def _is_in_another(members, number, r):
+    first, stop = _entries_at(members.grid, r)
+    for k in range(first, stop):
+        m = members.grid.entries[k]
         body = member(members, index(m))
-        if contract.level_of(body, contract.inner(body, r)) > 0.0 and float(m) != wall:
+        if contract.level_of(body, contract.inner(body, r)) > 0.0 and float(m) != number:
             return True
     return False
 
 
-@near.count_in_cell.register(Members)
-def _(members, r):
-    cell = index(cell_of(members.grid, r).number)
-    return int(members.grid.first[cell + 1] - members.grid.first[cell])
-
-
-@near.list_in_cell.register(Members)
-def _(members, k, before, r, into):
-    cell = index(cell_of(members.grid, r).number)
-    first, stop = members.grid.first[cell], members.grid.first[cell + 1]
-    for i in range(first, stop):
-        into[k + i - first] = before + members.grid.entries[i]
-    return int(stop - first)
-
-
-@near.one_in_cell.register(Members)
-def _(members, k, r):
-    return members.grid.entries[members.grid.first[index(cell_of(members.grid, r).number)] + k]
-
-
-@near.until_next_cell.register(Members)
-def _(members, r, v):
-    return until_next(None, members.grid, cell_of(members.grid, r), r, v)
-
-
-@near.deepest_in_cell.register(Members)
-def _(members, r):
-    grid, most = members.grid, -math.inf
-    cell = index(cell_of(grid, r).number)
-    for k in range(grid.first[cell], grid.first[cell + 1]):
-        most = max(most, contract.distance(member(members, index(grid.entries[k])), r))
+@outlined
+def _deepest(members, r):
+    most = -math.inf
+    first, stop = _entries_at(members.grid, r)
+    for k in range(first, stop):
+        most = max(most, contract.distance(member(members, index(members.grid.entries[k])), r))
     return most
-
-
-@flights.field_hit.register(Members)
-def _(members, gravity, r, v):
-    return _first_hit(members, gravity, r, v)
 
 
 @outlined
@@ -259,91 +275,3 @@ def _least_in_shell(members, r, center, shell):
 @inlined
 def _around(place, shell, count):
     return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
-
-
-# --- What bodies are made of -----------------------------------------------------------------------------
-
-gathered.register(Nothing, lambda like, table, m, k: None)
-width.register(Nothing, lambda like: 0)
-gathered.register(Vec, lambda like, table, m, k: Vec(table[m, k], table[m, k + 1], table[m, k + 2]))
-width.register(Vec, lambda like: 3)
-gathered.register(AlongX, lambda like, table, m, k: AlongX(1.0))
-gathered.register(AlongY, lambda like, table, m, k: AlongY(1.0))
-gathered.register(AlongZ, lambda like, table, m, k: AlongZ(1.0))
-
-
-@gathered.register(SphereNumbers)
-def _(like, table, m, k):
-    # Four numbers of it are half a line of the cache; the others follow from them.
-    radius = table[m, k + 3]
-    center = Vec(table[m, k], table[m, k + 1], table[m, k + 2])
-    return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
-
-
-width.register(SphereNumbers, lambda like: 4)
-
-
-@gathered.register(CapsuleNumbers)
-def _(like, table, m, k):
-    return CapsuleNumbers(
-        Vec(table[m, k], table[m, k + 1], table[m, k + 2]),
-        table[m, k + 3], table[m, k + 4], table[m, k + 5], table[m, k + 6],
-    )  # fmt: skip
-
-
-width.register(CapsuleNumbers, lambda like: 7)
-
-
-@inlined
-def _quadric(like, table, m, k):
-    """The fields of a quadric."""
-    tilt = k + 6 + width(like.b)
-    return (
-        gathered(like.center, table, m, k), gathered(like.a, table, m, k + 3), gathered(like.b, table, m, k + 6),
-        table[m, tilt], table[m, tilt + 1], table[m, tilt + 2],
-    )  # fmt: skip
-
-
-gathered.register(QuadricNumbers, lambda like, table, m, k: QuadricNumbers(*_quadric(like, table, m, k)))
-gathered.register(EllipsoidNumbers, lambda like, table, m, k: EllipsoidNumbers(*_quadric(like, table, m, k)))
-width.register(QuadricNumbers, lambda like: 9 + width(like.b))
-
-
-@gathered.register(SlabNumbers)
-def _(like, table, m, k):
-    n = k + width(like.normal)
-    return SlabNumbers(
-        gathered(like.normal, table, m, k), table[m, n], table[m, n + 1], table[m, n + 2], table[m, n + 3]
-    )
-
-
-width.register(SlabNumbers, lambda like: width(like.normal) + 4)
-
-
-@gathered.register(Rotated)
-def _(like, table, m, k):
-    n = k + width(like.body)
-    return Rotated(
-        gathered(like.body, table, m, k),
-        gathered(like.x, table, m, n), gathered(like.y, table, m, n + 3), gathered(like.z, table, m, n + 6),
-    )  # fmt: skip
-
-
-width.register(Rotated, lambda like: width(like.body) + 9)
-
-
-@gathered.register(Chain)
-def _(like, table, m, k):
-    return Chain(gathered(like.first, table, m, k), gathered(like.rest, table, m, k + width(like.first)))
-
-
-width.register(Chain, lambda like: width(like.first) + width(like.rest))
-
-
-@gathered.register(SolidNumbers)
-def _(like, table, m, k):
-    n = k + width(like.parts)
-    return SolidNumbers(gathered(like.parts, table, m, k), table[m, n], table[m, n + 1])
-
-
-width.register(SolidNumbers, lambda like: width(like.parts) + 2)

@@ -1,50 +1,16 @@
-"""A field that moves, as one: its grid and its bodies are asked in its own frame.
+"""A field that moves other than uniformly: how long a particle stays near one cell of its grid.
 
-In uniform translation a flight is straight, or falls as it does, in that frame too. In any other motion its place in a
-cell has bounds by its speed there and a bound of its acceleration, as `relative.py` has them.
+Its place in a cell has bounds by its speed there and a bound of its acceleration, as `relative.py` has them.
 """
 
 import math
 
 from ...kernel.jit import outlined
-from .. import flights, fold, near
-from ..posed import Drifting, Posed, own_place
 from ..relative import bounds_of
 from .grid import cell_of, until_next
 
 # The bounds of a flight in its cell hold for at most so many times its length, after so many trials.
 _CLOSE, _TRIALS = 2.0, 8
-
-# --- At one instant --------------------------------------------------------------------------------------
-
-
-@fold.outside_of_any.register(Posed)
-def _(members, wall, r):
-    return fold.outside_of_any(members.body, wall, own_place(members, r))
-
-
-near.count_in_cell.register(Posed, lambda members, r: near.count_in_cell(members.body, own_place(members, r)))
-near.one_in_cell.register(Posed, lambda members, k, r: near.one_in_cell(members.body, k, own_place(members, r)))
-
-
-@near.list_in_cell.register(Posed)
-def _(members, k, before, r, into):
-    return near.list_in_cell(members.body, k, before, own_place(members, r), into)
-
-
-near.deepest_in_cell.register(Posed, lambda members, r: near.deepest_in_cell(members.body, own_place(members, r)))
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-@flights.field_hit.register(Drifting)
-def _(members, gravity, r, v):
-    return flights.field_hit(members.body, gravity, r - members.pose.shift, v - members.pose.velocity)
-
-
-@near.until_next_cell.register(Drifting)
-def _(members, r, v):
-    return near.until_next_cell(members.body, r - members.pose.shift, v - members.pose.velocity)
 
 
 @outlined

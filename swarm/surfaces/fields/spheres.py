@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...kernel.vector import vec
 from ...rows import balls, lengths
-from ..shapes.sphere import SphereNumbers
+from ..shapes.sphere import ball
 from .many import Floats, Many, field_of
-from .members import Members, aligned, gathered
+from .members import Members, aligned
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -56,7 +57,4 @@ class Spheres(Many):
     def members(self) -> Members:
         """What kernels take."""
         table = aligned(np.column_stack([self.centers, self.radii]))
-        return field_of(gathered(_LIKE, table, 0, 0), table, self.corners, self.repeated)
-
-
-_LIKE = SphereNumbers(*[0.0] * 5)  # type: ignore[arg-type]
+        return field_of(ball(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)

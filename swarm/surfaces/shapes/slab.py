@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...checks import Vector, length
-from ...kernel.jit import by_type, inlined, select
+from ...kernel.jit import select
+from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
 from .. import contract
 from ..course import rise_time
@@ -80,59 +81,62 @@ class Slab(Surface):
 # fall that loses energy.
 
 
-class AlongX(NamedTuple):
+class AlongX(Record):
     """The x axis."""
 
     x: float
 
+    def part(self, r):
+        return r.x
 
-class AlongY(NamedTuple):
+    def scaled(self, k):
+        return Vec(k, 0.0, 0.0)
+
+
+class AlongY(Record):
     """The y axis."""
 
     y: float
 
+    def part(self, r):
+        return r.y
 
-class AlongZ(NamedTuple):
+    def scaled(self, k):
+        return Vec(0.0, k, 0.0)
+
+
+class AlongZ(Record):
     """The z axis."""
 
     z: float
 
+    def part(self, r):
+        return r.z
 
+    def scaled(self, k):
+        return Vec(0.0, 0.0, k)
+
+
+AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)
 Normal = Vec | AlongX | AlongY | AlongZ
 
 
 def normal_of(vector: Sequence[float]) -> Normal:
     """What kernels take for a unit vector, or for the opposite one where that is an axis."""
-    x, y, z = vector
-    if y == 0.0 and z == 0.0:
-        return AlongX(1.0)
-    if z == 0.0 and x == 0.0:
-        return AlongY(1.0)
-    if x == 0.0 and y == 0.0:
-        return AlongZ(1.0)
+    for axis, others in zip(AXES, ((1, 2), (2, 0), (0, 1)), strict=True):
+        if not any(vector[k] for k in others):
+            return axis(1.0)
     return vec(vector)
 
 
-@by_type
 def along(normal, r):
     """n.r"""
-    raise NotImplementedError
+    return dot(normal, r) if isinstance(normal, Vec) else normal.part(r)
 
 
-@by_type
 def scaled(normal, k):
     """k n"""
-    raise NotImplementedError
-
-
-along.register(Vec, lambda normal, r: dot(normal, r))
-scaled.register(Vec, lambda normal, k: k * normal)
-along.register(AlongX, lambda normal, r: r.x)
-scaled.register(AlongX, lambda normal, k: Vec(k, 0.0, 0.0))
-along.register(AlongY, lambda normal, r: r.y)
-scaled.register(AlongY, lambda normal, k: Vec(0.0, k, 0.0))
-along.register(AlongZ, lambda normal, r: r.z)
-scaled.register(AlongZ, lambda normal, k: Vec(0.0, 0.0, k))
+    return k * normal if isinstance(normal, Vec) else normal.scaled(k)
 
 
 # --- The numbers -----------------------------------------------------------------------------------------
@@ -140,7 +144,7 @@ scaled.register(AlongZ, lambda normal, k: Vec(0.0, 0.0, k))
 
 @root_gap
 @exact_chord
-class SlabNumbers(NamedTuple):
+class SlabNumbers(Record):
     """What kernels know of a slab."""
 
     normal: Normal
@@ -156,7 +160,6 @@ def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> Sl
     return SlabNumbers(across, float(along(across, vec(center))), half, half * half, side)
 
 
-@inlined
 def _off(surface, r):
     """The signed distance from the middle."""
     return along(surface.normal, r) - surface.offset
@@ -207,7 +210,6 @@ def _(surface, r, v):
     return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
 
-@inlined
 def near_face_hit(surface, r, v, pull):
     """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
     d = _off(surface, r)

@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ...checks import Vector, length
-from ...kernel.jit import inlined, select
+from ...kernel.jit import select
+from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
 from .. import contract
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
@@ -60,7 +60,7 @@ class Sphere(Surface):
 
 @root_gap
 @exact_chord
-class SphereNumbers(NamedTuple):
+class SphereNumbers(Record):
     """What kernels know of a sphere; a ball may be small compared with the distance of a flight from it."""
 
     center: Vec
@@ -72,6 +72,11 @@ class SphereNumbers(NamedTuple):
 
 class SphereCavity(SphereNumbers):
     """A cavity: every flight in it meets the wall."""
+
+
+def ball(center, radius):
+    """The numbers of a solid sphere."""
+    return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
 
 
 # --- The level set ---------------------------------------------------------------------------------------
@@ -133,7 +138,6 @@ contract.may_be_far.register(SphereCavity, lambda surface: False)
 contract.inner_gradient.register(SphereNumbers, lambda surface, r0, r1: r0 + r1 - 2.0 * surface.center)
 
 
-@inlined
 def _risen(d, p):
     """2 d.p, and |d + p|^2 - |d|^2."""
     dp = 2.0 * dot(d, p)
