@@ -1,15 +1,15 @@
 """Rotations as unit quaternions (w, x, y, z): what an argument may say, and what follows from it."""
 
-import functools
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Vector, number, vector
 from ..errors import SceneError
+from ..kernel.record import Record
 from ..kernel.vector import Vec, vec
 
 Quaternion = tuple[float, float, float, float]
@@ -122,7 +122,7 @@ def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
     return point if turn is None else tuple(product(matrix(turn).T, point).tolist())
 
 
-class Rotated(NamedTuple):
+class Rotated(Record):
     """A surface `body` in its own frame, and the rows of the matrix from that frame to the scene's."""
 
     body: Any
@@ -136,14 +136,9 @@ def framed(axes: NDArray[np.float64], body: Any) -> Any:
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)
-    swapped = by_right_angles(body, right) if np.abs(axes - right).max() <= _ROUND_OFF else None
-    return Rotated(body, *map(vec, axes.tolist())) if swapped is None else swapped
-
-
-@functools.singledispatch
-def by_right_angles(body: Any, axes: NDArray[np.float64]) -> Any:
-    """The numbers of a surface whose own axes are other axes of the scene, or their opposites; None: it has none."""
-    return None
+    if hasattr(body, "by_right_angles") and np.abs(axes - right).max() <= _ROUND_OFF:
+        return body.by_right_angles(right)
+    return Rotated(body, *map(vec, axes.tolist()))
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:

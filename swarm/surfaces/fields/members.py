@@ -25,7 +25,7 @@ _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # Bytes of a line of the cache.
 _LINE = 64
 # What has fields of its own in a table, beside vectors and balls.
-_KINDS = (CapsuleNumbers, QuadricNumbers, SlabNumbers, Rotated, Chain, SolidNumbers)
+_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, Chain, SolidNumbers)
 
 
 class Members(Record):
@@ -129,7 +129,7 @@ def can_be_member(wall: Any) -> bool:
         return True
     if isinstance(wall, (SphereNumbers, Vec)):
         return True
-    return isinstance(wall, (*_KINDS, *AXES)) and all(map(can_be_member, wall))
+    return isinstance(wall, _KINDS) and all(can_be_member(part) for part in wall)
 
 
 def kind_of(wall: Any) -> Any:

@@ -2,19 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ...checks import Vector, at_least, length
 from ...kernel.gravity import as_vector
-from ...kernel.jit import inlined, select
+from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract, flights
 from ..approach import NearPiece
 from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
-from .common import root_gap
+from .common import Distance
 from .revolved import Revolved
 
 # The last step of a fall leaves this part of R^2.
@@ -67,8 +66,7 @@ class Capsule(Revolved):
         return farthest(self.center) + self.radius + 0.5 * self.length
 
 
-@root_gap
-class CapsuleNumbers(NamedTuple):
+class CapsuleNumbers(Distance):
     """What kernels know of a capsule."""
 
     center: Vec
@@ -78,7 +76,6 @@ class CapsuleNumbers(NamedTuple):
     side: float
 
 
-@inlined
 def _from_segment(surface, r):
     """The vector from the nearest point of the segment."""
     d = r - surface.center

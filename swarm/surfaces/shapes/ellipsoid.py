@@ -11,7 +11,6 @@ from ...kernel.vector import cross, norm, times, total, vec
 from .. import contract
 from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
-from . import quadratic
 from .quadratic import QuadricNumbers, form, parabola, turning, widths
 
 
@@ -61,14 +60,20 @@ class Ellipsoid(Surface):
 class EllipsoidNumbers(QuadricNumbers):
     """A quadric without a linear term, of level 1."""
 
+    def discriminant(self, d, v, c, b, a):
+        """b^2 - a c"""
+        # = v.A v - w.(det A) A^-1 w with w = d x v, Lagrange's identity; near the wall the first form is better.
+        return select(c > 1.0, a - total(turning(self.a, cross(d, v))), b * b - a * c)
+
+    def level_window(self, c, d, v, pull):
+        """(c, window)"""
+        # Outside, the size is that of the distance: the flight may begin far from a solid.
+        size = 1.0 + select(c > 0.0, c, 0.0)
+        return level_and_window(c, 1.0, size, form(self.a, v, v), form(self.a, pull, pull))
+
 
 class EllipsoidCavity(EllipsoidNumbers):
     """A cavity: every flight in it meets the wall."""
-
-
-# Unlike 0.0, which changes -0.0, the compiler removes its addition.
-quadratic.linear.register(EllipsoidNumbers, lambda surface, u: -0.0)
-quadratic.tilted.register(EllipsoidNumbers, lambda surface, u, k: u)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -78,19 +83,6 @@ quadratic.tilted.register(EllipsoidNumbers, lambda surface, u, k: u)
 def _(surface, r, v):
     c, b, a = parabola(surface, r, v)
     return rise_time_inside(c, b, a), True
-
-
-@quadratic.discriminant.register(EllipsoidNumbers)
-def _(surface, d, v, c, b, a):
-    # b^2 - a c = v.A v - w.(det A) A^-1 w with w = d x v, Lagrange's identity; near the wall the first form is better.
-    return select(c > 1.0, a - total(turning(surface.a, cross(d, v))), b * b - a * c)
-
-
-@quadratic.level_window.register(EllipsoidNumbers)
-def _(surface, c, d, v, pull):
-    # Outside, the size is that of the distance: the flight may begin far from a solid.
-    size = 1.0 + select(c > 0.0, c, 0.0)
-    return level_and_window(c, 1.0, size, form(surface.a, v, v), form(surface.a, pull, pull))
 
 
 contract.may_be_far.register(EllipsoidCavity, lambda surface: False)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ...checks import Vector, number
 from ...kernel.jit import select
@@ -11,7 +10,7 @@ from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
-from .common import exact_chord
+from .common import ExactChord
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,8 +59,7 @@ class Plane(Surface):
         return abs(self.offset)
 
 
-@exact_chord
-class PlaneNumbers(NamedTuple):
+class PlaneNumbers(ExactChord):
     """What kernels know of a plane."""
 
     normal: Vec

@@ -4,16 +4,16 @@ The ellipsoid, the cylinder, the cone and the paraboloid are such surfaces, as i
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...checks import Vector
-from ...kernel.jit import by_type, inlined, select
+from ...kernel.jit import select
+from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, cross, dot, largest, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
-from ..rotation import by_right_angles
 from ..surface import side_sign
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
@@ -21,7 +21,7 @@ _CHORD_SWEEPS = 12
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class QuadricNumbers(NamedTuple):
+class QuadricNumbers(Record):
     """What kernels know of a quadric; it, or its waist, may be small compared with the distance of a flight from it."""
 
     center: Vec
@@ -30,6 +30,49 @@ class QuadricNumbers(NamedTuple):
     level: float
     scale: float  # by how much q varies over the surface's size
     side: float
+
+    def by_right_angles(self, axes: Any) -> Any:
+        """The numbers of the quadric whose own axes are these other axes of the scene, or their opposites."""
+        b = None if self.b is None else vec((axes @ np.array(self.b)).tolist())
+        center, a = axes @ np.array(self.center), abs(axes) @ np.array(self.a)
+        return self._replace(center=vec(center.tolist()), a=vec(a.tolist()), b=b)
+
+    def linear(self, u):
+        """b.u"""
+        # Unlike 0.0, which changes -0.0, the compiler removes its addition.
+        return -0.0 if self.b is None else dot(self.b, u)
+
+    def tilted(self, u, k):
+        """u + k b"""
+        return u if self.b is None else u + k * self.b
+
+    def discriminant(self, d, v, c, b, a):
+        """b^2 - a c, also from afar, where d is long."""
+        # = level v.A v + (b.v)^2/4 - w.(det A) A^-1 w + A v.(b x w) with w = d x v, Lagrange's identity. Of both forms
+        # the one with the smaller terms.
+        w, along = cross(d, v), 0.5 * self.linear(v)
+        u, s = turning(self.a, w), times(times(self.a, v), cross(self.b, w))
+        from_afar = self.level * a + along * along - total(u) + total(s)
+        u = absolute(u)
+        terms = abs(self.level * a) + along * along + u.x + u.y + u.z + total(absolute(s))
+        return select(terms < b * b + abs(a * c), from_afar, b * b - a * c)
+
+    def level_window(self, c, d, v, pull):
+        """(c, window) by the time in which the flight changes q by as much as it varies here.
+
+        The window is infinite where the level is a parabola.
+        """
+        magnitude, tilt = absolute(self.a), absolute(times(self.b, d))
+        terms = form(magnitude, d, d) + tilt.x + tilt.y + tilt.z
+        size = select(terms > self.scale, terms, self.scale)
+        moving, falling = form(magnitude, v, v), form(magnitude, pull, pull)
+        # At the apex of a cone there is no size: the time after which the fall is as fast as the start.
+        size = select(size > 0.0, size, moving * moving / falling)
+        # A cone has no size of its own to be far from.
+        own = select(self.scale > 0.0, self.scale, math.inf)
+        level, window = level_and_window(c, own, size, moving, falling)
+        window = select(abs(window) > 0.0, window, 1.0)
+        return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
 
 class ConvexQuadric(QuadricNumbers):
@@ -46,20 +89,11 @@ def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, 
     return kind(vec(center), a, b, level, scale, sign)
 
 
-@by_right_angles.register(QuadricNumbers)
-def _(body: QuadricNumbers, axes: Any) -> QuadricNumbers:
-    b = None if body.b is None else vec((axes @ np.array(body.b)).tolist())
-    center, a = axes @ np.array(body.center), abs(axes) @ np.array(body.a)
-    return body._replace(center=vec(center.tolist()), a=vec(a.tolist()), b=b)
-
-
-@inlined
 def form(a, u, v):
     """u.A v for the diagonal a of A."""
     return dot(times(a, u), v)
 
 
-@inlined
 def widths(a, kappa):
     """1/(1 + kappa A) by one division."""
     x, y, z = 1.0 + kappa * a.x, 1.0 + kappa * a.y, 1.0 + kappa * a.z
@@ -67,19 +101,6 @@ def widths(a, kappa):
     return Vec(y * z * inverse, x * z * inverse, x * y * inverse)
 
 
-@by_type
-def linear(surface, u):
-    """b.u"""
-    return dot(surface.b, u)
-
-
-@by_type
-def tilted(surface, u, k):
-    """u + k b"""
-    return u + k * surface.b
-
-
-@inlined
 def _unit(surface, n):
     """The unit vector along side n. At the apex of a cone, where n is 0, the answer is 0 and not NaN."""
     n2 = square(n)
@@ -94,13 +115,13 @@ contract.phi.register(QuadricNumbers, lambda surface, r: contract.inner(surface,
 @contract.gradient.register(QuadricNumbers)
 @contract.slope.register(QuadricNumbers)
 def _(surface, r):
-    return tilted(surface, times(2.0 * surface.a, r - surface.center), 1.0)
+    return surface.tilted(times(2.0 * surface.a, r - surface.center), 1.0)
 
 
 @contract.inner.register(QuadricNumbers)
 def _(surface, r):
     d = r - surface.center
-    return form(surface.a, d, d) + linear(surface, d)
+    return form(surface.a, d, d) + surface.linear(d)
 
 
 contract.gap_of.register(QuadricNumbers, lambda surface, q: surface.side * (q - surface.level))
@@ -133,10 +154,9 @@ def _(surface, r, v, pull):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@inlined
 def parabola(surface, r, v):
     """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
-    b = form(surface.a, r - surface.center, v) + 0.5 * linear(surface, v)
+    b = form(surface.a, r - surface.center, v) + 0.5 * surface.linear(v)
     return contract.phi(surface, r), b, form(surface.a, v, v)
 
 
@@ -149,24 +169,10 @@ def _(surface, r, v):
 @contract.first_hit.register(QuadricNumbers)
 def _(surface, r, v):
     c, b, a = parabola(surface, r, v)
-    d = discriminant(surface, r - surface.center, v, c, b, a)
+    d = surface.discriminant(r - surface.center, v, c, b, a)
     return rise_time_by(surface.side * c, surface.side * b, surface.side * a, d), True
 
 
-@by_type
-def discriminant(surface, d, v, c, b, a):
-    """b^2 - a c, also from afar, where d is long."""
-    # = level v.A v + (b.v)^2/4 - w.(det A) A^-1 w + A v.(b x w) with w = d x v, Lagrange's identity. Of both forms the
-    # one with the smaller terms.
-    w, along = cross(d, v), 0.5 * linear(surface, v)
-    u, s = turning(surface.a, w), times(times(surface.a, v), cross(surface.b, w))
-    from_afar = surface.level * a + along * along - total(u) + total(s)
-    u = absolute(u)
-    terms = abs(surface.level * a) + along * along + u.x + u.y + u.z + total(absolute(s))
-    return select(terms < b * b + abs(a * c), from_afar, b * b - a * c)
-
-
-@inlined
 def turning(a, w):
     """The terms of w.(det A) A^-1 w."""
     return times(times(Vec(a.y * a.z, a.x * a.z, a.x * a.y), w), w)
@@ -177,31 +183,12 @@ def _(surface, r, v, pull):
     # phi(r + v t + G t^2/2), a quartic in t
     d, side = r - surface.center, surface.side
     c, b, a = parabola(surface, r, v)
-    a2 = a + form(surface.a, d, pull) + 0.5 * linear(surface, pull)
+    a2 = a + form(surface.a, d, pull) + 0.5 * surface.linear(pull)
     a3, a4 = form(surface.a, v, pull), 0.25 * form(surface.a, pull, pull)
-    c, window = level_window(surface, c, d, v, pull)
+    c, window = surface.level_window(c, d, v, pull)
     # What is left of a3 where G A G is below the smallest number would be infinite after an infinite time.
     curved = side * select(window < math.inf, 1.0, 0.0)
     return Quartic(side * c, side * b, side * a2, curved * a3, curved * a4, window)
-
-
-@by_type
-def level_window(surface, c, d, v, pull):
-    """(c, window) by the time in which the flight changes q by as much as it varies here.
-
-    The window is infinite where the level is a parabola.
-    """
-    magnitude, tilt = absolute(surface.a), absolute(times(surface.b, d))
-    terms = form(magnitude, d, d) + tilt.x + tilt.y + tilt.z
-    size = select(terms > surface.scale, terms, surface.scale)
-    moving, falling = form(magnitude, v, v), form(magnitude, pull, pull)
-    # At the apex of a cone there is no size: the time after which the fall is as fast as the start.
-    size = select(size > 0.0, size, moving * moving / falling)
-    # A cone has no size of its own to be far from.
-    own = select(surface.scale > 0.0, surface.scale, math.inf)
-    level, window = level_and_window(c, own, size, moving, falling)
-    window = select(abs(window) > 0.0, window, 1.0)
-    return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
@@ -212,7 +199,7 @@ contract.gap_slope.register(QuadricNumbers, lambda surface, q0, q1: (surface.sid
 @contract.inner_gradient.register(QuadricNumbers)
 def _(surface, r0, r1):
     # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    return tilted(surface, times(surface.a, r0 + r1 - 2.0 * surface.center), 1.0)
+    return surface.tilted(times(surface.a, r0 + r1 - 2.0 * surface.center), 1.0)
 
 
 @contract.step_normal.register(QuadricNumbers)
@@ -222,12 +209,11 @@ def _(surface, r0, r1):
 
 @contract.push.register(QuadricNumbers)
 def _(surface, r0, p, kappa):
-    a, d, f = surface.a, r0 - surface.center, tilted(surface, p, -kappa)
+    a, d, f = surface.a, r0 - surface.center, surface.tilted(p, -kappa)
     moved = Vec(_pushed(a.x, d.x, f.x, kappa), _pushed(a.y, d.y, f.y, kappa), _pushed(a.z, d.z, f.z, kappa))
     return surface.center + moved
 
 
-@inlined
 def _pushed(a, d, f, kappa):
     """One component of r1 = [(1 - kappa A) r0 + p - kappa b]/(1 + kappa A)."""
     return ((1.0 - kappa * a) * d + f) / (1.0 + kappa * a)
@@ -236,11 +222,10 @@ def _pushed(a, d, f, kappa):
 @contract.resolve.register(QuadricNumbers)
 def _(surface, r, strength):
     # (1 + 2 strength A) s = r - strength b
-    moved = tilted(surface, r - surface.center, -strength)
+    moved = surface.tilted(r - surface.center, -strength)
     return surface.center + times(widths(surface.a, 2.0 * strength), moved)
 
 
-@inlined
 def _step(surface, r0, p, kappa):
     """D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
 

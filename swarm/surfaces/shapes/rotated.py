@@ -7,34 +7,24 @@ from collections.abc import Callable
 from typing import Any
 
 from ...kernel.gravity import Gravity, as_vector
-from ...kernel.jit import by_type, inlined
 from ...kernel.vector import Vec, dot
 from .. import contract, flights
 from ..rotation import Rotated
 
 
-@inlined
 def own(surface, a):
     """A vector of the scene in the surface's own frame."""
     return surface.x * a.x + surface.y * a.y + surface.z * a.z
 
 
-@inlined
 def scene(surface, a):
     """A vector of the surface's own frame in the scene."""
     return Vec(dot(surface.x, a), dot(surface.y, a), dot(surface.z, a))
 
 
-@by_type
 def _own_gravity(gravity, surface):
     """The same of gravity."""
-    return gravity
-
-
-@_own_gravity.register(Gravity)
-def _(gravity, surface):
-    turned = own(surface, as_vector(gravity))
-    return Gravity(turned.x, turned.y, turned.z)
+    return None if gravity is None else Gravity(*own(surface, as_vector(gravity)))
 
 
 def _turned(made: Callable[[Any], Any], *functions: Any) -> None:

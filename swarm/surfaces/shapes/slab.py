@@ -15,7 +15,7 @@ from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
-from .common import exact_chord, root_gap
+from .common import Distance, ExactChord
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,7 +121,7 @@ AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)
 Normal = Vec | AlongX | AlongY | AlongZ
 
 
-def normal_of(vector: Sequence[float]) -> Normal:
+def normal_of(vector: Sequence[float]) -> Any:
     """What kernels take for a unit vector, or for the opposite one where that is an axis."""
     for axis, others in zip(AXES, ((1, 2), (2, 0), (0, 1)), strict=True):
         if not any(vector[k] for k in others):
@@ -142,9 +142,7 @@ def scaled(normal, k):
 # --- The numbers -----------------------------------------------------------------------------------------
 
 
-@root_gap
-@exact_chord
-class SlabNumbers(Record):
+class SlabNumbers(Distance, ExactChord):
     """What kernels know of a slab."""
 
     normal: Normal

@@ -5,17 +5,18 @@ A part is a wall whose admissible side is outside of it. The body is hit when th
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ...kernel.gravity import Gravity, Nothing, as_vector, displacement
-from ...kernel.jit import by_type, inlined, outlined, select
+from ...kernel.gravity import Gravity, as_vector, displacement
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract, flights
 from ..approach import place, under_way
 from ..course import rise_near
-from ..fold import Chain
+from ..fold import Chain, each
 from ..rotation import Rotated
 from .plane import PlaneNumbers
 from .slab import SlabNumbers, near_face_hit
@@ -32,7 +33,7 @@ _ENTRIES = 100
 _SPACING = 6e-6
 
 
-class SolidNumbers(NamedTuple):
+class SolidNumbers(Record):
     """What kernels know of a body: its parts, and a length that bounds the round-off of their coordinates."""
 
     parts: Any  # Chain or None
@@ -53,14 +54,10 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
     return SolidNumbers(chain, -1.0, float(extent))
 
 
-@by_type
 def _sign(part):
     """The sign with which phi of a part rises out of it."""
-    return 1.0
-
-
-_sign.register(PlaneNumbers, lambda part: -1.0)
-_sign.register(Rotated, lambda part: _sign(part.body))
+    body = part.body if isinstance(part, Rotated) else part
+    return -1.0 if isinstance(body, PlaneNumbers) else 1.0
 
 
 # --- The level set ---------------------------------------------------------------------------------------
@@ -69,22 +66,17 @@ contract.phi.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r
 contract.gradient.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r)[1])
 
 
-@by_type
 def _largest(parts, r):
     """The largest phi of the parts, and its gradient."""
-    raise NotImplementedError
-
-
-@_largest.register(Chain)
-def _(parts, r):
-    sign = _sign(parts.first)
-    here, (other, gradient) = sign * contract.phi(parts.first, r), _largest(parts.rest, r)
-    # No select: these may be arrays.
-    use = 1.0 * (here >= other)
-    return np.maximum(here, other), (use * sign) * contract.gradient(parts.first, r) + (1.0 - use) * gradient
-
-
-_largest.register(Nothing, lambda parts, r: (-math.inf, ZERO))
+    most, gradient = -math.inf, ZERO
+    for link in reversed(each(parts)):
+        sign = _sign(link.first)
+        here = sign * contract.phi(link.first, r)
+        # No select: these may be arrays.
+        use = 1.0 * (here >= most)
+        most = np.maximum(here, most)
+        gradient = (use * sign) * contract.gradient(link.first, r) + (1.0 - use) * gradient
+    return most, gradient
 
 
 @contract.hessian.register(SolidNumbers)
@@ -93,31 +85,22 @@ def _(surface, r):
     return _bend_of_largest(surface.parts, r, h)[1]
 
 
-@by_type
 def _bend_of_largest(parts, r, h):
     """The largest phi of the parts, and half its second derivatives, by differences."""
-    raise NotImplementedError
+    most, bend = -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for link in reversed(each(parts)):
+        sign = _sign(link.first)
+        here = sign * contract.phi(link.first, r)
+        if not here < most:
+            f = 0.25 * sign / h
+            x, y = _turn(link.first, r, Vec(h, 0.0, 0.0), f), _turn(link.first, r, Vec(0.0, h, 0.0), f)
+            z = _turn(link.first, r, Vec(0.0, 0.0, h), f)
+            most, bend = here, Symmetric(x.x, y.y, z.z, x.y, y.z, x.z)
+    return most, bend
 
 
-@_bend_of_largest.register(Chain)
-def _(parts, r, h):
-    other = _bend_of_largest(parts.rest, r, h)
-    sign = _sign(parts.first)
-    here = sign * contract.phi(parts.first, r)
-    if here < other[0]:
-        return other
-    f = 0.25 * sign / h
-    x, y = _turn(parts.first, r, Vec(h, 0.0, 0.0), f), _turn(parts.first, r, Vec(0.0, h, 0.0), f)
-    z = _turn(parts.first, r, Vec(0.0, 0.0, h), f)
-    return here, Symmetric(x.x, y.y, z.z, x.y, y.z, x.z)
-
-
-@inlined
 def _turn(part, r, step, f):
     return f * (contract.gradient(part, r + step) - contract.gradient(part, r - step))
-
-
-_bend_of_largest.register(Nothing, lambda parts, r, h: (-math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -157,7 +140,6 @@ def _entry(surface, gravity, r, v):
     return t, not under_way(t, last)
 
 
-@inlined
 def _entry_step(surface, gravity, r, v, t, last):
     """One step more: (t, its length, 0 if the flight is inside of all parts then).
 
@@ -174,57 +156,30 @@ def _entry_step(surface, gravity, r, v, t, last):
     return select(goes_on, t + wait, t), select(goes_on, length, last)
 
 
-@by_type
 def _last_entry(parts, gravity, extent, r, v):
     """When the last of the parts is entered that the particle is not inside of: (time, whether it is then)."""
-    raise NotImplementedError
+    time, found = 0.0, True
+    for link in reversed(each(parts)):
+        here, found_here = _entry_of(link.first, gravity, r, v)
+        # On the face of a part, which is left or entered now, the sign of the approach decides.
+        depth = contract.gap_of(link.first, contract.inner(link.first, r))
+        later = (here > time) & (not (depth > noise(link.first, extent, r)))
+        time, found = select(later, here, time), select(later, found_here, found)
+    return time, found
 
 
-@_last_entry.register(Chain)
-def _(parts, gravity, extent, r, v):
-    time, found = _last_entry(parts.rest, gravity, extent, r, v)
-    here, found_here = _entry_of(parts.first, gravity, r, v)
-    # On the face of a part, which is left or entered now, the sign of the approach decides.
-    depth = contract.gap_of(parts.first, contract.inner(parts.first, r))
-    later = (here > time) & (not (depth > noise(parts.first, extent, r)))
-    return select(later, here, time), select(later, found_here, found)
-
-
-_last_entry.register(Nothing, lambda parts, gravity, extent, r, v: (0.0, True))
-
-
-@by_type
 def _entry_of(part, gravity, r, v):
     """A time until which a flight surely does not enter a part: (time, whether it does then)."""
-    return _part_hit(gravity, part, r, v)
-
-
-@_entry_of.register(SlabNumbers)
-def _(part, gravity, r, v):
-    return _slab_hit(gravity, part, r, v)
-
-
-@by_type
-def _part_hit(gravity, part, r, v):
-    return contract.first_hit(part, r, v)
-
-
-@_part_hit.register(Gravity)
-def _(gravity, part, r, v):
+    if gravity is None:
+        return contract.first_hit(part, r, v)
+    pull = as_vector(gravity)
+    if isinstance(part, SlabNumbers):
+        return near_face_hit(part, r, v, pull), True
     if contract.is_quartic(part):
-        return rise_near(contract.course(part, r, v, as_vector(gravity)))
-    return contract.falling_hit(part, r, v, as_vector(gravity))
+        return rise_near(contract.course(part, r, v, pull))
+    return contract.falling_hit(part, r, v, pull)
 
 
-@by_type
-def _slab_hit(gravity, part, r, v):
-    return contract.first_hit(part, r, v)
-
-
-_slab_hit.register(Gravity, lambda gravity, part, r, v: (near_face_hit(part, r, v, as_vector(gravity)), True))
-
-
-@inlined
 def noise(part, extent, r):
     """The round-off of the gap of a part."""
     gradient = total(absolute(contract.gradient(part, r)))
@@ -232,43 +187,28 @@ def noise(part, extent, r):
     return _ULPS * _EPSILON * terms
 
 
-contract.safe_time.register(SolidNumbers, lambda surface, r, v, pull: _longest_safe_time(surface.parts, r, v, pull))
-
-
-@by_type
-def _longest_safe_time(parts, r, v, pull):
-    """Outside of one part is outside of the body."""
-    raise NotImplementedError
-
-
-@_longest_safe_time.register(Chain)
-def _(parts, r, v, pull):
-    return max(contract.safe_time(parts.first, r, v, pull), _longest_safe_time(parts.rest, r, v, pull))
-
-
-_longest_safe_time.register(Nothing, lambda parts, r, v, pull: 0.0)
+@contract.safe_time.register(SolidNumbers)
+def _(surface, r, v, pull):
+    # Outside of one part is outside of the body.
+    longest = 0.0
+    for link in reversed(each(surface.parts)):
+        longest = max(contract.safe_time(link.first, r, v, pull), longest)
+    return longest
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
 
-contract.unit_normal.register(SolidNumbers, lambda surface, r: _outermost(surface.parts, r)[1])
+
+@contract.unit_normal.register(SolidNumbers)
+def _(surface, r):
+    # That of the part which the point is least deep in
+    least, normal = math.inf, ZERO
+    for link in reversed(each(surface.parts)):
+        depth = contract.distance(link.first, r)
+        if not depth > least:
+            least, normal = depth, contract.unit_normal(link.first, r)
+    return normal
 
 
-@by_type
-def _outermost(parts, r):
-    """The distance into the part that the point is least deep in, and that part's normal."""
-    raise NotImplementedError
-
-
-@_outermost.register(Chain)
-def _(parts, r):
-    other = _outermost(parts.rest, r)
-    depth = contract.distance(parts.first, r)
-    if depth > other[0]:
-        return other
-    return depth, contract.unit_normal(parts.first, r)
-
-
-_outermost.register(Nothing, lambda parts, r: (math.inf, ZERO))
 # phi is about the distance, whose faces are flat or wide: no pole within a push.
 contract.farthest_push.register(SolidNumbers, lambda surface: -math.inf)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 from ...checks import Vector, length
 from ...kernel.jit import select
-from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
 from .. import contract
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
-from .common import exact_chord, root_gap
+from .common import Distance, ExactChord
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,9 +57,7 @@ class Sphere(Surface):
         return farthest(self.center) + self.radius
 
 
-@root_gap
-@exact_chord
-class SphereNumbers(Record):
+class SphereNumbers(Distance, ExactChord):
     """What kernels know of a sphere; a ball may be small compared with the distance of a flight from it."""
 
     center: Vec

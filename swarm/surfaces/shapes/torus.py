@@ -2,20 +2,19 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ...checks import Vector, length
 from ...errors import SceneError
-from ...kernel.gravity import Gravity, Nothing, as_vector
-from ...kernel.jit import by_type, inlined, select
+from ...kernel.gravity import as_vector
+from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract
 from ..approach import Near, NearFall
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
-from .common import root_gap
+from .common import Distance
 
 # The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.
 _CLOSE = 4e-16
@@ -75,8 +74,7 @@ class Torus(Surface):
         return farthest(self.center) + self.major_radius + self.minor_radius
 
 
-@root_gap
-class TorusNumbers(NamedTuple):
+class TorusNumbers(Distance):
     """What kernels know of a torus."""
 
     center: Vec
@@ -86,7 +84,6 @@ class TorusNumbers(NamedTuple):
     side: float
 
 
-@inlined
 def _from_axis(surface, r):
     """rho, never 0: on the axis the direction to the tube is not defined."""
     d = r - surface.center
@@ -132,27 +129,19 @@ def _(surface, r0, r1):
 
 @contract.near.register(TorusNumbers)
 def _(surface, gravity, r, v):
-    return _near(gravity, surface, r, v)
+    return _near(surface, r, v) if gravity is None else _near_of_fall(surface, as_vector(gravity), r, v)
 
 
-@by_type
-def _near(gravity, surface, r, v):
-    raise NotImplementedError
-
-
-@inlined
 def _tube2(surface, q):
     """a^2, or that of a thicker tube that is near: from afar round-off of F is that of the distance."""
     return select(q > _AFAR * surface.radius2, q * (1.0 / _AFAR), surface.radius2)
 
 
-@inlined
 def _nearly(surface):
     return _CLOSE * surface.major * surface.major * surface.radius2
 
 
-@_near.register(Nothing)
-def _(gravity, surface, r, v):
+def _near(surface, r, v):
     d, major, side = r - surface.center, surface.major, surface.side
     rho = _from_axis(surface, r)
     across = rho - major
@@ -174,9 +163,8 @@ def _(gravity, surface, r, v):
     )  # fmt: skip
 
 
-@_near.register(Gravity)
-def _(gravity, surface, r, v):
-    d, g, major, side = r - surface.center, as_vector(gravity), surface.major, surface.side
+def _near_of_fall(surface, g, r, v):
+    d, major, side = r - surface.center, surface.major, surface.side
     rho = _from_axis(surface, r)
     across = rho - major
     q, d2 = across * across + d.z * d.z, square(d)
@@ -206,7 +194,6 @@ def _(gravity, surface, r, v):
     )  # fmt: skip
 
 
-@inlined
 def _ball(surface, d2):
     """Whether a solid is within a ball that a point is outside of, and the square radius of one that is nearer to it.
 
