@@ -1,9 +1,8 @@
 """Boxes: many bricks, each at its place, with its widths and rotation."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from ...rows import bodies, quaternions, widths
 from ..shapes.box import Box
 from ..surface import Surface
 from .many import Many
@@ -33,19 +32,8 @@ class Boxes(Many):
     array([0.  , 0.25])
     """
 
+    kind: ClassVar[type[Surface]] = Box
     centers: Any
     half_widths: Any
     rotations: Any = None
     side: str = "outside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers))
-        object.__setattr__(self, "half_widths", widths("half_widths", self.half_widths, len(self)))
-        if self.rotations is not None:
-            object.__setattr__(self, "rotations", quaternions("rotations", self.rotations, len(self)))
-
-    def solids(self) -> list[Surface]:
-        turns = [None] * len(self) if self.rotations is None else self.rotations.tolist()
-        each = zip(self.half_widths.tolist(), self.centers.tolist(), turns, strict=True)
-        return [Box(half, center, self.side, rotation=turn) for half, center, turn in each]

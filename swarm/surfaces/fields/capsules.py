@@ -1,9 +1,8 @@
 """Capsules: many rods with round ends, each at its place, with its radius, length and axis."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from ...rows import bodies, directions, lengths
 from ..shapes.capsule import Capsule
 from ..surface import Surface
 from .many import Many
@@ -34,19 +33,9 @@ class Capsules(Many):
     array([0.])
     """
 
+    kind: ClassVar[type[Surface]] = Capsule
     centers: Any
     radii: Any
     lengths: Any
     axes: Any = (0.0, 0.0, 1.0)
     side: str = "outside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers))
-        object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
-        object.__setattr__(self, "lengths", lengths("lengths", self.lengths, len(self)))
-        object.__setattr__(self, "axes", directions("axes", self.axes, len(self)))
-
-    def solids(self) -> list[Surface]:
-        each = zip(self.radii.tolist(), self.lengths.tolist(), self.axes.tolist(), self.centers.tolist(), strict=True)
-        return [Capsule(radius, length, axis, center, self.side) for radius, length, axis, center in each]

@@ -1,9 +1,8 @@
 """Cylinders: many posts or rods, each at its place, with its radius and axis."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from ...rows import bodies, directions, lengths
 from ..shapes.cylinder import Cylinder
 from ..surface import Surface
 from .many import Many
@@ -34,21 +33,9 @@ class Cylinders(Many):
     array([0.])
     """
 
+    kind: ClassVar[type[Surface]] = Cylinder
     centers: Any
     radii: Any
     axes: Any = (0.0, 0.0, 1.0)
     lengths: Any = None
     side: str = "outside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers))
-        object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
-        object.__setattr__(self, "axes", directions("axes", self.axes, len(self)))
-        if self.lengths is not None:
-            object.__setattr__(self, "lengths", lengths("lengths", self.lengths, len(self)))
-
-    def solids(self) -> list[Surface]:
-        long = [None] * len(self) if self.lengths is None else self.lengths.tolist()
-        each = zip(self.radii.tolist(), self.axes.tolist(), long, self.centers.tolist(), strict=True)
-        return [Cylinder(radius, axis, length, center, self.side) for radius, axis, length, center in each]

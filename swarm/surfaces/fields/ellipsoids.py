@@ -1,9 +1,8 @@
 """Ellipsoids: many grains, each at its place, with its semi-axes and rotation."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from ...rows import bodies, quaternions, widths
 from ..shapes.ellipsoid import Ellipsoid
 from ..surface import Surface
 from .many import Many
@@ -33,19 +32,8 @@ class Ellipsoids(Many):
     array([0., 0.])
     """
 
+    kind: ClassVar[type[Surface]] = Ellipsoid
     centers: Any
     semi_axes: Any
     rotations: Any = None
     side: str = "outside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "centers", bodies("centers", self.centers))
-        object.__setattr__(self, "semi_axes", widths("semi_axes", self.semi_axes, len(self)))
-        if self.rotations is not None:
-            object.__setattr__(self, "rotations", quaternions("rotations", self.rotations, len(self)))
-
-    def solids(self) -> list[Surface]:
-        turns = [None] * len(self) if self.rotations is None else self.rotations.tolist()
-        each = zip(self.semi_axes.tolist(), self.centers.tolist(), turns, strict=True)
-        return [Ellipsoid(semi_axes, center, self.side, rotation=turn) for semi_axes, center, turn in each]

@@ -3,14 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
 from ...errors import SceneError
-from ..shapes.sphere import SphereNumbers
+from ...rows import balls, bodies, directions, lengths, quaternions, widths
+from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .entering import grid_of
 from .grid import one_cell
@@ -23,17 +24,33 @@ Floats = NDArray[np.float64]
 # longer, fewer; and in a cell that repeats, whose faces end flights too: among 27 balls 87 ns, from cell to cell 52.
 # Under gravity cells are faster from 16 on: so few are in one cell.
 _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
-_COLUMNS = {
-    "centers": ("x", "y", "z"), "radii": ("radius",), "lengths": ("length",),
-    "axes": ("axis_x", "axis_y", "axis_z"), "half_widths": ("half_x", "half_y", "half_z"),
-    "semi_axes": ("a", "b", "c"), "rotations": ("q_w", "q_x", "q_y", "q_z"),
-}  # fmt: skip
+
+
+class _Rows(NamedTuple):
+    """An argument that has a row for each body."""
+
+    of_one: str  # the argument of one body
+    columns: tuple[str, ...]  # of a file
+    checked: Callable[..., Floats]
+
+
+_ROWS = {
+    "centers": _Rows("center", ("x", "y", "z"), bodies),
+    "radii": _Rows("radius", ("radius",), lengths),
+    "lengths": _Rows("length", ("length",), lengths),
+    "axes": _Rows("axis", ("axis_x", "axis_y", "axis_z"), directions),
+    "half_widths": _Rows("half_widths", ("half_x", "half_y", "half_z"), widths),
+    "semi_axes": _Rows("semi_axes", ("a", "b", "c"), widths),
+    "rotations": _Rows("rotation", ("q_w", "q_x", "q_y", "q_z"), quaternions),
+}
 
 
 class Many(Surface):
     """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
 
     centers: Any
+    # Of one body
+    kind: ClassVar[type[Surface]]
     # The corners of the cell that repeats, in a scene in which one does.
     repeated: ClassVar[tuple[Floats, Floats] | None] = None
     # Of images, the bodies that they are of.
@@ -47,6 +64,10 @@ class Many(Surface):
         for what in ("rotation", "mass", "inertia"):
             if getattr(self, what) is not None:
                 raise SceneError(f"{what} must be None for {name}, got {getattr(self, what)!r}")
+        object.__setattr__(self, "centers", (balls if self.kind is Sphere else bodies)("centers", self.centers))
+        for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
+            if (value := getattr(self, what)) is not None:
+                object.__setattr__(self, what, _ROWS[what].checked(what, value, len(self)))
 
     def __len__(self) -> int:
         return len(self.centers)
@@ -63,7 +84,7 @@ class Many(Surface):
     def columns(cls) -> dict[str, tuple[str, ...]]:
         """The columns of a file that hold each argument of the bodies."""
         known = {field.name for field in fields(cls)}
-        return {argument: names for argument, names in _COLUMNS.items() if argument in known}
+        return {argument: rows.columns for argument, rows in _ROWS.items() if argument in known}
 
     @classmethod
     def needed(cls) -> list[str]:
@@ -74,7 +95,9 @@ class Many(Surface):
 
     def solids(self) -> list[Surface]:
         """Every body as a surface of its own."""
-        raise NotImplementedError
+        given = {_ROWS[name].of_one: getattr(self, name) for name in self.columns() if getattr(self, name) is not None}
+        rows = zip(*(values.tolist() for values in given.values()), strict=True)
+        return [self.kind(**dict(zip(given, row, strict=True)), side="outside") for row in rows]  # type: ignore[call-arg]
 
     def corners(self) -> tuple[Floats, Floats]:
         """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...kernel.vector import vec
-from ...rows import balls, lengths
-from ..shapes.sphere import ball
+from ..shapes.sphere import Sphere, ball
+from ..surface import Surface
 from .many import Floats, Many, field_of
 from .members import Members, aligned
 
@@ -35,14 +35,10 @@ class Spheres(Many):
     array([0.  , 0.15])
     """
 
+    kind: ClassVar[type[Surface]] = Sphere
     centers: Any
     radii: Any
     side: str = "outside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "centers", balls("centers", self.centers))
-        object.__setattr__(self, "radii", lengths("radii", self.radii, len(self)))
 
     def size(self) -> float:
         return float(self.radii.min())
