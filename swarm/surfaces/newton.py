@@ -2,7 +2,7 @@
 
 import math
 
-from ..kernel.jit import inlined, outlined
+from ..kernel.jit import outlined
 from ..kernel.vector import Vec, dot, largest
 from . import contract
 
@@ -61,7 +61,6 @@ def _resolved(surface, r, strength):
     return Vec(math.nan, math.nan, math.nan)
 
 
-@inlined
 def _unpushed(surface, r, strength, f):
     """(I + strength H)^-1 f, H at a point, by the adjugate."""
     h = contract.hessian(surface, r)
@@ -73,7 +72,6 @@ def _unpushed(surface, r, strength, f):
     return inverse * Vec(dot(Vec(aa, ab, ac), f), dot(Vec(ab, bb, bc), f), dot(Vec(ac, bc, cc), f))
 
 
-@inlined
 def _converged(change, previous, size):
     """Whether an iteration has reached round-off: its change is below it, or is near it and shrinks no more."""
     return change <= _EPSILON * size or (change >= previous and change <= _NOISE * size)

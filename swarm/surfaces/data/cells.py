@@ -4,12 +4,11 @@ In a cell a cubic is between the least and the largest of its Bernstein coeffici
 coefficients are differences of these: bounds that hold, not samples.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.jit import Array
+from ...kernel.record import Record
 from .spline import MARGIN
 
 Floats = NDArray[np.float64]
@@ -35,7 +34,7 @@ _MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 _PARTS = 4.0
 
 
-class Cells(NamedTuple):
+class Cells(Record):
     """What is known of each cell, in few bytes: a flight comes through many."""
 
     clear: Array  # uint8 (cells along x, y, z): 0 if the surface may be in it, else 1 + the clearance/unit

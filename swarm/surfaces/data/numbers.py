@@ -1,9 +1,8 @@
 """What kernels know of a sampled surface: its level set."""
 
 import math
-from typing import NamedTuple
 
-from ...kernel.jit import inlined
+from ...kernel.record import Record
 from ...kernel.vector import absolute, dot, norm, times, total
 from .. import contract
 from . import spline as splines
@@ -11,7 +10,7 @@ from .cells import Cells
 from .spline import Spline
 
 
-class SampledNumbers(NamedTuple):
+class SampledNumbers(Record):
     """The numbers of a sampled surface."""
 
     spline: Spline
@@ -34,7 +33,6 @@ def _(surface, r):
     return slope
 
 
-@inlined
 def coordinates(surface, r):
     """The magnitudes of those that round a point, in the scene and in the grid: near the origin these are larger."""
     return absolute(r) + absolute(r - surface.spline.low)

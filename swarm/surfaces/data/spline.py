@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.fours import Four, over_block, sum_of
-from ...kernel.jit import Array, inlined, outlined
+from ...kernel.jit import Array, outlined
+from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, norm, times
 
 Floats = NDArray[np.float64]
@@ -20,7 +21,7 @@ LEAST = 4
 MARGIN = 1e-6
 
 
-class Spline(NamedTuple):
+class Spline(Record):
     """Coefficients of cells from `low` on, two more along each axis than there are samples."""
 
     low: Vec
@@ -83,7 +84,6 @@ class Place(NamedTuple):
     off: Vec
 
 
-@inlined
 def place_of(spline, r):
     """The `Place` of a point, or of the nearest point of the grid."""
     u, n = times(r - spline.low, spline.inverse), spline.shape
@@ -93,12 +93,10 @@ def place_of(spline, r):
     return Place(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, spline.width))
 
 
-@inlined
 def _within(u, count):
     return np.minimum(np.maximum(u, -MARGIN), count + MARGIN)
 
 
-@inlined
 def _whole(u, count):
     return np.maximum(np.minimum(np.floor(u), count - 1.0), 0.0)
 
@@ -106,7 +104,6 @@ def _whole(u, count):
 # --- Values ----------------------------------------------------------------------------------------------
 
 
-@inlined
 def basis(t):
     """The basis functions at a place in the cell."""
     s = 1.0 - t
@@ -119,21 +116,18 @@ def basis(t):
     )
 
 
-@inlined
 def _slopes(t):
     """Their derivatives."""
     s = 1.0 - t
     return Four(-0.5 * s * s, 0.5 * t * (3.0 * t - 4.0), 0.5 * s * (4.0 - 3.0 * s), 0.5 * t * t)
 
 
-@inlined
 def _bends(t):
     """Their second derivatives."""
     s = 1.0 - t
     return Four(s, t - 2.0 * s, s - 2.0 * t, t)
 
 
-@inlined
 def value_and_slope(spline, r):
     """phi and its gradient."""
     place, table, k = place_of(spline, r), spline.coefficients, spline.inverse
@@ -178,7 +172,6 @@ def half_bend(spline, r):
 # --- Differences -----------------------------------------------------------------------------------------
 
 
-@inlined
 def _steps(t0, t1, d):
     """The basis functions at t1 less those at t0, without cancellation; d is t1 - t0."""
     s0, s1 = 1.0 - t0, 1.0 - t1

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel.jit import Array, index, inlined, kernel, outlined, select
+from ...kernel.jit import Array, index, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
 from .. import contract, flights
@@ -249,7 +249,6 @@ def nearest(members, points, found):
         found[3, i] = best
 
 
-@inlined
 def _within(place, count):
     return min(max(place, 0.0), count - 1.0)
 
@@ -272,6 +271,5 @@ def _least_in_shell(members, r, center, shell):
     return best, which
 
 
-@inlined
 def _around(place, shell, count):
     return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import inlined, outlined, select
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..course import rise_time
@@ -45,7 +46,7 @@ class Bend(NamedTuple):
         return cls(least, most, Symmetric(*low.min(axis=1).tolist()), Symmetric(*high.max(axis=1).tolist()))
 
 
-class OwnNumbers(NamedTuple):
+class OwnNumbers(Record):
     """The numbers of a surface by functions. The box is relative to the center."""
 
     center: Vec
@@ -97,7 +98,6 @@ def _(surface):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@inlined
 def _outside(surface, r):
     """The distance outside the box, by its largest component; below 0 inside."""
     d = r - surface.center
@@ -164,7 +164,6 @@ def _straight(surface, r, v):
     return t, False
 
 
-@inlined
 def _quadratic(v, high, low):
     """The upper bound of v.H v for entries of H from `low` to `high`; the lower bound with the two exchanged."""
     xy, yz, zx = 2.0 * v.x * v.y, 2.0 * v.y * v.z, 2.0 * v.z * v.x
@@ -173,7 +172,6 @@ def _quadratic(v, high, low):
     return sum + select(yz > 0.0, high.yz, low.yz) * yz + select(zx > 0.0, high.zx, low.zx) * zx
 
 
-@inlined
 def _in_box(surface, r, v):
     """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
     d, low, high = r - surface.center, surface.low, surface.high
@@ -183,7 +181,6 @@ def _in_box(surface, r, v):
     return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)
 
 
-@inlined
 def _between(low, high, x, v):
     """When a flight is between two planes: (from, until)."""
     if v == 0.0:
