@@ -4,7 +4,7 @@ Fields come before all other walls: whether a scene has one is the type of its c
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from ..kernel.jit import select
@@ -31,12 +31,16 @@ class Listed(Field):
     """A field of walls that are surfaces of their own: each has a row of what it gives."""
 
 
-def chain_of(surfaces: Sequence[Surface]) -> Chain | None:
+def linked(firsts: Iterable[Any], rest: Any = None, link: Any = Chain) -> Any:
+    """A chain of these, in their order, and then the rest."""
+    for first in reversed(list(firsts)):
+        rest = link(first, rest)
+    return rest
+
+
+def chain_of(surfaces: Iterable[Surface]) -> Any:
     """The walls of `surfaces` as a chain, in their order."""
-    chain = None
-    for wall in reversed([wall for surface in surfaces for wall in surface.walls()]):
-        chain = Chain(wall, chain)
-    return chain
+    return linked(wall for surface in surfaces for wall in surface.walls())
 
 
 def each(chain):

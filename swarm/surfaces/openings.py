@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..kernel.jit import select
 from . import contract, required
 from .fields.many import Many
-from .fold import Chain, Field, chain_of, each
+from .fold import Chain, Field, chain_of, each, linked
 from .images import Lengths, images_of
 from .kinds import by_kind
 from .room import has_room
@@ -58,11 +58,9 @@ def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Sur
     return found
 
 
-def _chain_of(volumes: Sequence[Surface]) -> Chain | None:
-    chain = None
-    for volume in by_kind(volumes, lambda volume: volume.walls()):
-        chain = Chain(Field(volume.members, None) if isinstance(volume, Many) else chain_of([volume]), chain)
-    return chain
+def _chain_of(volumes: Sequence[Surface]) -> Any:
+    ordered = reversed(by_kind(volumes, lambda volume: volume.walls()))
+    return linked(Field(one.members, None) if isinstance(one, Many) else chain_of([one]) for one in ordered)
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ...motion import Placed
-from ..fold import Chain, Field, Listed
+from ..fold import Chain, Field, Listed, chain_of, linked
 from ..kinds import by_kind
 from ..moving import walls_of
 from ..surface import Surface
@@ -85,14 +85,9 @@ def chain_in(
 
     `groups` are the order's fields, and `taken` says how kernels take a field.
     """
-    chain: Chain | Field | None = None
-    for wall in reversed([wall for one in (*(surfaces[i] for i in order.others), *own) for wall in one.walls()]):
-        chain = Chain(wall, chain)
-    for members in reversed(groups):
-        chain = Listed(taken(members), chain)
-    for i in reversed(order.fields):
-        chain = Field(taken(surfaces[i].walls()[0]), chain)
-    return chain
+    chain = chain_of([*(surfaces[i] for i in order.others), *own])
+    chain = linked(map(taken, groups), chain, Listed)
+    return linked((taken(surfaces[i].walls()[0]) for i in order.fields), chain, Field)  # type: ignore[no-any-return]
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

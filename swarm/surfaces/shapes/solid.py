@@ -16,7 +16,7 @@ from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract, flights
 from ..approach import place, under_way
 from ..course import rise_near
-from ..fold import Chain, each
+from ..fold import each, linked
 from ..rotation import Rotated
 from .plane import PlaneNumbers
 from .slab import SlabNumbers, near_face_hit
@@ -48,10 +48,7 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
         parts: numbers of walls with side -1, or of planes, whose part is where normal.r > offset.
         extent: distance from the origin within which the parts' centres lie [m], where that is far.
     """
-    chain = None
-    for part in reversed(parts):
-        chain = Chain(part, chain)
-    return SolidNumbers(chain, -1.0, float(extent))
+    return SolidNumbers(linked(parts), -1.0, float(extent))
 
 
 def _sign(part):
