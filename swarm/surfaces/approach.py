@@ -12,13 +12,13 @@ from ..kernel.gravity import Gravity, accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from . import contract, flights
-from .course import positive, rise_by, rise_time
+from .course import Majorant, positive, rise_by
 
 # Steps of a flight that is asked for alone; what is not found by then goes on in the next pass.
 _STEPS = 100
 
 
-class Near(Record):
+class Near(Majorant):
     """The level from one place of a flight on, nowhere above c + 2 b t + a2 t^2 + a3 t^3 + ...
 
     The window is a time for which that says something. A step that leaves no more than `nearly` of the level is the
@@ -35,9 +35,9 @@ class Near(Record):
     border: Any = None  # None or `Border`
 
     def bounds(self, reach):
-        """(s, m, a) of a step as far as its reach.
+        """(the level with the a2 of a step as far as its reach, s, m).
 
-        Up to there a t^2 + s t^3 is at least the terms from t^2 on, and their sum from t^3 on of a magnitude of at most
+        Up to there the terms from t^3 on are at most s t^3, beyond a border with a2, and of a magnitude of at most
         m t^3.
         """
         # The reach is infinite only where the level is a parabola.
@@ -46,13 +46,11 @@ class Near(Record):
         for a in reversed(self.higher[:-1]):
             rise, size = positive(a) + t * rise, abs(a) + t * size
         if self.border is None:
-            return rise, size, self.a2
+            return self, rise, size
         beyond = self.border.beyond(t)
-        return (
-            rise,
-            size + beyond / select(t > 0.0, t, math.inf),
-            self.a2 + select(self.border.rises, beyond, 0.0),
-        )
+        a2 = self.a2 + select(self.border.rises, beyond, 0.0)
+        above = Near(self.c, self.b, a2, self.higher, self.window, self.nearly, self.meets, self.border)
+        return above, rise, size + beyond / select(t > 0.0, t, math.inf)
 
     def ended(self, time, reach, size):
         """(the step, its length or 0 if it is the last)."""
@@ -63,11 +61,8 @@ class Near(Record):
 
     def first_step(self):
         """The first step of a flight: (t, its length, 0 if it is the last)."""
-        rise, size, a2 = self.bounds(self.window)
-        time = rise_time(self.c, self.b, a2 + rise_by(rise, self.window))
-        # See `leave` in course.py.
-        leaving = rise_time(2.0 * self.b, 0.5 * a2, rise)
-        return self.ended(select((self.b <= 0.0) & (leaving > time), leaving, time), self.window, size)
+        above, rise, size = self.bounds(self.window)
+        return self.ended(above.rises_after_leaving(rise, self.window), self.window, size)
 
     def next_step(self, t, last):
         """One step more of a flight, from where the steps until t have led: (t, its length, 0 if it is the last).
@@ -75,8 +70,8 @@ class Near(Record):
         The parabola holds for twice the last step, or without end where the level is one itself.
         """
         reach = select(self.window < math.inf, 2.0 * last, math.inf)
-        rise, size, a2 = self.bounds(reach)
-        step, length = self.ended(rise_time(self.c, self.b, a2 + rise_by(rise, reach)), reach, size)
+        above, rise, size = self.bounds(reach)
+        step, length = self.ended(above.rises(rise, reach), reach, size)
         goes_on = under_way(t, last)
         return select(goes_on, t + step, t), select(goes_on, length, last)
 

@@ -7,15 +7,15 @@ import math
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from .course import rise_time
+from .course import Majorant, rise_time
 
 
-class Level(Record):
+class Level(Majorant):
     """A level whose third derivative has a bound: f, f'/2, f''/2, |grad q| and m."""
 
-    level: float
-    half: float
-    bend: float
+    c: float
+    b: float
+    a2: float
     steepness: float
     magnitude: float
 
@@ -26,19 +26,14 @@ class Level(Record):
 
     def own_rise(self):
         """When its own parabola rises."""
-        return rise_time(self.level, self.half, self.bend)
+        return rise_time(self.c, self.b, self.a2)
 
-    def rise(self, sixth, within, is_first):
+    def soonest(self, sixth, within, is_first):
         """When it rises at the soonest, if a sixth of f''' is bounded within that time.
 
-        From the wall inwards f is t (f' + f''/2 t + ...), one power of t nearer to it than the parabola. The later of
-        both counts: how deep a particle is that leaves no wall, the parabola alone knows.
+        How deep a particle is that leaves no wall, the parabola alone knows.
         """
-        time = rise_time(self.level, self.half, self.bend + sixth * within)
-        if is_first:
-            leaving = rise_time(2.0 * self.half, 0.5 * self.bend, sixth)
-            time = select((self.half <= 0.0) & (leaving > time), leaving, time)
-        return time
+        return self.rises_after_leaving(sixth, within) if is_first else self.rises(sixth, within)
 
 
 class Between(Record):
@@ -66,7 +61,7 @@ class Between(Record):
         over, under = select(reaches, -c, b + root), select(reaches, b + root, -a)
         return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
 
-    def rise(self, sixth, within, is_first):
+    def soonest(self, sixth, within, is_first):
         """When one of them rises at the soonest, as of a `Level`."""
         b, k = self.half, sixth * within
         c, a = self.place - self.radius, self.bend + k

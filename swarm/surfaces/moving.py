@@ -29,10 +29,13 @@ class Moving(Driven):
     body: Any
     drive: Drive
 
+    posed = Posed
+
     def during(self, left, after):
         """The wall over a step, at whose start and end so much of the frame is left [s]."""
         start = self.drive.pose(left)
-        return Posed(self.body, start, start if after is left else self.drive.pose(after), self.drive, left, after)
+        end = start if after is left else self.drive.pose(after)
+        return self.posed(self.body, start, end, self.drive, left, after)
 
     def seen(self, flight, t):
         left = flight.left - t
@@ -42,8 +45,7 @@ class Moving(Driven):
 class Translated(Moving):
     """A wall in uniform translation, with or without a spin that leaves the surface as it is."""
 
-    def during(self, left, after):
-        return Drifting(*super().during(left, after))
+    posed = Drifting
 
     def seen(self, flight, t):
         return None

@@ -39,8 +39,8 @@ class Step(Record):
     time: float
 
 
-class Majorant(Record):
-    """What is above a level along a flight."""
+class Ahead(Record):
+    """A level along a flight, and what bounds it for some time ahead."""
 
     def rise(self, within):
         """When it rises through 0, with bounds that hold for so long."""
@@ -59,7 +59,7 @@ class Majorant(Record):
         return time
 
 
-class Bent(Majorant):
+class Bent(Ahead):
     """Of a level whose second derivative has a bound."""
 
     seen: Seen
@@ -82,7 +82,7 @@ class Bent(Majorant):
         return max(step, self.clear / some)
 
 
-class Known(Majorant):
+class Known(Ahead):
     """Of a level whose third derivative has one."""
 
     body: Any
@@ -95,7 +95,7 @@ class Known(Majorant):
 
     def rise(self, within):
         here = self.level
-        return rise_time(here.level, here.half, here.bend + self.third(within) * within * (1.0 / 6.0))
+        return rise_time(here.c, here.b, here.a2 + self.third(within) * within * (1.0 / 6.0))
 
 
 # --- A safe step of one wall -----------------------------------------------------------------------------
@@ -133,7 +133,7 @@ def safe_step(body, seen, longest):
 
 def _level_step(here, body, seen, longest):
     """The `Step` of a level."""
-    return Step(here.level, here.half, Known(body, seen, here).longest(min(here.own_rise(), longest)))
+    return Step(here.c, here.b, Known(body, seen, here).longest(min(here.own_rise(), longest)))
 
 
 def _slab_step(body, seen, longest):

@@ -82,7 +82,7 @@ def _first_stride(known, within, is_first):
     first, wall, meets_first = math.inf, -1.0, False
     for number, one in known:
         sixth, level = one.third(within) * (1.0 / 6.0), one.level
-        time = level.rise(sixth, within, is_first)
+        time = level.soonest(sixth, within, is_first)
         # The parabola is above f by no more than this.
         meets = 2.0 * sixth * within * time * time <= _EPSILON * one.seen.coordinates * level.steepness
         mine = time < first
