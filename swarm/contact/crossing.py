@@ -10,7 +10,7 @@ from ..surfaces import fold as walls
 from ..surfaces.fields.grid import block_of, in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried, at
-from ..surfaces.posed import Posed, in_frame, own_place, rising, straight_hit
+from ..surfaces.posed import Posed, straight_hit
 from .hold import is_held_by
 
 _EPSILON = 2.220446049250313e-16
@@ -86,8 +86,8 @@ def own_path(field, ends, path):
 
 @own_path.register(Posed)
 def _(field, ends, path):
-    r0, v0 = own_place(field, path.r0), in_frame(field, path.r0, path.v0)
-    return Path(r0, v0, own_place(ends, path.r1), in_frame(ends, path.r1, path.v1), path.h)
+    r0, v0 = field.own_place(path.r0), field.own_velocity(path.r0, path.v0)
+    return Path(r0, v0, ends.own_place(path.r1), ends.own_velocity(path.r1, path.v1), path.h)
 
 
 @inlined
@@ -118,7 +118,8 @@ def _level(surface, r, v):
     """The level of a wall, its rate of change, and the length of its gradient."""
     n = contract.unit_normal(surface, r)
     scale = abs(dot(n, contract.slope(surface, r)))
-    return contract.level_of(surface, contract.inner(surface, r)), scale * rising(surface, n, r, v), scale
+    speed = dot(n, v - contract.velocity(surface, r))
+    return contract.level_of(surface, contract.inner(surface, r)), scale * speed, scale
 
 
 @by_type

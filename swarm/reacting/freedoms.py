@@ -10,7 +10,7 @@ from typing import NamedTuple
 from ..kernel.jit import Array, by_type, index, inlined, select
 from ..kernel.vector import ZERO, Vec, column, cross, dot, norm, put, square
 from ..surfaces import contract
-from ..surfaces.drive import Drive, Pose, Rows, Swing, Turn, pose
+from ..surfaces.drive import Drive, Pose, Rows, Swing, Turn
 from ..surfaces.fold import Chain
 from ..surfaces.posed import Posed
 
@@ -164,7 +164,7 @@ def posed(freedom, body, walls, t):
 @posed.register(Hinged)
 def _(freedom, body, walls, t):
     drive = drive_of(freedom, walls, t)
-    here = pose(drive, 0.0)
+    here = drive.pose(0.0)
     return Posed(body, here, here, drive, 0.0, 0.0)
 
 

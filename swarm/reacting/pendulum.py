@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from ..kernel.jit import index, inlined
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from ..surfaces.drive import Drive, Pose, Turn
-from ..surfaces.posed import Posed, arm_length, frame_pull, in_frame, own_place
-from ..surfaces.relative import Framed, Seen, motion_of
+from ..surfaces.moving import Driven
+from ..surfaces.posed import Posed
 from .freedoms import arm_of, drive_of, mobility, pose_of, posed, push, renew, rows_about, stays
 
 # Terms of the polynomial, and the part of the radius that it is for.
@@ -29,7 +29,7 @@ class Pendulum(NamedTuple):
     rest: float  # the angle at which it hangs [rad]
 
 
-class Swaying(NamedTuple):
+class Swaying(Driven):
     """A pendulum as flights meet it, from a time on."""
 
     body: Any
@@ -37,6 +37,13 @@ class Swaying(NamedTuple):
     freedom: Pendulum
     walls: Any
     start: float
+
+    def seen(self, flight, t):
+        """A particle as safe steps to the pendulum see it."""
+        freedom, walls, time = self.freedom, self.walls, self.start + t
+        now = posed(freedom, self.body, walls, time)
+        euler = angle_at(freedom, walls, time).acceleration * cross(freedom.axis, arm_of(freedom, flight.place(t)))
+        return flight.seen(t, now, flight.pull - euler)._replace(drive=self.drive)
 
 
 # --- The angle -------------------------------------------------------------------------------------------
@@ -164,18 +171,3 @@ def swaying(freedom, body, walls, flight, longest):
     turn, jerks = Turn(ZERO, ZERO, ZERO, freedom.axis, fastest), Vec(jerk, jerk, jerk)
     bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, freedom.center, 0.0, hard, jerk, math.inf, 0.0, jerks)
     return Swaying(body, bounds, freedom, walls, flight.time)
-
-
-@motion_of.register(Swaying)
-def _(wall, last, flight, t):
-    freedom, walls, time = wall.freedom, wall.walls, wall.start + t
-    here = pose_of(freedom, walls, time)
-    now = Posed(0.0, here, here, drive_of(freedom, walls, time), 0.0, 0.0)
-    r, v = flight.r + t * (flight.v + (0.5 * t) * flight.pull), flight.v + t * flight.pull
-    euler = angle_at(freedom, walls, time).acceleration * cross(freedom.axis, arm_of(freedom, r))
-    seen = Seen(
-        own_place(now, r), in_frame(now, r, v), frame_pull(now, r, v, flight.pull - euler),
-        flight.speed + t * flight.weight, arm_length(here.turn, now, r), flight.weight,
-        abs(r.x) + abs(r.y) + abs(r.z),
-    )  # fmt: skip
-    return Framed(wall.drive, seen)

@@ -240,7 +240,7 @@ def may_be_far(surface):
 def near(surface, gravity, r, v):
     """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
 
-    A `Near` or `NearFall` of approach.py; `gravity` is None where the flight is straight.
+    A `Near` of approach.py; `gravity` is None where the flight is straight.
     """
     raise NotImplementedError
 

@@ -5,11 +5,12 @@ first root is found by safe steps: none is skipped, however close to a double on
 """
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernel.jit import inlined, select
+from ..kernel.jit import select
+from ..kernel.record import Record
 from ..kernel.vector import cross, dot, square
 
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
@@ -25,7 +26,29 @@ _FAR = 32.0
 _NO_HIT = float(np.finfo(np.float64).tiny)
 
 
-class Quartic(NamedTuple):
+class Majorant(Record):
+    """A level from one time of a flight on, c + 2 b t + a2 t^2 + ..., whose rest has a bound s t^3 up to a time."""
+
+    if TYPE_CHECKING:
+        c: Any
+        b: Any
+        a2: Any
+
+    def rises(self, slope, within):
+        """When it rises through 0 at the soonest, with the bound s that holds for so long."""
+        return rise_time(self.c, self.b, self.a2 + rise_by(slope, within))
+
+    def leaves(self, slope):
+        """When 2 b t + a2 t^2 + s t^3 rises through 0: from a wall inwards the level is one power of t nearer to it."""
+        return rise_time(2.0 * self.b, 0.5 * self.a2, slope)
+
+    def rises_after_leaving(self, slope, within):
+        """The later of both, where it does not rise at once."""
+        time, leaving = self.rises(slope, within), self.leaves(slope)
+        return select((self.b <= 0.0) & (leaving > time), leaving, time)
+
+
+class Quartic(Majorant):
     """The level of a fall, c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4, and the time in which it crosses the surface's size.
 
     The window is infinite where the level is a parabola; from afar both are as `level_and_window` says.
@@ -38,8 +61,26 @@ class Quartic(NamedTuple):
     a4: float
     window: float
 
+    def steepest(self, within):
+        """s >= 0 with a3 t^3 + a4 t^4 <= s t^3 up to this time."""
+        return positive(self.a3 + select(self.a4 > 0.0, self.a4 * within, 0.0))
 
-@inlined
+    def moved(self, t):
+        """The level from a later time on, by Horner's scheme of what Horner's scheme leaves."""
+        a4 = self.a4
+        a3t = self.a3 + t * a4
+        a2t = self.a2 + t * a3t
+        twice_bt = 2.0 * self.b + t * a2t
+        ct = self.c + t * twice_bt
+        a3t = a3t + t * a4
+        a2t = a2t + t * a3t
+        bt = 0.5 * (twice_bt + t * a2t)
+        a3t = a3t + t * a4
+        a2t = a2t + t * a3t
+        a3t = a3t + t * a4
+        return Quartic(ct, bt, a2t, a3t, a4, self.window)
+
+
 def rise_time(c, b, a):
     """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
 
@@ -48,7 +89,6 @@ def rise_time(c, b, a):
     return rise_time_by(c, b, a, b * b - a * c)
 
 
-@inlined
 def rise_time_by(c, b, a, discriminant):
     """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
     time, bottom = _outer_root(c, b, a, discriminant)
@@ -56,14 +96,12 @@ def rise_time_by(c, b, a, discriminant):
     return select(misses, math.inf, select(time > 0.0, time, 0.0))
 
 
-@inlined
 def rise_time_inside(c, b, a):
     """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
     time, bottom = _outer_root(c, b, a, b * b - a * c)
     return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
 
 
-@inlined
 def _outer_root(c, b, a, discriminant):
     """The root at which c + 2 b t + a t^2 rises, and its denominator."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
@@ -74,7 +112,6 @@ def _outer_root(c, b, a, discriminant):
     return select(approaching, -c, root - b) / bottom, bottom
 
 
-@inlined
 def ball_rise_time(side, radius2, d, v):
     """`rise_time` for |d + v t|^2 - R^2, from however far."""
     c, b, a = square(d) - radius2, dot(d, v), square(v)
@@ -83,7 +120,6 @@ def ball_rise_time(side, radius2, d, v):
     return rise_time_by(side * c, side * b, side * a, select(c > radius2, from_afar, b * b - a * c))
 
 
-@inlined
 def level_and_window(c, own, size, speed2, pull2):
     """(c, window) of a fall's course by its level, the level's sizes on the surface and here, square speed and pull.
 
@@ -95,52 +131,40 @@ def level_and_window(c, own, size, speed2, pull2):
     return select(far, 1.0 - 1.0 / (_FAR * _FAR), 1.0) * c, select(far, -window, window)
 
 
-@inlined
 def safe_rise_time(level):
     """A time up to |window| during which a level surely stays <= 0."""
     window = abs(level.window)
-    time = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, window), window))
+    time = level.rises(level.steepest(window), window)
     return select(level.c > 0.0, 0.0, select(time < window, time, window))
 
 
-@inlined
 def rise_near(level):
     """(a time up to |window| during which a level surely stays <= 0, whether it rises then), near to its first rise.
 
     The parabola of twice the time that the one of the window gives is less far above the level.
     """
     window = abs(level.window)
-    first = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, window), window))
+    first = level.rises(level.steepest(window), window)
     rises, leaving = first <= window, leave(level)[0]
     time = select(rises, first, window)
     rises, time = rises & (leaving <= time), select(leaving > time, leaving, time)
     reach = 2.0 * time
-    again = rise_time(level.c, level.b, level.a2 + rise_by(_steepest(level.a3, level.a4, reach), reach))
+    again = level.rises(level.steepest(reach), reach)
     within = select(again < reach, again, reach)
     later = within > time
     return select(later, within, time), select(later, again <= reach, rises) & (level.window > 0.0)
 
 
-@inlined
-def _steepest(a3, a4, window):
-    """s >= 0 with a3 t^3 + a4 t^4 <= s t^3 up to the window: c + 2 b t + (a2 + s window) t^2 rises first."""
-    slope = a3 + select(a4 > 0.0, a4 * window, 0.0)
-    return positive(slope)
-
-
-@inlined
 def positive(a):
     """max(a, 0)"""
     return select(a > 0.0, a, 0.0)
 
 
-@inlined
 def rise_by(slope, window):
     """slope * window, 0 where the window is infinite because the level is a parabola."""
     return select(slope > 0.0, slope * window, 0.0)
 
 
-@inlined
 def leave(level):
     """The first safe step of a flight that does not rise at once: (t, what `safe_step` takes as the last length).
 
@@ -149,19 +173,17 @@ def leave(level):
     ceiling needs: the parabola of the whole window rises at once there.
     """
     window = abs(level.window)
-    time = rise_time(2.0 * level.b, 0.5 * level.a2, _steepest(level.a3, level.a4, window))
+    time = level.leaves(level.steepest(window))
     time = select(level.b <= 0.0, select(time < window, time, window), 0.0)
     return time, select(time < math.inf, math.inf, 0.0)
 
 
-@inlined
 def close(window):
     """What reach step^2 is at most in a step that leaves nothing."""
     window = abs(window)
     return _CLOSE * window * window * window
 
 
-@inlined
 def safe_step(may_be_far, level, nearly, t, last):
     """One step towards the first rise of a level through 0: (t, its length).
 
@@ -175,33 +197,19 @@ def safe_step(may_be_far, level, nearly, t, last):
     if may_be_far:
         there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
     reach = select(2.0 * last < window, 2.0 * last, window)
-    # The Taylor coefficients at t, by Horner's scheme of what Horner's scheme leaves
-    a4 = level.a4
-    a3t = level.a3 + t * a4
-    a2t = level.a2 + t * a3t
-    twice_bt = 2.0 * level.b + t * a2t
-    ct = level.c + t * twice_bt
-    a3t = a3t + t * a4
-    a2t = a2t + t * a3t
-    bt = 0.5 * (twice_bt + t * a2t)
-    a3t = a3t + t * a4
-    a2t = a2t + t * a3t
-    a3t = a3t + t * a4
-    slope = _steepest(a3t, a4, reach)
-    time = rise_time(ct, bt, a2t + rise_by(slope, reach))
+    here = level.moved(t)
+    time = here.rises(here.steepest(reach), reach)
     step = select(time < reach, time, reach)
     # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
     at_root = time <= reach
     return t + step, select(at_root & (reach * step * step <= nearly), there, step)
 
 
-@inlined
 def arrived(last):
     """Whether a safe step was the last."""
     return last == 0.0
 
 
-@inlined
 def first_rise(may_be_far, level):
     """`first_hit` for a level, by safe steps."""
     t, last = leave(level)

@@ -5,30 +5,89 @@ count back from the end of the frame under way, so that they have the digits of 
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from .. import motion as motions
 from ..kernel.angle import sine_and_versine
-from ..kernel.jit import Array, by_type, inlined
+from ..kernel.jit import Array, select
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, vec
-from .fold import Chain
+from .fold import Chain, each
 from .surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
 _SLOW = 0.05
 
 
-class Swing(NamedTuple):
+class Rows(Record):
+    """The rows of the matrix of a rotation A."""
+
+    x: Vec
+    y: Vec
+    z: Vec
+
+    def out(self, a):
+        """A a"""
+        return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
+
+    def back(self, a):
+        """A^T a"""
+        return self.x * a.x + self.y * a.y + self.z * a.z
+
+
+class Pose(Record):
+    """Where a wall is at one instant: d, d', d'' and the rows of A, or None."""
+
+    shift: Vec
+    velocity: Vec
+    acceleration: Vec
+    turn: Any
+
+    def out(self, a):
+        """A direction of the frame of the wall in the scene."""
+        return a if self.turn is None else self.turn.out(a)
+
+    def back(self, a):
+        """A direction of the scene in the frame of the wall."""
+        return a if self.turn is None else self.turn.back(a)
+
+    def place_out(self, center, r):
+        """A point of the frame of the wall in the scene: c + d + A (r - c)."""
+        return (r if self.turn is None else center + self.turn.out(r - center)) + self.shift
+
+    def place_back(self, center, r):
+        """A point of the scene in the frame of the wall."""
+        r = r - self.shift
+        return r if self.turn is None else center + self.turn.back(r - center)
+
+
+class Swing(Record):
     """C (cos(w t) - 1) + S sin(w t), with the time t since the end of the frame."""
 
     cosine: Vec
     sine: Vec
     rate: float
 
+    def added(self, t, d, v, a):
+        """A displacement and its first two derivatives with those of the swing added."""
+        s, versine = sine_and_versine(self.rate * t)
+        c = 1.0 - versine
+        return (
+            d + self.sine * s - self.cosine * versine,
+            v + self.rate * (self.sine * c - self.cosine * s),
+            a - (self.rate * self.rate) * (self.sine * s + self.cosine * c),
+        )
 
-class Track(NamedTuple):
+    def mean_velocity(self, middle, h):
+        """w sinc(w h/2) (S cos w m - C sin w m) over a time h around the middle m."""
+        angle = self.rate * middle
+        here = self.sine * math.cos(angle) - self.cosine * math.sin(angle)
+        return (self.rate * _sinc(0.5 * self.rate * h)) * here
+
+
+class Track(Record):
     """A spline: d(t) less its value at the end of the frame, which is at the time `now`."""
 
     times: Array  # (knots,)
@@ -36,8 +95,31 @@ class Track(NamedTuple):
     end: Vec
     now: float
 
+    def at(self, t):
+        """Its value and first two derivatives."""
+        now = self.now + t
+        low, high = 0, self.times.size - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if self.times[middle] <= now:
+                low = middle
+            else:
+                high = middle
+        s, cubics = now - self.times[low], self.cubics
+        a, b, c, d = (Vec(cubics[k, 0, low], cubics[k, 1, low], cubics[k, 2, low]) for k in range(4))
+        return (
+            (a - self.end) + s * (b + s * (c + s * d)),
+            b + s * (2.0 * c + (3.0 * s) * d),
+            2.0 * c + (6.0 * s) * d,
+        )
 
-class Turn(NamedTuple):
+    def mean_velocity(self, middle, h):
+        """By Simpson's rule, exact within a piece."""
+        first, second, third = self.at(middle - 0.5 * h)[1], self.at(middle)[1], self.at(middle + 0.5 * h)[1]
+        return (first + 4.0 * second + third) * (1.0 / 6.0)
+
+
+class Turn(Record):
     """The rotation about an axis through the centre: the rows of A at the end of the frame, and the rate [rad/s]."""
 
     x: Vec
@@ -46,8 +128,24 @@ class Turn(NamedTuple):
     axis: Vec
     rate: float
 
+    def at(self, t):
+        """The rows of A."""
+        # A(t) = A R, with the rotation R about the same axis: the rows of A, turned back.
+        s, versine = sine_and_versine(self.rate * t)
+        k = self.axis
+        # row cos a + (1 - cos a) k (k.row) - sin a k x row
+        return Rows(*(row + versine * (dot(k, row) * k - row) - s * cross(k, row) for row in (self.x, self.y, self.z)))
 
-class Drive(NamedTuple):
+    def mean_velocity(self, middle, h, arm):
+        """(A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
+        return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, self.at(middle).out(arm))
+
+
+def _sinc(x):
+    return select(abs(x) > 0.0, math.sin(x) / select(abs(x) > 0.0, x, 1.0), 1.0)
+
+
+class Drive(Record):
     """The motion of a wall, as kernels take it in one frame."""
 
     shift: Vec  # d at the end of the frame
@@ -64,22 +162,28 @@ class Drive(NamedTuple):
     late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
     jerks: Vec  # bounds of the components of d''' [m/s^3]
 
+    def pose(self, left):
+        """The `Pose` when so much of the frame is left [s]."""
+        t = -left
+        d, v, a = ZERO, ZERO, ZERO
+        for link in reversed(each(self.swings)):
+            d, v, a = link.first.added(t, d, v, a)
+        e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
+        turn = None if self.turn is None else self.turn.at(t)
+        return Pose(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
 
-class Pose(NamedTuple):
-    """Where a wall is at one instant: d, d', d'' and the rows of A, or None."""
+    def mean_velocity(self, middle, h):
+        """The mean of d' over a time h around the middle."""
+        # Not the difference of two places over the time: of a short step that has no digits left, and a particle that
+        # friction stops takes ever shorter ones.
+        swings = ZERO
+        for link in reversed(each(self.swings)):
+            swings = swings + link.first.mean_velocity(middle, h)
+        return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
 
-    shift: Vec
-    velocity: Vec
-    acceleration: Vec
-    turn: Any
-
-
-class Rows(NamedTuple):
-    """The rows of a matrix."""
-
-    x: Vec
-    y: Vec
-    z: Vec
+    def angular_speed(self):
+        """How fast the surface turns [rad/s]."""
+        return 0.0 if self.turn is None else abs(self.turn.rate)
 
 
 # --- From a description ----------------------------------------------------------------------------------
@@ -135,86 +239,3 @@ def drive_of(surface: Surface, moment: float) -> Drive:
 
 def _vector(values: Any) -> Vec:
     return vec(np.asarray(values, np.float64).tolist())
-
-
-# --- Poses -----------------------------------------------------------------------------------------------
-
-
-@by_type
-def _swung(swings, t):
-    """What oscillations add to d, d' and d''."""
-    return ZERO, ZERO, ZERO
-
-
-@_swung.register(Chain)
-def _(swings, t):
-    one = swings.first
-    d, v, a = _swung(swings.rest, t)
-    s, versine = sine_and_versine(one.rate * t)
-    c = 1.0 - versine
-    return (
-        d + one.sine * s - one.cosine * versine,
-        v + one.rate * (one.sine * c - one.cosine * s),
-        a - (one.rate * one.rate) * (one.sine * s + one.cosine * c),
-    )
-
-
-@by_type
-def tracked(track, t):
-    """What a spline adds."""
-    return ZERO, ZERO, ZERO
-
-
-@tracked.register(Track)
-def _(track, t):
-    now = track.now + t
-    low, high = 0, track.times.size - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if track.times[middle] <= now:
-            low = middle
-        else:
-            high = middle
-    s, cubics = now - track.times[low], track.cubics
-    a, b = (
-        Vec(cubics[0, 0, low], cubics[0, 1, low], cubics[0, 2, low]),
-        Vec(cubics[1, 0, low], cubics[1, 1, low], cubics[1, 2, low]),
-    )
-    c, d = (
-        Vec(cubics[2, 0, low], cubics[2, 1, low], cubics[2, 2, low]),
-        Vec(cubics[3, 0, low], cubics[3, 1, low], cubics[3, 2, low]),
-    )
-    return (
-        (a - track.end) + s * (b + s * (c + s * d)),
-        b + s * (2.0 * c + (3.0 * s) * d),
-        2.0 * c + (6.0 * s) * d,
-    )
-
-
-@by_type
-def turned(turn, t):
-    """The rows of A."""
-    return
-
-
-@turned.register(Turn)
-def _(turn, t):
-    # A(t) = A R, with the rotation R about the same axis: the rows of A, turned back.
-    s, versine = sine_and_versine(turn.rate * t)
-    return Rows(_spun(turn, turn.x, versine, s), _spun(turn, turn.y, versine, s), _spun(turn, turn.z, versine, s))
-
-
-@inlined
-def _spun(turn, row, versine, s):
-    """A row, turned back about the axis: row cos a + (1 - cos a) k (k.row) - sin a k x row."""
-    k = turn.axis
-    return row + versine * (dot(k, row) * k - row) - s * cross(k, row)
-
-
-@inlined
-def pose(drive, left):
-    """The `Pose` when so much of the frame is left [s]."""
-    t = -left
-    d, v, a = _swung(drive.swings, t)
-    e, w, b = tracked(drive.track, t)
-    return Pose(drive.shift + t * drive.velocity + d + e, drive.velocity + v + w, a + b, turned(drive.turn, t))

@@ -48,7 +48,7 @@ def first_hit(chain, gravity, r, v):
     first = NEVER
     for link in reversed(each(chain)):
         if isinstance(link, Field):
-            first = soonest(link.first.first_hit(gravity, r, v), first, count(link.first))
+            first = soonest(link.first.field_hit(gravity, r, v), first, count(link.first))
         else:
             time, found = hit(gravity, link.first, r, v)
             first = sooner(time, found, first)

@@ -5,39 +5,63 @@ without motion has none of this around its walls and pays nothing.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..kernel.jit import by_type
 from ..kernel.record import Record
 from . import contract, stroke  # noqa: F401
-from .drive import Drive, drive_of, pose
+from .drive import Drive, drive_of
 from .fold import Chain, Field
 from .posed import Drifting, Posed
 from .surface import Surface
 
 
-class Moving(Record):
+class Driven(Record):
+    """A wall that moves."""
+
+    def seen(self, flight, t):
+        """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
+        return
+
+
+class Moving(Driven):
     """A wall, or a field of them, and its motion."""
 
     body: Any
     drive: Drive
 
+    posed = Posed
+
     def count(self):
         """How many walls a field has."""
         return self.body.count()
+
+    def during(self, left, after):
+        """The wall over a step, at whose start and end so much of the frame is left [s]."""
+        start = self.drive.pose(left)
+        end = start if after is left else self.drive.pose(after)
+        return self.posed(self.body, start, end, self.drive, left, after)
+
+    def seen(self, flight, t):
+        left = flight.left - t
+        return flight.seen(t, self.during(left, left), flight.pull)
 
 
 class Translated(Moving):
     """A wall in uniform translation, with or without a spin that leaves the surface as it is."""
 
+    posed = Drifting
 
-class Following(NamedTuple):
+    def seen(self, flight, t):
+        return None
+
+
+class Following(Record):
     """A wall that moves with the one before it: both are of one surface."""
 
     body: Any
 
 
-class Carried(NamedTuple):
+class Carried(Record):
     """The walls of a scene, some of which move, all of them uniformly."""
 
     walls: Chain | Field
@@ -90,63 +114,25 @@ def walls_of(surface: Surface, moment: float) -> list[Any]:
 # --- At one instant --------------------------------------------------------------------------------------
 
 
-@by_type
 def at(chain, left):
     """The walls when so much of the frame is left [s]: themselves, where none moves."""
-    return chain
+    return during(chain, left, left)
 
 
-@by_type
 def during(chain, left, after):
     """The walls over a step, at whose start and end so much of the frame is left [s]."""
-    return chain
+    return _during(chain.walls, None, left, after) if isinstance(chain, Carried) else chain
 
 
-at.register(Carried, lambda chain, left: _during(chain.walls, None, left, left))
-during.register(Carried, lambda chain, left, after: _during(chain.walls, None, left, after))
-
-
-@by_type
 def _during(chain, last, left, after):
     """The walls of a chain; `last` is the one before them."""
-    return
+    if chain is None:
+        return None
+    wall, kind = chain.first, Field if isinstance(chain, Field) else Chain
+    if isinstance(wall, Following):
+        wall = last._replace(body=wall.body)
+    elif isinstance(wall, Moving):
+        wall = wall.during(left, after)
+    return kind(wall, _during(chain.rest, wall, left, after))
 
 
-@_during.register(Chain)
-def _(chain, last, left, after):
-    made = _wall(chain.first, last, left, after)
-    return Chain(made, _during(chain.rest, made, left, after))
-
-
-@_during.register(Field)
-def _(chain, last, left, after):
-    made = _wall(chain.first, None, left, after)
-    return Field(made, _during(chain.rest, None, left, after))
-
-
-@by_type
-def _wall(wall, last, left, after):
-    return wall
-
-
-@_wall.register(Moving)
-def _(wall, last, left, after):
-    return Posed(wall.body, pose(wall.drive, left), pose(wall.drive, after), wall.drive, left, after)
-
-
-@_wall.register(Translated)
-def _(wall, last, left, after):
-    return Drifting(wall.body, pose(wall.drive, left), pose(wall.drive, after), wall.drive, left, after)
-
-
-_wall.register(Following, lambda wall, last, left, after: _with(last, wall.body))
-
-
-@by_type
-def _with(last, body):
-    """Another wall in the place of one at an instant."""
-    return
-
-
-_with.register(Posed, lambda last, body: Posed(body, last.pose, last.end, last.drive, last.left, last.after))
-_with.register(Drifting, lambda last, body: Drifting(body, last.pose, last.end, last.drive, last.left, last.after))

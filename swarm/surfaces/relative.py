@@ -1,15 +1,11 @@
 """A free flight in the frame of a wall that moves: where the particle is, and what bounds its way from there."""
 
-from typing import NamedTuple
-
-from ..kernel.jit import by_type, inlined
+from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, norm, total
-from .drive import Drive, Turn, pose
-from .moving import Following, Moving, Translated
-from .posed import Posed, arm_length, frame_pull, in_frame, own_place
+from .drive import Drive
 
 
-class Flight(NamedTuple):
+class Flight(Record):
     """A free flight, and how much of the frame is left at its start [s]."""
 
     r: Vec
@@ -19,10 +15,36 @@ class Flight(NamedTuple):
     speed: float  # |v|
     weight: float  # |G|
 
+    def place(self, t):
+        """Where the particle is after a time."""
+        return self.r + t * (self.v + (0.5 * t) * self.pull)
 
-class Seen(NamedTuple):
+    def velocity(self, t):
+        """Its velocity then."""
+        return self.v + t * self.pull
+
+    def seen(self, t, wall, pull):
+        """The particle after a time as `Seen` in the frame of a wall `Posed` then, where this pulls it."""
+        p, v = self.place(t), self.velocity(t)
+        return Seen(
+            wall.drive, wall.own_place(p), wall.own_velocity(p, v), wall.own_pull(p, v, pull),
+            self.speed + t * self.weight, wall.arm_length(p), self.weight,
+            total(absolute(p)) + total(absolute(wall.pose.shift)),
+        )  # fmt: skip
+
+
+class Bounds(Record):
+    """Of the speed, the acceleration and the jerk in the frame of a wall for some time."""
+
+    speed: float
+    acceleration: float
+    jerk: float
+
+
+class Seen(Record):
     """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
 
+    drive: Drive
     r: Vec
     v: Vec
     a: Vec
@@ -31,76 +53,19 @@ class Seen(NamedTuple):
     weight: float  # |G|
     coordinates: float  # what the round-off of its place is relative to [m]
 
+    def bounds(self, within):
+        """`Bounds` that hold for so long [s]."""
+        drive, spin = self.drive, self.drive.angular_speed()
+        # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
+        speed = self.speed + self.weight * within + drive.fastest
+        arm, hard = self.arm + speed * within, self.weight + drive.hardest
+        return Bounds(
+            speed + spin * arm,
+            hard + spin * (2.0 * speed + spin * arm),
+            drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
+        )
 
-class Framed(NamedTuple):
-    """The motion of a wall, and the particle in its frame."""
 
-    drive: Drive
-    seen: Seen
-
-
-@inlined
 def flight_of(r, v, pull, left):
     """The flight of a particle."""
     return Flight(r, v, pull, left, norm(v), norm(pull))
-
-
-@inlined
-def seen_at(drive, flight, t):
-    """The particle at a time of its flight, in the frame of a wall with this motion."""
-    left = flight.left - t
-    place = pose(drive, left)
-    now = Posed(0.0, place, place, drive, left, left)
-    p, v = flight.r + t * (flight.v + (0.5 * t) * flight.pull), flight.v + t * flight.pull
-    coordinates = total(absolute(p)) + total(absolute(place.shift))
-    speed = flight.speed + t * flight.weight
-    return Seen(
-        own_place(now, p), in_frame(now, p, v), frame_pull(now, p, v, flight.pull), speed,
-        arm_length(place.turn, now, p), flight.weight, coordinates,
-    )  # fmt: skip
-
-
-class Bounds(NamedTuple):
-    """Of the speed, the acceleration and the jerk in the frame of a wall for some time."""
-
-    speed: float
-    acceleration: float
-    jerk: float
-
-
-@inlined
-def bounds_of(drive, seen, within):
-    """`Bounds` that hold for so long [s]."""
-    spin = turning(drive.turn)
-    # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
-    speed = seen.speed + seen.weight * within + drive.fastest
-    arm, hard = seen.arm + speed * within, seen.weight + drive.hardest
-    return Bounds(
-        speed + spin * arm,
-        hard + spin * (2.0 * speed + spin * arm),
-        drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
-    )
-
-
-@by_type
-def turning(turn):
-    """The angular speed [rad/s]."""
-    return 0.0
-
-
-turning.register(Turn, lambda turn: abs(turn.rate))
-
-
-@by_type
-def motion_of(wall, last, flight, t):
-    """`Framed` of a wall; None of one that is not met by safe steps."""
-    return
-
-
-@motion_of.register(Moving)
-def _(wall, last, flight, t):
-    return Framed(wall.drive, seen_at(wall.drive, flight, t))
-
-
-motion_of.register(Translated, lambda wall, last, flight, t: None)
-motion_of.register(Following, lambda wall, last, flight, t: last)

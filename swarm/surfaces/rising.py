@@ -9,20 +9,20 @@ digits, or doubles them where only f'' has a bound.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..kernel.jit import by_type, inlined, select
-from ..kernel.vector import Vec, absolute, dot, norm, square, times, total
+from ..kernel.jit import select
+from ..kernel.record import Record
+from ..kernel.vector import absolute, dot, norm, square, times, total
 from . import contract
 from .course import rise_time
-from .drive import Turn
-from .fold import Chain
-from .relative import Bounds, Seen, bounds_of, turning
+from .fold import each
+from .levels import Between, Level
+from .relative import Bounds, Seen
 from .rotation import Rotated
 from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
-from .shapes.rotated import own as rotated_own
-from .shapes.rotated import scene as rotated_scene
+from .shapes.rotated import own, scene
 from .shapes.slab import SlabNumbers, along, scaled
 from .shapes.solid import SolidNumbers, noise
 from .shapes.sphere import SphereNumbers
@@ -31,7 +31,7 @@ from .shapes.sphere import SphereNumbers
 _CLOSE, _TRIALS = 2.0, 8
 
 
-class Step(NamedTuple):
+class Step(Record):
     """The level, half its derivative, and a time during which the flight stays admissible."""
 
     level: float
@@ -39,250 +39,196 @@ class Step(NamedTuple):
     time: float
 
 
-# --- A safe step of one wall -----------------------------------------------------------------------------
+class Ahead(Record):
+    """A level along a flight, and what bounds it for some time ahead."""
+
+    def rise(self, within):
+        """When it rises through 0, with bounds that hold for so long."""
+        raise NotImplementedError
+
+    def longest(self, longest):
+        """The longest time, of at most this one, in which the level surely does not rise."""
+        time, within, too_long = 0.0, longest, longest
+        for _k in range(_TRIALS):
+            time = max(time, min(self.rise(within), within))
+            # The bounds grow with the time that they hold for: those of a long time say little of a short step.
+            too_long = select(time < within, within, too_long)
+            if not _CLOSE * time < too_long:
+                break
+            within = math.sqrt(time * too_long)
+        return time
 
 
-@by_type
-def safe_step(body, drive, seen, longest):
-    """The `Step` of a wall, whose time is at most the longest, and with a bound of f'' alone."""
-    n, level = contract.slope(body, seen.r), contract.level_of(body, contract.inner(body, seen.r))
-    half, steepness = 0.5 * body.side * dot(n, seen.v), norm(n)
-    most, magnitude, reach = contract.bend(body, seen.r)
-    clear = contract.clearance(body, seen.r)
-    # The bounds grow with the time that they hold for.
-    time, within, too_long = 0.0, longest, longest
-    for _k in range(_TRIALS):
-        bounds = bounds_of(drive, seen, within)
-        speed = bounds.speed
-        # f''/2 <= w.H w + |grad q| A/2, where grad q turns by 2 m W t at most
-        bend = max(most, 0.0) * speed * speed
-        bend += 0.5 * bounds.acceleration * (steepness + 2.0 * magnitude * speed * within)
-        step = min(rise_time(level, half, bend), select(speed > 0.0, reach / select(speed > 0.0, speed, 1.0), math.inf))
-        step = max(step, clear / select(speed > 0.0, speed, 1.0))
-        time = max(time, min(step, within))
-        too_long = select(time < within, within, too_long)
-        if not _CLOSE * time < too_long:
-            break
-        within = math.sqrt(time * too_long)
-    return Step(level, half, time)
+class Bent(Ahead):
+    """Of a level whose second derivative has a bound."""
 
-
-class Level(NamedTuple):
-    """A level whose third derivative has a bound: f, f'/2, f''/2, |grad q| and m."""
-
+    seen: Seen
     level: float
     half: float
-    bend: float
     steepness: float
+    most: float
     magnitude: float
+    reach: float
+    clear: float
+
+    def rise(self, within):
+        bounds = self.seen.bounds(within)
+        speed = bounds.speed
+        # f''/2 <= w.H w + |grad q| A/2, where grad q turns by 2 m W t at most
+        bend = max(self.most, 0.0) * speed * speed
+        bend += 0.5 * bounds.acceleration * (self.steepness + 2.0 * self.magnitude * speed * within)
+        some = select(speed > 0.0, speed, 1.0)
+        step = min(rise_time(self.level, self.half, bend), select(speed > 0.0, self.reach / some, math.inf))
+        return max(step, self.clear / some)
 
 
-class Between(NamedTuple):
-    """The levels of the two planes of a slab: the place between them in the direction of motion, f'/2 > 0 and f''/2."""
+class Known(Ahead):
+    """Of a level whose third derivative has one."""
 
-    place: float
-    half: float
-    bend: float
-    radius: float
+    body: Any
+    seen: Seen
+    level: Any  # `Level` or `Between`
 
+    def third(self, within):
+        """The bound of f''' within that time."""
+        return self.level.third(bounds_on(self.body, self.seen, within), within)
 
-@by_type
-def level_of(body, seen):
-    """`Level` of a wall, or `Between`."""
-    raise NotImplementedError
-
-
-@level_of.register(PlaneNumbers)
-def _(body, seen):
-    n = body.normal
-    return Level(dot(n, seen.r) - body.offset, 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a), 1.0, 0.0)
+    def rise(self, within):
+        here = self.level
+        return rise_time(here.c, here.b, here.a2 + self.third(within) * within * (1.0 / 6.0))
 
 
-@level_of.register(SlabNumbers)
-def _(body, seen):
-    # Of the two planes: a bound of f''' of the square would be ten times as far from it.
-    half = 0.5 * along(body.normal, seen.v)
-    x, bend = along(body.normal, seen.r) - body.offset, 0.5 * along(body.normal, seen.a)
-    # Without a speed the plane behind is the near one, from which it leaves.
-    sign = math.copysign(1.0, select(half == 0.0, -x, half))
-    return Between(sign * x, abs(half), sign * bend, body.radius)
+# --- A safe step of one wall -----------------------------------------------------------------------------
 
-
-@level_of.register(SphereNumbers)
-def _(body, seen):
-    d, side = seen.r - body.center, body.side
-    q = square(d)
-    bend = square(seen.v) + dot(d, seen.a)
-    return Level(side * (q - body.radius2), side * dot(d, seen.v), side * bend, 2.0 * math.sqrt(q), 1.0)
-
-
-@level_of.register(QuadricNumbers)
-def _(body, seen):
-    n, side, a = contract.slope(body, seen.r), body.side, absolute(body.a)
-    bend = form(body.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
-    level = contract.level_of(body, contract.inner(body, seen.r))
-    return Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(a.x, a.y, a.z))
-
-
-@by_type
-def bounds_on(body, drive, seen, within):
-    """`Bounds` in the frame of a wall, or in any other in which its level is the same function of place."""
-    return _along_normal(flat_normal(body), drive, bounds_of(drive, seen, within))
-
-
-@by_type
-def flat_normal(body):
-    """The normal of a flat wall, or None."""
-    return
-
-
-flat_normal.register(PlaneNumbers, lambda body: body.normal)
-flat_normal.register(SlabNumbers, lambda body: scaled(body.normal, 1.0))
-flat_normal.register(Rotated, lambda body: _in_wall(flat_normal(body.body), body))
-
-
-@by_type
-def _in_wall(n, body):
-    """A normal of its own frame in that of the wall."""
-    return
-
-
-_in_wall.register(Vec, lambda n, body: rotated_scene(body, n))
-
-
-@by_type
-def _along_normal(n, drive, bounds):
-    """Bounds of a flat wall, to which only the jerk along its normal counts.
-
-    Where a motion has none of it, a particle that leaves the wall at no speed stays at it without end.
-    """
-    return bounds
-
-
-@_along_normal.register(Vec)
-def _(n, drive, bounds):
-    jerk = _jerk_along(drive.turn, n, drive, bounds.jerk)
-    return Bounds(bounds.speed, bounds.acceleration, select(jerk < bounds.jerk, jerk, bounds.jerk))
-
-
-@by_type
-def _jerk_along(turn, n, drive, jerk):
-    return total(absolute(times(n, drive.jerks)))
-
-
-@_jerk_along.register(Turn)
-def _(turn, n, drive, jerk):
-    # Along its axis a rotation leaves a place as it is.
-    along_axis = dot(n, turn.axis)
-    across = norm(n - along_axis * turn.axis)
-    return abs(along_axis) * total(absolute(times(turn.axis, drive.jerks))) + across * jerk
-
-
-@bounds_on.register(SphereNumbers)
-def _(body, drive, seen, within):
-    # In a frame that its centre carries along: it does not turn.
-    spin, arm = turning(drive.turn), norm(body.center - drive.center)
-    return Bounds(
-        seen.speed + seen.weight * within + drive.fastest + spin * arm,
-        seen.weight + drive.hardest + spin * spin * arm,
-        drive.jerk + spin * spin * spin * arm,
-    )
-
-
-@by_type
-def third_of(level, bounds, within):
-    """The bound of f''' within that time."""
-    raise NotImplementedError
-
-
-@third_of.register(Level)
-def _(level, bounds, within):
-    moved = level.steepness + 2.0 * level.magnitude * bounds.speed * within
-    return 6.0 * level.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
-
-
-third_of.register(Between, lambda level, bounds, within: bounds.jerk)
-
-
-@inlined
-def _step_of(here, body, drive, seen, longest):
-    """The `Step` of a level."""
-    within = min(rise_time(here.level, here.half, here.bend), longest)
-    time, too_long = 0.0, within
-    for _k in range(_TRIALS):
-        third = third_of(here, bounds_on(body, drive, seen, within), within)
-        time = max(time, min(rise_time(here.level, here.half, here.bend + third * within * (1.0 / 6.0)), within))
-        # The bounds grow with the time that they hold for: those of a long time say little of a short step.
-        too_long = select(time < within, within, too_long)
-        if not _CLOSE * time < too_long:
-            break
-        within = math.sqrt(time * too_long)
-    return Step(here.level, here.half, time)
-
-
-def _of_level(kind: Any) -> None:
-    contract.has_levels.register(kind, lambda surface: True)
-    safe_step.register(
-        kind, lambda body, drive, seen, longest: _step_of(level_of(body, seen), body, drive, seen, longest)
-    )
-
-
-_of_level(PlaneNumbers)
-_of_level(SphereNumbers)
-_of_level(QuadricNumbers)
+# Bodies whose levels are known.
+_LEVELED = PlaneNumbers, SphereNumbers, QuadricNumbers
+for _kind in _LEVELED:
+    contract.has_levels.register(_kind, lambda surface: True)
 # Between its planes; of a solid there is one.
 contract.has_levels.register(SlabNumbers, lambda surface: surface.side > 0.0)
+contract.has_levels.register(Rotated, lambda surface: contract.has_levels(surface.body))
 
 
-@safe_step.register(SlabNumbers)
-def _(body, drive, seen, longest):
+def needs_bend(body):
+    """Whether safe steps to a body need its `bend`."""
+    return not isinstance(body, (*_LEVELED, SlabNumbers, SolidNumbers))
+
+
+def safe_step(body, seen, longest):
+    """The `Step` of a wall, whose time is at most the longest."""
+    if isinstance(body, Rotated):
+        return safe_step(body.body, _turned(body, seen), longest)
+    if isinstance(body, SolidNumbers):
+        return _entry_step(body, seen, longest)
+    if isinstance(body, SlabNumbers):
+        return _slab_step(body, seen, longest)
+    if isinstance(body, _LEVELED):
+        return _level_step(level_of(body, seen), body, seen, longest)
+    n, level = contract.slope(body, seen.r), contract.level_of(body, contract.inner(body, seen.r))
+    half = 0.5 * body.side * dot(n, seen.v)
+    most, magnitude, reach = contract.bend(body, seen.r)
+    bent = Bent(seen, level, half, norm(n), most, magnitude, reach, contract.clearance(body, seen.r))
+    return Step(level, half, bent.longest(longest))
+
+
+def _level_step(here, body, seen, longest):
+    """The `Step` of a level."""
+    return Step(here.c, here.b, Known(body, seen, here).longest(min(here.own_rise(), longest)))
+
+
+def _slab_step(body, seen, longest):
     x, side = along(body.normal, seen.r) - body.offset, body.side
     sign = select(x > 0.0, 1.0, -1.0)
     x, half, bend = sign * x, 0.5 * sign * along(body.normal, seen.v), 0.5 * sign * along(body.normal, seen.a)
-    here, other = (
-        Level(side * (x - body.radius), side * half, side * bend, 1.0, 0.0),
-        Level(-x - body.radius, -half, -bend, 1.0, 0.0),
-    )
-    near, far = _step_of(here, body, drive, seen, longest), _step_of(other, body, drive, seen, longest)
-    return Step(near.level, near.half, select((side > 0.0) & (far.time < near.time), far.time, near.time))
+    near = _level_step(Level(side * (x - body.radius), side * half, side * bend, 1.0, 0.0), body, seen, longest)
+    far = _level_step(Level(-x - body.radius, -half, -bend, 1.0, 0.0), body, seen, longest)
+    return near._replace(time=select((side > 0.0) & (far.time < near.time), far.time, near.time))
 
 
-@inlined
-def _own(body, seen):
-    """What is seen, in the frame of a wall that is turned in its own."""
-    return Seen(
-        rotated_own(body, seen.r), rotated_own(body, seen.v), rotated_own(body, seen.a), seen.speed, seen.arm,
-        seen.weight, seen.coordinates,
-    )  # fmt: skip
-
-
-contract.has_levels.register(Rotated, lambda surface: contract.has_levels(surface.body))
-level_of.register(Rotated, lambda body, seen: level_of(body.body, _own(body, seen)))
-
-
-@safe_step.register(Rotated)
-def _(body, drive, seen, longest):
-    return safe_step(body.body, drive, _own(body, seen), longest)
-
-
-@safe_step.register(SolidNumbers)
-def _(body, drive, seen, longest):
-    return _entry_step(body.parts, body.extent, drive, seen, longest)
-
-
-@by_type
-def _entry_step(parts, extent, drive, seen, longest):
+def _entry_step(body, seen, longest):
     """Of the part that the particle is least deep in: outside of one part is outside of the body."""
-    return Step(math.inf, 0.0, 0.0)
+    found = Step(math.inf, 0.0, 0.0)
+    for link in reversed(each(body.parts)):
+        part = link.first
+        here = safe_step(part, seen, longest)
+        # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
+        depth = contract.gap_of(part, contract.inner(part, seen.r))
+        time = select(depth > noise(part, body.extent, seen.r), 0.0, here.time)
+        least = here.level < found.level
+        level, half = select(least, here.level, found.level), select(least, here.half, found.half)
+        found = Step(level, half, select(time > found.time, time, found.time))
+    return found
 
 
-@_entry_step.register(Chain)
-def _(parts, extent, drive, seen, longest):
-    here = safe_step(parts.first, drive, seen, longest)
-    other = _entry_step(parts.rest, extent, drive, seen, longest)
-    # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
-    depth = contract.gap_of(parts.first, contract.inner(parts.first, seen.r))
-    time = select(depth > noise(parts.first, extent, seen.r), 0.0, here.time)
-    least = here.level < other.level
-    level, half = select(least, here.level, other.level), select(least, here.half, other.half)
-    return Step(level, half, select(time > other.time, time, other.time))
+def _turned(body, seen):
+    """What is seen, in the frame of a wall that is turned in its own."""
+    return seen._replace(r=own(body, seen.r), v=own(body, seen.v), a=own(body, seen.a))
+
+
+# --- Levels and their bounds -----------------------------------------------------------------------------
+
+
+def level_of(body, seen):
+    """The `Level` of a wall, or `Between`."""
+    if isinstance(body, Rotated):
+        return level_of(body.body, _turned(body, seen))
+    r, v, a = seen.r, seen.v, seen.a
+    if isinstance(body, PlaneNumbers):
+        n = body.normal
+        return Level(dot(n, r) - body.offset, 0.5 * dot(n, v), 0.5 * dot(n, a), 1.0, 0.0)
+    if isinstance(body, SlabNumbers):
+        # Of the two planes: a bound of f''' of the square would be ten times as far from it.
+        half = 0.5 * along(body.normal, v)
+        x, bend = along(body.normal, r) - body.offset, 0.5 * along(body.normal, a)
+        # Without a speed the plane behind is the near one, from which it leaves.
+        sign = math.copysign(1.0, select(half == 0.0, -x, half))
+        return Between(sign * x, abs(half), sign * bend, body.radius)
+    side = body.side
+    if isinstance(body, SphereNumbers):
+        d = r - body.center
+        q, bend = square(d), square(v) + dot(d, a)
+        return Level(side * (q - body.radius2), side * dot(d, v), side * bend, 2.0 * math.sqrt(q), 1.0)
+    n, most = contract.slope(body, r), absolute(body.a)
+    bend = form(body.a, v, v) + 0.5 * dot(n, a)
+    level = contract.level_of(body, contract.inner(body, r))
+    return Level(level, 0.5 * side * dot(n, v), side * bend, norm(n), max(most.x, most.y, most.z))
+
+
+def bounds_on(body, seen, within):
+    """`Bounds` in the frame of a wall, or in any other in which its level is the same function of place."""
+    drive = seen.drive
+    if isinstance(body, SphereNumbers):
+        # In a frame that its centre carries along: it does not turn.
+        spin, arm = drive.angular_speed(), norm(body.center - drive.center)
+        return Bounds(
+            seen.speed + seen.weight * within + drive.fastest + spin * arm,
+            seen.weight + drive.hardest + spin * spin * arm,
+            drive.jerk + spin * spin * spin * arm,
+        )
+    bounds, n = seen.bounds(within), _flat_normal(body)
+    if n is None:
+        return bounds
+    # Only the jerk along the normal of a flat wall counts. Where a motion has none of it, a particle that leaves the
+    # wall at no speed stays at it without end.
+    jerk = _jerk_along(n, drive, bounds.jerk)
+    return bounds._replace(jerk=select(jerk < bounds.jerk, jerk, bounds.jerk))
+
+
+def _flat_normal(body):
+    """The normal of a flat wall, or None."""
+    if isinstance(body, Rotated):
+        n = _flat_normal(body.body)
+        return None if n is None else scene(body, n)
+    if isinstance(body, SlabNumbers):
+        return scaled(body.normal, 1.0)
+    return body.normal if isinstance(body, PlaneNumbers) else None
+
+
+def _jerk_along(n, drive, jerk):
+    """The bound of the jerk along a normal, of one in any direction."""
+    if drive.turn is None:
+        return total(absolute(times(n, drive.jerks)))
+    # Along its axis a rotation leaves a place as it is.
+    axis = drive.turn.axis
+    along_axis = dot(n, axis)
+    return abs(along_axis) * total(absolute(times(axis, drive.jerks))) + norm(n - along_axis * axis) * jerk

@@ -1,10 +1,11 @@
 """When a flight meets walls in any motion: safe steps of all walls, so that no hit is skipped."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, by_type_outlined, index, outlined, select
+from ..kernel.jit import index, outlined, select
+from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from ..motion import Guide
 from . import contract, flights
@@ -13,11 +14,11 @@ from .fields.grid import cell_of
 from .fields.members import Members, member
 from .fields.moved import until_next_in_frame
 from .flights import NEVER, Hit, hit, sooner, soonest
-from .fold import Chain, Field, count
-from .moving import Following, Marched, Moving, Translated, at
+from .fold import Chain, Field, count, each
+from .moving import Driven, Following, Marched, Moving, Translated, at
 from .posed import Drifting, Posed
-from .relative import Framed, bounds_of, flight_of, motion_of, seen_at
-from .rising import safe_step
+from .relative import flight_of
+from .rising import needs_bend, safe_step
 from .rotation import Rotated
 from .surface import Surface
 
@@ -30,7 +31,7 @@ _ROUND_OFF = 8.0
 _BISECTIONS = 1100
 
 
-class Nearest(NamedTuple):
+class Nearest(Record):
     """The shortest safe step of all walls, its wall and how far it goes; a wall that is passed, or -1, and how far."""
 
     time: float
@@ -47,75 +48,66 @@ _NOBODY = Nearest(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 # --- Of all walls ----------------------------------------------------------------------------------------
 
 
-@by_type
-def _nearest(chain, number, last, flight, t, longest):
-    """The `Nearest` of all walls that are met by safe steps; `last` is `Framed` of the wall before."""
-    return _NOBODY
-
-
-@_nearest.register(Chain)
-def _(chain, number, last, flight, t, longest):
-    mine = motion_of(chain.first, last, flight, t)
-    rest = _nearest(chain.rest, number + 1.0, mine, flight, t, longest)
-    return _nearer(mine, chain.first, number, rest, longest)
-
-
-@_nearest.register(Field)
-def _(chain, number, last, flight, t, longest):
-    rest = _nearest(chain.rest, number + count(chain.first), None, flight, t, longest)
-    return _nearest_of_field(chain.first, number, rest, flight, t, longest)
-
-
-@by_type
-def _nearest_of_field(field, number, rest, flight, t, longest):
-    """The `Nearest` of the bodies of a field and the rest."""
-    return rest
-
-
-@_nearest_of_field.register(Moving)
-def _(field, number, rest, flight, t, longest):
-    return _nearest_in_cell(field, number, rest, flight, t, longest)
-
-
-_nearest_of_field.register(Translated, lambda field, number, rest, flight, t, longest: rest)
-
-
-@outlined
-def _nearest_in_cell(field, number, rest, flight, t, longest):
-    """The same by the bodies of the cell in which a particle is then; to leave the cell ends a step, but is no hit."""
-    grid, mine = field.body.grid, Framed(field.drive, seen_at(field.drive, flight, t))
-    until, found = until_next_in_frame(grid, field.drive, mine.seen, min(rest.time, longest)), rest
-    if until < rest.time:
-        found = Nearest(until, -1.0, math.inf, 0.0, rest.past, rest.depth)
-    cell = index(cell_of(grid, mine.seen.r).number)
-    for k in range(grid.first[cell], grid.first[cell + 1]):
-        m = grid.entries[k]
-        body = Following(member(field.body, index(m)))
-        found = _nearer(mine, body, number + m, found, min(found.time, longest))
+def seen_by_walls(chain, flight, t):
+    """(wall, its number, `Seen`) of each wall in no field that is met by safe steps, last to first."""
+    found: Any = ()
+    number, seen = 0.0, None
+    for link in each(chain):
+        wall = link.first
+        if isinstance(link, Field):
+            number += count(wall)
+            continue
+        if not isinstance(wall, Following):
+            seen = wall.seen(flight, t) if isinstance(wall, Driven) else None
+        if seen is not None:
+            found = ((wall, number, seen), *found)
+        number += 1.0
     return found
 
 
-@by_type
-def _nearer(mine, wall, number, rest, longest):
+def _nearest(chain, flight, t, longest):
+    """The `Nearest` of all walls that are met by safe steps."""
+    found = _NOBODY
+    for wall, number, seen in seen_by_walls(chain, flight, t):
+        found = _nearer(seen, wall.body, number, found, longest)
+    return _nearest_of_fields(chain, 0.0, found, flight, t, longest)
+
+
+def _nearest_of_fields(chain, number, found, flight, t, longest):
+    """The `Nearest` of the bodies of all fields and what is found."""
+    if not isinstance(chain, Field):
+        return found
+    field = chain.first
+    found = _nearest_of_fields(chain.rest, number + count(field), found, flight, t, longest)
+    if not isinstance(field, Moving) or isinstance(field, Translated):
+        return found
+    return _nearest_in_cell(field, number, found, flight, t, longest)
+
+
+@outlined
+def _nearest_in_cell(field, number, found, flight, t, longest):
+    """The same by the bodies of the cell in which a particle is then; to leave the cell ends a step, but is no hit."""
+    grid, seen = field.body.grid, field.seen(flight, t)
+    until = until_next_in_frame(grid, seen, min(found.time, longest))
+    if until < found.time:
+        found = Nearest(until, -1.0, math.inf, 0.0, found.past, found.depth)
+    cell = index(cell_of(grid, seen.r).number)
+    for k in range(grid.first[cell], grid.first[cell + 1]):
+        m = grid.entries[k]
+        found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
+    return found
+
+
+def _nearer(seen, body, number, rest, longest):
     """The `Nearest` of one wall and the rest."""
-    return rest
-
-
-@_nearer.register(Framed)
-def _(mine, wall, number, rest, longest):
-    seen = mine.seen
-    step = safe_step(wall.body, mine.drive, seen, longest)
+    step = safe_step(body, seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
-    speed, room = bounds_of(mine.drive, seen, 0.0).speed, 2.0 * _EPSILON * seen.coordinates
+    speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
     sooner_one = step.time < rest.time
     return Nearest(
-        select(sooner_one, step.time, rest.time),
-        select(sooner_one, number, rest.wall),
-        select(sooner_one, way, rest.way),
-        select(sooner_one, room, rest.room),
-        select(is_past, number, rest.past),
-        select(is_past, depth, rest.depth),
+        *select(sooner_one, (step.time, number, way, room), rest[:4]),
+        *select(is_past, (number, depth), rest[4:]),
     )
 
 
@@ -124,7 +116,7 @@ def march(chain, flight, longest):
     """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
     t, before = 0.0, 0.0
     for i in range(_MARCH):
-        near = _nearest(chain, 0.0, None, flight, t, longest - t)
+        near = _nearest(chain, flight, t, longest - t)
         if i > 0 and near.past >= 0.0:
             # By round-off: a wall that bends as is said is not passed by more.
             if near.depth <= _ROUND_OFF * near.room:
@@ -146,7 +138,7 @@ def _last_inside(chain, flight, low, high, wall):
         t = 0.5 * (low + high)
         if not low < t < high:
             break
-        past = _nearest(chain, 0.0, None, flight, t, 0.0).past
+        past = _nearest(chain, flight, t, 0.0).past
         if past >= 0.0:
             high, wall = t, past
         else:
@@ -173,66 +165,52 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
-    own = safe_step.dispatch(type(wall)) is safe_step.dispatch(object)
-    return own and contract.bend.dispatch(type(wall)) is contract.bend.dispatch(object)
+    return needs_bend(wall) and contract.bend.dispatch(type(wall)) is contract.bend.dispatch(object)
 
 
 # --- Free time -------------------------------------------------------------------------------------------
 
 
-@by_type
 def free_time(chain, gravity, r, v, left):
     """A time during which a flight surely stays admissible, with so much of the frame left [s].
 
     0 for a particle that is in contact now.
     """
-    return flights.free_time(gravity, at(chain, left), r, v)
+    now, time = at(chain, left), math.inf
+    if not isinstance(chain, Marched):
+        return flights.free_time(gravity, now, r, v)
+    for link in reversed(each(now)):
+        here = _free_of(link.first, gravity, r, v)
+        time = select(time < here, time, here)
+    return time
 
 
-@free_time.register(Marched)
-def _(chain, gravity, r, v, left):
-    return _free_of_all(at(chain, left), gravity, r, v)
-
-
-@by_type
-def _free_of_all(chain, gravity, r, v):
-    return math.inf
-
-
-@_free_of_all.register(Chain)
-def _(chain, gravity, r, v):
-    here, other = _free_of(chain.first, gravity, r, v), _free_of_all(chain.rest, gravity, r, v)
-    return select(other < here, other, here)
-
-
-@by_type
 def _free_of(surface, gravity, r, v):
     """The free time of one wall."""
-    return flights.free_time(gravity, Chain(surface, None), r, v)
-
-
-_free_of.register(Drifting, lambda surface, gravity, r, v: flights.free_time(gravity, Chain(surface, None), r, v))
-
-
-@_free_of.register(Posed)
-def _(surface, gravity, r, v):
+    if not _is_marched(surface):
+        return flights.free_time(gravity, Chain(surface, None), r, v)
     # One safe step: of a flight of many steps the next one begins nearer to the wall.
-    seen = seen_at(surface.drive, flight_of(r, v, accelerated(gravity, ZERO, 1.0), surface.left), 0.0)
-    step = safe_step(surface.body, surface.drive, seen, surface.left)
+    step = safe_step(surface.body, _seen_now(surface, gravity, r, v), surface.left)
     return select(step.level > 0.0, 0.0, step.time)
+
+
+def _is_marched(surface):
+    """Whether a wall at an instant is met by safe steps."""
+    return isinstance(surface, Posed) and not isinstance(surface, Drifting)
+
+
+def _seen_now(surface, gravity, r, v):
+    """A particle in the frame of such a wall."""
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), surface.left)
+    return Moving(surface.body, surface.drive).seen(flight, 0.0)
 
 
 # --- First hits ------------------------------------------------------------------------------------------
 
 
-@by_type_outlined
+@outlined
 def first_hit(chain, gravity, r, v, left):
-    """The first `Hit` of a free flight with the walls of a scene, with so much of the frame left [s]."""
-    return NEVER
-
-
-@first_hit.register(Marched)
-def _(chain, gravity, r, v, left):
+    """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
     found = closed_hit(at(chain, left), gravity, r, v)
     longest = select(found.time < left, found.time, left)
     met = march(chain.walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
@@ -241,41 +219,17 @@ def _(chain, gravity, r, v, left):
     return found
 
 
-@by_type
 def closed_hit(chain, gravity, r, v):
     """The first hit with the walls that have a closed form."""
-    return NEVER
-
-
-@closed_hit.register(Chain)
-def _(chain, gravity, r, v):
-    rest = closed_hit(chain.rest, gravity, r, v)
-    time, found = _closed(chain.first, gravity, r, v)
-    return sooner(time, found, rest)
-
-
-@closed_hit.register(Field)
-def _(chain, gravity, r, v):
-    rest = closed_hit(chain.rest, gravity, r, v)
-    return soonest(_closed_in_field(chain.first, gravity, r, v), rest, count(chain.first))
-
-
-@by_type
-def _closed_in_field(field, gravity, r, v):
-    return field.first_hit(gravity, r, v)
-
-
-_closed_in_field.register(Posed, lambda field, gravity, r, v: NEVER)
-_closed_in_field.register(Drifting, lambda field, gravity, r, v: field.first_hit(gravity, r, v))
-
-
-@by_type
-def _closed(surface, gravity, r, v):
-    return hit(gravity, surface, r, v)
-
-
-_closed.register(Posed, lambda surface, gravity, r, v: (math.inf, True))
-_closed.register(Drifting, lambda surface, gravity, r, v: hit(gravity, surface, r, v))
+    found = NEVER
+    for link in reversed(each(chain)):
+        wall, closed = link.first, not _is_marched(link.first)
+        if isinstance(link, Field):
+            found = soonest(wall.field_hit(gravity, r, v) if closed else NEVER, found, count(wall))
+        else:
+            time, meets = hit(gravity, wall, r, v) if closed else (math.inf, True)
+            found = sooner(time, meets, found)
+    return found
 
 
 @outlined
@@ -301,10 +255,9 @@ def _first_hit_of_field(members, gravity, r, v):
 
 
 def _until_next_cell(members, r, v):
-    seen = seen_at(members.drive, flight_of(r, v, ZERO, members.left), 0.0)
-    return until_next_in_frame(members.body.grid, members.drive, seen, members.left)
+    return until_next_in_frame(members.body.grid, _seen_now(members, None, r, v), members.left)
 
 
 # What takes safe steps is known only here.
-Posed.first_hit = _first_hit_of_field  # type: ignore[attr-defined]
+Posed.field_hit = _first_hit_of_field  # type: ignore[attr-defined]
 Posed.until_next_cell = _until_next_cell  # type: ignore[attr-defined]

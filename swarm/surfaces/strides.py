@@ -6,18 +6,16 @@ find goes on in the next pass, from where it is.
 """
 
 import math
-from typing import Any, NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.jit import select
 from ..kernel.vector import ZERO
-from .course import rise_time
 from .flights import Hit
-from .fold import Chain
+from .fold import each
 from .moving import Moving, at
-from .relative import Framed, flight_of, motion_of
-from .rising import Between, Level, bounds_on, level_of, third_of
-from .safe import closed_hit
+from .relative import flight_of
+from .rising import Known, level_of
+from .safe import closed_hit, seen_by_walls
 
 _EPSILON = 2.220446049250313e-16
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
@@ -27,33 +25,6 @@ _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
 _AHEAD = 32.0
 
 
-class Known(NamedTuple):
-    """The level of a wall, the wall and the particle in its frame."""
-
-    level: Any
-    body: Any
-    framed: Framed
-
-
-class Rise(NamedTuple):
-    """When a level rises at the soonest, and by how much it is at most below 0 then."""
-
-    time: float
-    error: float
-
-
-class Stride(NamedTuple):
-    """The time at which the first level may rise, its wall, and whether it surely does but for round-off."""
-
-    time: float
-    wall: float
-    meets: Any
-
-
-# --- In a lane -------------------------------------------------------------------------------------------
-
-
-@inlined
 def begin(chain, gravity, course, lane, r, v, left):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
     found = closed_hit(at(chain, left), gravity, r, v)
@@ -61,24 +32,25 @@ def begin(chain, gravity, course, lane, r, v, left):
     course[_CLOSED, lane], course[_OTHER, lane] = found.time, found.wall
 
 
-@inlined
 def stride(chain, gravity, course, lane, r, v, left, is_first):
     """One stride of a lane that has not met a wall."""
     t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
     longest = select(closed < left, closed, left) - t
     flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), left)
-    known = _known(chain.walls, None, flight, t)
+    known = tuple(
+        (number, Known(wall.body, seen, level_of(wall.body, seen)))
+        for wall, number, seen in seen_by_walls(chain.walls, flight, t)
+    )
     within, ahead = _first_rise(known), _AHEAD * _pace(chain.walls)
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
-    found = _stride(known, 0.0, within, is_first)
-    step = select(found.time < within, found.time, within)
+    time, wall, meets = _first_stride(known, within, is_first)
+    step = select(time < within, time, within)
     under_way = (met < 0.0) & (longest > 0.0)
     course[_TIME, lane] = select(under_way, t + step, t)
-    course[_MET, lane] = select(under_way & found.meets & (found.time <= within), found.wall, met)
+    course[_MET, lane] = select(under_way & meets & (time <= within), wall, met)
 
 
-@inlined
 def end(course, lane):
     """The first `Hit` of a lane, if its strides have found it."""
     t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
@@ -87,164 +59,33 @@ def end(course, lane):
     return Hit(select(arrives, closed, t), select(arrives, course[_OTHER, lane], met))
 
 
-@by_type
 def _pace(chain):
-    """The shortest pace of all walls that are met by safe steps."""
-    return math.inf
+    """The shortest pace of all walls that move."""
+    shortest = math.inf
+    for link in reversed(each(chain)):
+        mine = link.first.drive.pace if isinstance(link.first, Moving) else math.inf
+        shortest = select(mine < shortest, mine, shortest)
+    return shortest
 
 
-@_pace.register(Chain)
-def _(chain):
-    mine, other = _pace_of(chain.first), _pace(chain.rest)
-    return select(mine < other, mine, other)
-
-
-@by_type
-def _pace_of(wall):
-    return math.inf
-
-
-_pace_of.register(Moving, lambda wall: wall.drive.pace)
-
-# --- All walls that are met by safe steps ----------------------------------------------------------------
-
-
-@by_type
-def _known(chain, last, flight, t):
-    """`Known` of each; `last` is `Framed` of the wall before."""
-    return
-
-
-@_known.register(Chain)
-def _(chain, last, flight, t):
-    mine = motion_of(chain.first, last, flight, t)
-    return Chain(_known_of(mine, chain.first), _known(chain.rest, mine, flight, t))
-
-
-@by_type
-def _known_of(mine, wall):
-    return
-
-
-_known_of.register(Framed, lambda mine, wall: Known(level_of(wall.body, mine.seen), wall.body, mine))
-
-
-@by_type
 def _first_rise(known):
     """When the first of the levels' own parabolas rises."""
-    return math.inf
+    first = math.inf
+    for _number, one in known:
+        mine = one.level.own_rise()
+        first = select(mine < first, mine, first)
+    return first
 
 
-@_first_rise.register(Chain)
-def _(known):
-    mine, other = _own_rise_of(known.first), _first_rise(known.rest)
-    return select(mine < other, mine, other)
-
-
-@by_type
-def _own_rise_of(known):
-    return math.inf
-
-
-_own_rise_of.register(Known, lambda known: _own_rise(known.level))
-
-
-@by_type
-def _stride(known, number, within, is_first):
-    """The `Stride` of all walls, with bounds that hold for so long."""
-    return Stride(math.inf, -1.0, False)
-
-
-@_stride.register(Chain)
-def _(known, number, within, is_first):
-    rest = _stride(known.rest, number + 1.0, within, is_first)
-    return _sooner(known.first, number, within, is_first, rest)
-
-
-@by_type
-def _sooner(known, number, within, is_first, rest):
-    return rest
-
-
-@_sooner.register(Known)
-def _(known, number, within, is_first, rest):
-    drive, seen = known.framed.drive, known.framed.seen
-    sixth = third_of(known.level, bounds_on(known.body, drive, seen, within), within) * (1.0 / 6.0)
-    time = _rise(known.level, sixth, within, is_first)
-    # The parabola is above f by no more than this.
-    meets = 2.0 * sixth * within * time * time <= _EPSILON * seen.coordinates * _steepness(known.level)
-    mine = time < rest.time
-    return Stride(
-        select(mine, time, rest.time), select(mine, number, rest.wall), (mine & meets) | ((not mine) & rest.meets)
-    )
-
-
-# --- Of one level ----------------------------------------------------------------------------------------
-
-
-@by_type
-def _own_rise(level):
-    """When its own parabola rises."""
-    raise NotImplementedError
-
-
-@by_type
-def _rise(level, sixth, within, is_first):
-    """When it rises at the soonest, if a sixth of f''' is bounded within that time.
-
-    From the wall inwards f is t (f' + f''/2 t + ...), one power of t nearer to it than the parabola. The later of both
-    counts: how deep a particle is that leaves no wall, the parabola alone knows.
-    """
-    raise NotImplementedError
-
-
-@by_type
-def _steepness(level):
-    raise NotImplementedError
-
-
-_own_rise.register(Level, lambda level: rise_time(level.level, level.half, level.bend))
-_steepness.register(Level, lambda level: level.steepness)
-
-
-@_rise.register(Level)
-def _(level, sixth, within, is_first):
-    time = rise_time(level.level, level.half, level.bend + sixth * within)
-    if is_first:
-        leaving = rise_time(2.0 * level.half, 0.5 * level.bend, sixth)
-        time = select((level.half <= 0.0) & (leaving > time), leaving, time)
-    return time
-
-
-_steepness.register(Between, lambda level: 1.0)
-
-
-@_own_rise.register(Between)
-def _(level):
-    # The plane ahead, unless the particle turns short of it: then the one behind
-    c, b, a = level.place - level.radius, level.half, level.bend
-    discriminant = b * b - a * c
-    reaches = (discriminant >= 0.0) | (a > 0.0)
-    discriminant = select(reaches, discriminant, b * b - a * (level.place + level.radius))
-    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-    over, under = select(reaches, -c, b + root), select(reaches, b + root, -a)
-    return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
-
-
-@_rise.register(Between)
-def _(level, sixth, within, is_first):
-    b, k = level.half, sixth * within
-    c, a = level.place - level.radius, level.bend + k
-    discriminant = b * b - a * c
-    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-    reaches = ((discriminant >= 0.0) | (a > 0.0)) & (b + root > 0.0)
-    ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
-    # The one behind: the particle moves away from it.
-    c, a = -level.place - level.radius, k - level.bend
-    discriminant = b * b - a * c
-    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-    behind = select(a > 0.0, (b + root) / a, math.inf)
-    if is_first:
-        leaving = rise_time(-2.0 * b, -0.5 * level.bend, sixth)
-        behind = select(leaving > behind, leaving, behind)
-    return select(behind < ahead, behind, ahead)
+def _first_stride(known, within, is_first):
+    """(when the first level may rise, its wall, whether it surely does but for round-off), with bounds for so long."""
+    first, wall, meets_first = math.inf, -1.0, False
+    for number, one in known:
+        sixth, level = one.third(within) * (1.0 / 6.0), one.level
+        time = level.soonest(sixth, within, is_first)
+        # The parabola is above f by no more than this.
+        meets = 2.0 * sixth * within * time * time <= _EPSILON * one.seen.coordinates * level.steepness
+        mine = time < first
+        first, wall = select(mine, time, first), select(mine, number, wall)
+        meets_first = (mine & meets) | ((not mine) & meets_first)
+    return first, wall, meets_first

@@ -10,7 +10,7 @@ from walls import falling, hit_of, start, straight
 
 import swarm
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import approach, contract
+from swarm.surfaces import contract
 from swarm.surfaces import march as marches
 from swarm.surfaces import rotation as rotations
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
@@ -72,9 +72,9 @@ def test_the_level_is_nowhere_above_its_polynomial(name, gravity):
         assert near.c == pytest.approx(level(0.0), abs=1e-14)
         assert near.b == pytest.approx((level(1e-6) - level(-1e-6)) / 4e-6, abs=1e-8)
         for within in near.window * np.array([1e-3, 0.1, 1.0]):
-            rise, _size, a2 = approach._slopes_within(near, within)
+            above, rise, _size = near.bounds(within)
             for t in within * rng.uniform(0.0, 1.0, 10):
-                assert level(t) <= near.c + 2.0 * near.b * t + a2 * t**2 + rise * t**3 + 1e-13
+                assert level(t) <= near.c + 2.0 * near.b * t + above.a2 * t**2 + rise * t**3 + 1e-13
 
 
 def _level(surface, r):

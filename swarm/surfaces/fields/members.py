@@ -48,7 +48,7 @@ class Members(Record):
         """Whether a point is in any but the one with this number."""
         return _is_in_another(self, number, r)
 
-    def first_hit(self, gravity, r, v):
+    def field_hit(self, gravity, r, v):
         """The first `Hit` of a free flight, or how far it is surely free."""
         return _first_hit(self, gravity, r, v)
 

@@ -6,7 +6,6 @@ Its place in a cell has bounds by its speed there and a bound of its acceleratio
 import math
 
 from ...kernel.jit import outlined
-from ..relative import bounds_of
 from .grid import cell_of, until_next
 
 # The bounds of a flight in its cell hold for at most so many times its length, after so many trials.
@@ -14,12 +13,12 @@ _CLOSE, _TRIALS = 2.0, 8
 
 
 @outlined
-def until_next_in_frame(grid, drive, seen, longest):
+def until_next_in_frame(grid, seen, longest):
     """A time up to the longest during which a particle, seen in the frame of a field, is surely near its cell."""
     cell, time, within = cell_of(grid, seen.r), 0.0, longest
     # The bound of the acceleration grows with the time that it holds for.
     for _k in range(_TRIALS):
-        until = until_next(bounds_of(drive, seen, within), grid, cell, seen.r, seen.v)
+        until = until_next(seen.bounds(within), grid, cell, seen.r, seen.v)
         time = max(time, min(until, within))
         if not _CLOSE * time < within:
             break

@@ -10,7 +10,7 @@ from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract, flights
-from ..approach import NearPiece
+from ..approach import Border, Near
 from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
 from .common import Distance
@@ -136,10 +136,10 @@ def _(surface, gravity, r, v):
     far = q > _AFAR * surface.radius2
     radius2 = select(far, q * (1.0 / _AFAR), surface.radius2)
     size2 = select(q > radius2, q, radius2)
-    return NearPiece(
-        side * (q - radius2), side * dot(e, v), side * s2, side * s3, side * s4,
-        abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube,
+    return Near(
+        side * (q - radius2), side * dot(e, v), side * s2, (side * s3, side * s4),
         2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * surface.radius2, not far,
+        Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
     )  # fmt: skip
 
 

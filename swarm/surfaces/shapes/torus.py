@@ -11,7 +11,7 @@ from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from .. import contract
-from ..approach import Near, NearFall
+from ..approach import Near
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from .common import Distance
@@ -158,7 +158,7 @@ def _near(surface, r, v):
     window = 2.0 * math.sqrt(size2 / w)
     return Near(
         select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -w, side * f2),
-        select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w),
+        (select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w)),
         select(far, math.inf, window), _nearly(surface), (not far) & (tube2 == surface.radius2),
     )  # fmt: skip
 
@@ -185,11 +185,13 @@ def _near_of_fall(surface, g, r, v):
     far, ball2 = _ball(surface, d2)
     size2 = major * surface.radius + q
     window = 2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * 4.0 * s4)))
-    return NearFall(
+    return Near(
         select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -s2, side * f2),
-        select(far, -s3, side * f3), select(far, -s4, side * f4),
-        select(far, 0.0, side * 2.0 * (2.0 * b * s4 + s2 * s3)), select(far, 0.0, side * (2.0 * s2 * s4 + s3 * s3)),
-        select(far, 0.0, side * 2.0 * s3 * s4), select(far, 0.0, side * s4 * s4),
+        (
+            select(far, -s3, side * f3), select(far, -s4, side * f4),
+            select(far, 0.0, side * 2.0 * (2.0 * b * s4 + s2 * s3)), select(far, 0.0, side * (2.0 * s2 * s4 + s3 * s3)),
+            select(far, 0.0, side * 2.0 * s3 * s4), select(far, 0.0, side * s4 * s4),
+        ),
         window, _nearly(surface), (not far) & (tube2 == surface.radius2),
     )  # fmt: skip
 
