@@ -1,10 +1,10 @@
 """How a lasting contact begins and ends, one particle at a time: what it becomes at a wall."""
 
 import math
-from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, inlined, outlined
+from ..kernel.jit import outlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import flights
 from ..surfaces import fold as walls
@@ -33,7 +33,7 @@ _EPSILON = 2.220446049250313e-16
 TOUCH = 1e-10
 
 
-class Particle(NamedTuple):
+class Particle(Record):
     """A particle in contact: its energy is twice that per mass, and scale2 is the square of its own speed."""
 
     r: Vec
@@ -43,7 +43,7 @@ class Particle(NamedTuple):
     scale2: float
 
 
-class Next(NamedTuple):
+class Next(Record):
     """What becomes of it: its velocity along the walls, the speed it keeps across them, its energy, its second wall.
 
     `wait` is how long the hops last that are left out, `impulse` what the wall gave.
@@ -59,13 +59,11 @@ class Next(NamedTuple):
     wait: float
 
 
-@inlined
 def own_speed2(p):
     """The square of the speed that a particle's own scale and its motion say."""
     return max(p.scale2, square(p.v))
 
 
-@inlined
 def weightless(rules, gravity, p):
     """An acceleration that is none for this particle: round-off of gravity, and of the pull of walls that bend.
 
@@ -74,12 +72,10 @@ def weightless(rules, gravity, p):
     return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 
 
-@inlined
 def _energy(twice):
     return Energy(twice, 0.5 / twice if twice > 0.0 else 0.0)
 
 
-@inlined
 def _loses(rules, wall):
     return 1.0 - wall_laws.restitution_of(rules.laws, wall) > 0.0
 
@@ -118,7 +114,7 @@ def enter(rules, chain, gravity, wall, p):
     flies = Next(FLYING, v, 0.0, twice, wall, -1.0, impulse, 0.0)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
     press = _press(chain, wall, p.r, along, pull)
-    if not press > weightless(rules, gravity, p) or wall_laws.is_hot(rules.laws, wall):
+    if not press > weightless(rules, gravity, p) or wall_laws.thermal_of(rules.laws, wall).is_hot():
         return flies
     hop = 2.0 * max(away, 0.0) / press
     short = hop < rules.shortest_flight if rules.shortest_flight > 0.0 else away <= GRAZING * math.sqrt(speed2)
@@ -142,14 +138,13 @@ def enter(rules, chain, gravity, wall, p):
     # the particle than to one that slides, which the caller books, and friction as much less.
     slip = relative(u, along)
     e, speed = wall_laws.restitution_of(rules.laws, wall), norm(slip)
-    spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
+    spared = wall_laws.of_wall(wall_laws.friction(rules.laws), wall) * away
     # `away` may be below 0 by round-off, and what friction has stopped has no direction.
     faster = along + (spared / speed) * slip if speed > abs(spared) else along
-    twice += square(faster) - square(v) if wall_laws.moves(rules.laws) else square(faster) - square(along) - away * away
+    twice += square(faster) - square(along) - away * away if u is None else square(faster) - square(v)
     return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
 
-@inlined
 def _kept(across, p):
     """The speed across its walls that a particle keeps while it slides."""
     return across if across > _NO_HOP * math.sqrt(own_speed2(p)) else 0.0
@@ -159,13 +154,13 @@ def _kept(across, p):
 def _on_edge(rules, chain, gravity, two, p):
     """What becomes of a particle in an edge: it slides there if both walls press on it."""
     drift = hold.drift(wall_laws.moving(rules.laws), two, chain, p.r)
-    taken = hold.split_at(two, chain, drift, p.r, p.v)
+    taken = two.split_at(chain, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
     least = weightless(rules, gravity, p)
     if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
-    n, m = hold.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
+    n, m = two.presses(chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
     if not (n > least and m > least):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
@@ -173,16 +168,12 @@ def _on_edge(rules, chain, gravity, two, p):
     return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second, 0.0, 0.0)
 
 
-@by_type
 def _across2(drift, v, taken):
-    """What a velocity loses of its square where its part across the walls is taken, and the square of that part."""
+    """The square that a velocity loses where its part across the walls is taken, and the square of that part."""
+    if drift is not None:
+        return square(v) - square(taken.along), square(v - taken.along)
     across2 = max(square(v) - square(taken.along), 0.0)
     return across2, across2
-
-
-@_across2.register(hold.Drift)
-def _(drift, v, taken):
-    return square(v) - square(taken.along), square(v - taken.along)
 
 
 # --- While it slides -------------------------------------------------------------------------------------
@@ -205,7 +196,7 @@ def after_meeting(rules, held, chain, gravity, wall, p):
     away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
     drift = hold.drift(moving, held, chain, p.r)
-    taken = hold.split_at(held, chain, drift, p.r, p.v)
+    taken = held.split_at(chain, drift, p.r, p.v)
     flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
@@ -217,36 +208,30 @@ def after_meeting(rules, held, chain, gravity, wall, p):
     keep, twice = _kept(math.sqrt(kept2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
-    other = hold.second(held)
+    other = held.second
     return Next(EDGE if other >= 0.0 else HELD, taken.along, keep, twice, held.first, other, impulse, 0.0)
 
 
-@by_type
 def _at_rest_there(held, rules, chain, gravity, wall, p):
-    """What becomes of it where it is too slow to leave the other wall: an edge, or that wall alone."""
+    """`Next` where a particle is too slow to leave the other wall: an edge, or that wall alone."""
+    if isinstance(held, Two):
+        return Next(CAREFUL, p.v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     edge = _on_edge(rules, chain, gravity, Two(held.first, wall), p)
     if edge.phase == EDGE:
         return edge
     pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
-    away = -dot(n, relative(wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r), p.v))
+    moving = wall_laws.moving(rules.laws)
+    away = -dot(n, relative(wall_velocity(moving, chain, wall, p.r), p.v))
     along = p.v + away * n
-    least = weightless(rules, gravity, p)
-    if not _press(chain, wall, p.r, along, pull) > least:
+    if not _press(chain, wall, p.r, along, pull) > weightless(rules, gravity, p):
         return edge
-    if (
-        dot(_normal(chain, held.first, p.r), sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration)
-        > 0.0
-    ):
+    drawn = sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration
+    if dot(_normal(chain, held.first, p.r), drawn) > 0.0:
         return edge
     keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
-        keep, twice = 0.0, p.twice - (square(p.v) - square(along) if wall_laws.moves(rules.laws) else away * away)
+        keep, twice = 0.0, p.twice - (away * away if moving is None else square(p.v) - square(along))
     return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
-
-
-@_at_rest_there.register(Two)
-def _(held, rules, chain, gravity, wall, p):
-    return Next(CAREFUL, p.v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
 
 
 @outlined
@@ -266,7 +251,6 @@ def settles(rules, chain, gravity, p, held):
     return slow and touching.are_carried(chain, gravity, p.r, p.v, TOUCH * rules.size, held)
 
 
-@inlined
 def rests(gravity, force):
     """Whether a particle without speed stays where it is."""
     return norm(force.acceleration) <= ALLOWED * norm(accelerated(gravity, ZERO, 1.0))
