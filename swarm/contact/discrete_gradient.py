@@ -33,7 +33,7 @@ _NUDGE = 1e-6
 
 
 def reaction_needs(gradient: str) -> tuple[Any, ...]:
-    """What a step with that argument `gradient` of its method needs of every wall."""
+    """The needs of a step, of every wall, with that argument `gradient` of its method."""
     return (*impulse.NEEDS, contract.resolve) if gradient == "mean-value" else impulse.NEEDS
 
 

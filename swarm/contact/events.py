@@ -44,9 +44,9 @@ class Particle(Record):
 
 
 class Next(Record):
-    """What becomes of it: its velocity along the walls, the speed it keeps across them, its energy, its second wall.
+    """Its phase then, its velocity along the walls, the speed that it keeps across them, its energy, its walls.
 
-    `wait` is how long the hops last that are left out, `impulse` what the wall gave.
+    `impulse` is that of the wall, `wait` how long the hops last that are left out.
     """
 
     phase: int
@@ -54,9 +54,9 @@ class Next(Record):
     keep: float
     twice: float
     wall: float
-    other: float
-    impulse: float
-    wait: float
+    other: float = -1.0
+    impulse: float = 0.0
+    wait: float = 0.0
 
 
 def own_speed2(p):
@@ -103,7 +103,7 @@ def _bounce(rules, chain, gravity, wall, p):
 
 @outlined
 def enter(rules, chain, gravity, wall, p):
-    """What becomes of a particle that leaves this wall so slowly that it is back at once."""
+    """`Next` of a particle that leaves this wall so slowly that it is back at once."""
     n, u = _normal(chain, wall, p.r), wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
     if dot(relative(u, v), n) > 0.0:
@@ -111,7 +111,7 @@ def enter(rules, chain, gravity, wall, p):
         v, twice, impulse = bounce.v, bounce.twice_energy, bounce.impulse
     away = -dot(relative(u, v), n)
     along = v + away * n
-    flies = Next(FLYING, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+    flies = Next(FLYING, v, 0.0, twice, wall, impulse=impulse)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
     press = _press(chain, wall, p.r, along, pull)
     if not press > weightless(rules, gravity, p) or wall_laws.thermal_of(rules.laws, wall).is_hot():
@@ -128,12 +128,12 @@ def enter(rules, chain, gravity, wall, p):
         if towards <= GRAZING * math.sqrt(speed2):
             edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
             if edge.phase == EDGE:
-                return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse, 0.0)
+                return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse)
         if following.time <= _INSTANT * rules.size / math.sqrt(speed2):
-            return Next(CAREFUL, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+            return Next(CAREFUL, v, 0.0, twice, wall, impulse=impulse)
         return flies
     if not _loses(rules, wall):
-        return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
+        return Next(HELD, along, _kept(away, p), twice, wall, impulse=impulse)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
     # the particle than to one that slides, which the caller books, and friction as much less.
     slip = relative(u, along)
@@ -152,11 +152,11 @@ def _kept(across, p):
 
 @outlined
 def _on_edge(rules, chain, gravity, two, p):
-    """What becomes of a particle in an edge: it slides there if both walls press on it."""
+    """`Next` of a particle in an edge: it slides there if both walls press on it."""
     drift = hold.drift(wall_laws.moving(rules.laws), two, chain, p.r)
     taken = two.split_at(chain, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
-    stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
+    stays = Next(FLYING, p.v, 0.0, p.twice, two.first)
     least = weightless(rules, gravity, p)
     if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
@@ -164,8 +164,8 @@ def _on_edge(rules, chain, gravity, two, p):
     if not (n > least and m > least):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
-        return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second, 0.0, 0.0)
-    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second, 0.0, 0.0)
+        return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second)
+    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second)
 
 
 def _across2(drift, v, taken):
@@ -181,41 +181,32 @@ def _across2(drift, v, taken):
 
 @outlined
 def meet(rules, held, chain, gravity, wall, p):
-    """What becomes of a sliding particle at another wall."""
+    """`Next` of a sliding particle at another wall."""
     bounce = _bounce(rules, chain, gravity, wall, p)
-    return after_meeting(
-        rules, held, chain, gravity, wall, Particle(p.r, bounce.v, bounce.impulse, bounce.twice_energy, p.scale2)
-    )
-
-
-@outlined
-def after_meeting(rules, held, chain, gravity, wall, p):
-    """The same with the velocity that the other wall has turned; `left` is its impulse."""
-    impulse = p.left
+    p, impulse = Particle(p.r, bounce.v, p.left, bounce.twice_energy, p.scale2), bounce.impulse
     moving = wall_laws.moving(rules.laws)
     away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
     drift = hold.drift(moving, held, chain, p.r)
     taken = held.split_at(chain, drift, p.r, p.v)
-    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
+    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, impulse=impulse)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
     if away <= slow:
         found = _at_rest_there(held, rules, chain, gravity, wall, p)
         if found.phase != FLYING:
-            return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse, 0.0)
+            return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse)
     across2, kept2 = _across2(drift, p.v, taken)
     keep, twice = _kept(math.sqrt(kept2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
-    other = held.second
-    return Next(EDGE if other >= 0.0 else HELD, taken.along, keep, twice, held.first, other, impulse, 0.0)
+    return Next(EDGE if held.second >= 0.0 else HELD, taken.along, keep, twice, held.first, held.second, impulse)
 
 
 def _at_rest_there(held, rules, chain, gravity, wall, p):
     """`Next` where a particle is too slow to leave the other wall: an edge, or that wall alone."""
     if isinstance(held, Two):
-        return Next(CAREFUL, p.v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
+        return Next(CAREFUL, p.v, 0.0, p.twice, wall)
     edge = _on_edge(rules, chain, gravity, Two(held.first, wall), p)
     if edge.phase == EDGE:
         return edge
@@ -231,7 +222,7 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
     keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
         keep, twice = 0.0, p.twice - (away * away if moving is None else square(p.v) - square(along))
-    return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
+    return Next(HELD, along, keep, twice, wall)
 
 
 @outlined

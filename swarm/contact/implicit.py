@@ -25,7 +25,7 @@ _TOLERANCE = 1e-8
 SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 _EPSILON = 2.220446049250313e-16
-# What the equation needs of every wall.
+# The equation needs these of every wall.
 NEEDS = (*FORCE_NEEDS, contract.resolve, contract.farthest_push)
 
 

@@ -29,7 +29,7 @@ _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
 # A point whose coordinates would be on the surface within this part of themselves is on it.
 _ON_SURFACE = 8.0 * _EPSILON
-# What the equation and its energy need of every wall; multipliers need `gap_scale` too.
+# The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
     contract.inner, contract.gap_of, contract.gap_slope, contract.gradient, contract.inner_gradient, contract.push,
     contract.rise, contract.farthest_push,
@@ -56,7 +56,7 @@ class Residual(Record):
 
 
 class LoopRecord(Record):
-    """What the loop of a multiplier needs of a step."""
+    """A step as the loop of a multiplier takes it."""
 
     mean: float  # (Phi0 + Phi1)/2
     stored: float  # V1

@@ -8,7 +8,7 @@ from ..surfaces.fold import Chain
 
 
 class Laws(NamedTuple):
-    """What impacts do to a particle besides turning it round."""
+    """The effects of impacts on a particle besides turning it round."""
 
     restitution: Any  # None, or a Chain of one e a wall
     friction: Any  # None, or a Chain of one mu a wall

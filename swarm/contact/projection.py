@@ -109,7 +109,7 @@ def _edge(normal, i, j):
 
 @outlined
 def _carried(touched, normal, held, w):
-    """What each wall of a corner takes of w: the first three that carry it."""
+    """The part of w that each wall of a corner takes: the first three that carry it."""
     count = touched.size
     for i in range(count):
         for j in range(i):

@@ -74,7 +74,7 @@ def _decide(method, chain, gravity, share, i):
     else:
         settles = events.settles(method, chain, gravity, p, held)
     if again > _OFTEN or settles:
-        found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
+        found = events.Next(CAREFUL, v, 0.0, p.twice, wall)
     elif first < 0.0:
         found = events.enter(method, chain, gravity, wall, p)
     elif second < 0.0:
