@@ -93,7 +93,8 @@ def every_function_of_a_vector(a, b, k):
     )
 
 
-def every_function_of_a_law(law, g0, g1):
+@_jit.inlined
+def _every_function_of_a_law(law, g0, g1):
     return (
         law.stored_energy(g0),
         law.stiffness(g1),
@@ -101,6 +102,10 @@ def every_function_of_a_law(law, g0, g1):
         law.energy_slope(g1, g1 * 1.001),
         law.energy_slope(-g1, g1),
     )
+
+
+def every_function_of_a_law(law, g0, g1):
+    return _every_function_of_a_law(law, g0, g1)
 
 
 def flat(nested):
