@@ -178,7 +178,7 @@ def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> Contac
     rows, reactions = _Rows(scene, start, mass, method.dt), np.zeros((count, 4))
     _require(corner.hold(numbers.form, numbers.law, None, chain, rows.step, reactions).solved, 0)
     first, last = np.zeros(count), reactions[:, 3]
-    corner.constraints(chain, numbers.law, 0, start.r, first)
+    corner.constraints(chain, numbers.law, start.r, first)
     stored = 0.5 * method.penalty * float(last @ last)
     rows.add(np.zeros(count), 0.5 * method.penalty * (first + last), reactions, stored)
     return rows.history(True)

@@ -93,14 +93,19 @@ def every_function_of_a_vector(a, b, k):
     )
 
 
-def every_function_of_a_law(law, g0, g1):
+@_jit.inlined
+def _every_function_of_a_law(law, g0, g1):
     return (
-        regularisation.stored_energy(law, g0),
-        regularisation.stiffness(law, g1),
-        regularisation.energy_slope(law, g0, g1),
-        regularisation.energy_slope(law, g1, g1 * 1.001),
-        regularisation.energy_slope(law, -g1, g1),
+        law.stored_energy(g0),
+        law.stiffness(g1),
+        law.energy_slope(g0, g1),
+        law.energy_slope(g1, g1 * 1.001),
+        law.energy_slope(-g1, g1),
     )
+
+
+def every_function_of_a_law(law, g0, g1):
+    return _every_function_of_a_law(law, g0, g1)
 
 
 def flat(nested):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm.contact.regularisation import constraint, constraint_gradient, regularisation
+from swarm.contact.regularisation import regularisation
 
 from .cases import Floats
 from .plotting import BLUE, GREEN, GREY, RED, page
@@ -27,8 +27,8 @@ def numbers() -> Numbers:
     """Phi of the engine's laws; alpha has no part in it."""
     gaps = np.linspace(-1.0, 1.5, 251)
     laws = [regularisation(1.0, a) for a in EXPONENTS]
-    values = np.array([[constraint(law, g) for g in gaps] for law in laws])
-    return Numbers(gaps, values, np.array([constraint_gradient(law, np.float64(0.0)) for law in laws]))
+    values = np.array([[law.constraint(g) for g in gaps] for law in laws])
+    return Numbers(gaps, values, np.array([law.constraint_gradient(np.float64(0.0)) for law in laws]))
 
 
 def draw(numbers: Numbers, folder: Path) -> Path:

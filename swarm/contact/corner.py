@@ -3,16 +3,13 @@
 Each wall is solved with the reactions of the others held, until the end of the step no longer moves.
 """
 
-from typing import NamedTuple
-
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
+from ..kernel.jit import outlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, largest, norm
 from ..surfaces import contract
+from ..surfaces.fold import each
 from . import impulse as contact_impulse
-from . import regularisation as law_of
 from .discrete_gradient import reaction
-from .laws import Moves
 from .records import Step
 
 _EPSILON = 2.220446049250313e-16
@@ -20,7 +17,7 @@ _EPSILON = 2.220446049250313e-16
 _SWEEPS = 500
 
 
-class Held(NamedTuple):
+class End(Record):
     """The end r1 of a step that the walls hold back, and whether every wall was solved."""
 
     r: Vec
@@ -37,18 +34,17 @@ def hold(form, law, multipliers, chain, step, reactions):
     r = step.r
     for i in range(_SWEEPS):
         before = r
-        solved = _sweep(chain, form, law, multipliers, 0, step, reactions)
+        solved = _sweep(chain, form, law, multipliers, step, reactions)
         r = step.r + (step.p - total(reactions))
         size, moved = max(largest(r), largest(step.p)), largest(r - before)
         if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * _EPSILON * size)):
-            return Held(r, True)
+            return End(r, True)
         if i > 0 and moved == 0.0:
             # A wall that is not solved: sweeps from where they began say the same.
-            return Held(r, False)
-    return Held(r, False)
+            return End(r, False)
+    return End(r, False)
 
 
-@inlined
 def _reaction_of(reactions, k):
     return Vec(reactions[k, 0], reactions[k, 1], reactions[k, 2])
 
@@ -62,31 +58,19 @@ def total(reactions):
     return found
 
 
-@by_type_outlined
-def _sweep(chain, form, law, multipliers, k, step, reactions):
+@outlined
+def _sweep(chain, form, law, multipliers, step, reactions):
     """Solve every wall once; whether all were solved."""
-    reactions[k] = 0.0
-    remaining = Step(step.r, step.p - total(reactions), step.c)
-    found = reaction(form, law, multiplier_of(multipliers, k), chain.first, remaining)
-    held = found.vector
-    reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = held.x, held.y, held.z, found.constraint
-    return _sweep(chain.rest, form, law, multipliers, k + 1, step, reactions) and found.solved
-
-
-@_sweep.register(Nothing)
-def _(chain, form, law, multipliers, k, step, reactions):
-    return True
-
-
-@by_type
-def multiplier_of(multipliers, k):
-    """Entry k, or None where the method has no multipliers."""
-    return multipliers[k]
-
-
-@multiplier_of.register(Nothing)
-def _(multipliers, k):
-    return None
+    solved = True
+    for k, link in enumerate(each(chain)):
+        reactions[k] = 0.0
+        remaining = Step(step.r, step.p - total(reactions), step.c)
+        multiplier = None if multipliers is None else multipliers[k]
+        found = reaction(form, law, multiplier, link.first, remaining)
+        held = found.vector
+        reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = held.x, held.y, held.z, found.constraint
+        solved = solved & found.solved
+    return solved
 
 
 @outlined
@@ -96,40 +80,25 @@ def add_impulses(reactions, h, impulse, lane):
         impulse[k, lane] += 2.0 / h * norm(_reaction_of(reactions, k))
 
 
-@by_type_outlined
-def add_works(moving, chain, k, factor, reactions, impulse, lane):
+@outlined
+def add_works(moving, chain, factor, reactions, impulse, lane):
     """Add the work per mass of each wall in a step, `factor` times reaction.way, to its row of `impulse`: their sum.
 
     The rows of work are behind those of impulses; where no wall moves there are none.
     """
-    return 0.0
+    found = 0.0
+    if moving is None:
+        return found
+    for k, link in reversed(tuple(enumerate(each(chain)))):
+        work = factor * dot(_reaction_of(reactions, k), contract.way(link.first))
+        impulse[reactions.shape[0] + k, lane] += work
+        found = work + found
+    return found
 
 
-@add_works.register(Moves)
-def _(moving, chain, k, factor, reactions, impulse, lane):
-    return _add_works(chain, k, factor, reactions, impulse, lane)
-
-
-@by_type_outlined
-def _add_works(chain, k, factor, reactions, impulse, lane):
-    work = factor * dot(_reaction_of(reactions, k), contract.way(chain.first))
-    impulse[reactions.shape[0] + k, lane] += work
-    return work + _add_works(chain.rest, k + 1, factor, reactions, impulse, lane)
-
-
-@_add_works.register(Nothing)
-def _(chain, k, factor, reactions, impulse, lane):
-    return 0.0
-
-
-@by_type_outlined
-def constraints(chain, law, k, r, into):
+@outlined
+def constraints(chain, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
-    start = contact_impulse.start_gap(0.0, chain.first, r, contract.inner(chain.first, r))
-    into[k] = law_of.constraint(law, start.gap)
-    constraints(chain.rest, law, k + 1, r, into)
-
-
-@constraints.register(Nothing)
-def _(chain, law, k, r, into):
-    pass
+    for k, link in enumerate(each(chain)):
+        start = contact_impulse.start_gap(0.0, link.first, r, contract.inner(link.first, r))
+        into[k] = law.constraint(start.gap)

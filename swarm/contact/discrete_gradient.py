@@ -13,12 +13,12 @@ Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, by_type_outlined, inlined, outlined
+from ..kernel.jit import outlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from ..surfaces import contract
 from ..surfaces.stroke import framed
 from . import impulse
-from . import regularisation as law_of
 from .records import Step
 
 _EPSILON = 2.220446049250313e-16
@@ -32,33 +32,9 @@ _NEARLY = 0.1
 _NUDGE = 1e-6
 
 
-class Composite(NamedTuple):
-    """Chooses the composite form."""
-
-
-class MeanValue(NamedTuple):
-    """Chooses the mean-value form."""
-
-
-def form_of(gradient: str) -> Composite | MeanValue:
-    """The form of a method's argument `gradient`."""
-    return MeanValue() if gradient == "mean-value" else Composite()
-
-
 def reaction_needs(gradient: str) -> tuple[Any, ...]:
-    """What a step with that argument needs of every wall."""
+    """The needs of a step, of every wall, with that argument `gradient` of its method."""
     return (*impulse.NEEDS, contract.resolve) if gradient == "mean-value" else impulse.NEEDS
-
-
-@by_type
-def nested(form):
-    """Whether a step takes nested solves, which are too long for lanes."""
-    return False
-
-
-@nested.register(MeanValue)
-def _(form):
-    return True
 
 
 # --- The vectors -----------------------------------------------------------------------------------------
@@ -68,7 +44,7 @@ def _(form):
 def composite(law, surface, r0, r1):
     """D = Phi[g0, g1] g[q0, q1] D_q; where q1 = q0 the quotients are their one-sided limits."""
     q0, q1 = contract.inner(surface, r0), contract.inner(surface, r1)
-    slope, _curvature = law_of.constraint_slope(law, contract.gap_of(surface, q0), contract.gap_of(surface, q1))
+    slope, _curvature = law.constraint_slope(contract.gap_of(surface, q0), contract.gap_of(surface, q1))
     rise, _curvature = contract.gap_slope(surface, q0, q1)
     return slope * rise * contract.inner_gradient(surface, r0, r1)
 
@@ -79,16 +55,14 @@ def constraint_gradient(law, surface, r):
     return _constraint_slope(law, surface, contract.inner(surface, r)) * contract.inner_gradient(surface, r, r)
 
 
-@inlined
 def _constraint_slope(law, surface, q):
     """dPhi/dq"""
     slope, _curvature = contract.gap_slope(surface, q, q)
-    return law_of.constraint_gradient(law, contract.gap_of(surface, q)) * slope
+    return law.constraint_gradient(contract.gap_of(surface, q)) * slope
 
 
-@inlined
 def _constraint(law, surface, r):
-    return law_of.constraint(law, contract.gap_of(surface, contract.inner(surface, r)))
+    return law.constraint(contract.gap_of(surface, contract.inner(surface, r)))
 
 
 @outlined
@@ -106,7 +80,7 @@ def identity_miss(law, surface, r0, r1, beta):
 # --- A step that one wall holds back ---------------------------------------------------------------------
 
 
-class Reaction(NamedTuple):
+class Reaction(Record):
     """The displacement c D (alpha Phi_mean + lambda) by which one wall holds a step back: r1 = r0 + p less it."""
 
     vector: Vec
@@ -114,53 +88,64 @@ class Reaction(NamedTuple):
     solved: bool
 
 
-@by_type_outlined
+@outlined
 def reaction(form, law, multiplier, surface, step):
     """The reaction of one wall in a step.
 
     `form` is Composite or MeanValue (or AtEnd of implicit.py), `multiplier` a float or None.
     """
-    raise NotImplementedError
+    return form.reaction(law, multiplier, surface, step)
 
 
-@reaction.register(Composite)
-def _(form, law, multiplier, surface, step):
-    kappa, solved = impulse.careful(law, multiplier, surface, step)
-    r1 = contract.push(surface, step.r, step.p, kappa)
-    start = impulse.start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
-    g1 = impulse.end_gap(surface, step, start, kappa)
-    return Reaction(kappa * contract.inner_gradient(surface, step.r, r1), law_of.constraint(law, g1), solved)
+class Composite(NamedTuple):
+    """The composite form."""
+
+    def reaction(self, law, multiplier, surface, step):
+        """`Reaction` of a surface."""
+        kappa, solved = impulse.careful(law, multiplier, surface, step)
+        r1 = contract.push(surface, step.r, step.p, kappa)
+        start = impulse.start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
+        g1 = impulse.end_gap(surface, step, start, kappa)
+        return Reaction(kappa * contract.inner_gradient(surface, step.r, r1), law.constraint(g1), solved)
 
 
-@reaction.register(MeanValue)
-def _(form, law, multiplier, surface, step):
-    body, r0, p = framed(surface, step.r, step.p)
-    own = Step(r0, p, step.c)
-    # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
-    low, high = 0.0, 0.0
-    kappa, f_low = _pushed(law, multiplier, body, own, low)
-    f_high = f_low
-    for i in range(_PARTS):
-        if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
-            break
-        low, f_low, high = high, f_high, (i + 1.0) / _PARTS
-        kappa, f_high = _pushed(law, multiplier, body, own, high)
-    beta, found = high, f_high == 0.0
-    if f_low == 0.0:
-        beta, found = low, True
-        kappa, _f = _pushed(law, multiplier, body, own, low)
-    elif f_low * f_high < 0.0:
-        for _i in range(_BETA_ITERATIONS):
-            beta = illinois(low, f_low, high, f_high)
-            kappa, f = _pushed(law, multiplier, body, own, beta)
-            if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
-                found = True
+class MeanValue(NamedTuple):
+    """The mean-value form, whose nested solves are too long for lanes."""
+
+    def reaction(self, law, multiplier, surface, step):
+        """`Reaction` of a surface."""
+        body, r0, p = framed(surface, step.r, step.p)
+        own = Step(r0, p, step.c)
+        # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
+        low, high = 0.0, 0.0
+        kappa, f_low = _pushed(law, multiplier, body, own, low)
+        f_high = f_low
+        for i in range(_PARTS):
+            if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
                 break
-            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
-    # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
-    # identity requires along grad q(r_beta) meets it whatever beta is.
-    r, change = _balanced(law, multiplier, body, own, beta, kappa)
-    return Reaction(r, _constraint(law, body, r0 + p - r), found and change <= _NEARLY)
+            low, f_low, high = high, f_high, (i + 1.0) / _PARTS
+            kappa, f_high = _pushed(law, multiplier, body, own, high)
+        beta, found = high, f_high == 0.0
+        if f_low == 0.0:
+            beta, found = low, True
+            kappa, _f = _pushed(law, multiplier, body, own, low)
+        elif f_low * f_high < 0.0:
+            for _i in range(_BETA_ITERATIONS):
+                beta = illinois(low, f_low, high, f_high)
+                kappa, f = _pushed(law, multiplier, body, own, beta)
+                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                    found = True
+                    break
+                low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
+        # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
+        # identity requires along grad q(r_beta) meets it whatever beta is.
+        r, change = _balanced(law, multiplier, body, own, beta, kappa)
+        return Reaction(r, _constraint(law, body, r0 + p - r), found and change <= _NEARLY)
+
+
+def form_of(gradient: str) -> Composite | MeanValue:
+    """The form of a method's argument `gradient`."""
+    return MeanValue() if gradient == "mean-value" else Composite()
 
 
 @outlined
@@ -236,14 +221,12 @@ def _pushed_with(law, multiplier, surface, step, beta, kappa):
 # --- A root in a bracket without derivatives -------------------------------------------------------------
 
 
-@inlined
 def illinois(low, f_low, high, f_high):
     """The next trial of regula falsi, the middle where that does not lie inside."""
     trial = low - f_low * (high - low) / (f_high - f_low)
     return trial if low < trial < high else 0.5 * (low + high)
 
 
-@inlined
 def narrowed(low, f_low, high, f_high, trial, f):
     """The half of the bracket that holds the root; the weight of an end that stays is halved (Illinois)."""
     if f * f_high > 0.0:

@@ -1,27 +1,26 @@
 """The energy that the walls store, summed over all surfaces of a scene, and how well it is known."""
 
-from typing import NamedTuple
-
-from ..kernel.gravity import Nothing, potential, weight
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.gravity import potential, weight
+from ..kernel.jit import select
+from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, dot, square, total
 from ..surfaces import contract
+from ..surfaces.fold import each
 from ..surfaces.stroke import place_scale
-from . import regularisation as law_of
 
 # Units of round-off by which a contact that is solved may miss its energy.
 _ROUND_OFF = 64.0 * 2.220446049250313e-16
 
 
-class Budget(NamedTuple):
-    """What the energy of a step is measured against."""
+class Budget(Record):
+    """The measure of the energy of a step."""
 
     over_mass: float  # 1/mass
     energy: float  # of the particle, per mass: that at the start of the run, with the work of walls since
     force: float  # that multipliers add to the springs, per mass
 
 
-class Ends(NamedTuple):
+class Ends(Record):
     """The two ends of a step of length h, and the velocity at the second."""
 
     r0: Vec
@@ -30,48 +29,31 @@ class Ends(NamedTuple):
     h: float
 
 
-@by_type
 def contact_energy(law, chain, over_mass, r):
     """Energy per mass that one particle stores in the walls, by 1/mass; rigid walls (None) store none."""
-    return _stored(chain, law, r) * over_mass
+    if law is None:
+        return 0.0
+    stored = 0.0
+    for link in reversed(each(chain)):
+        stored = law.stored_energy(contract.gap_of(link.first, contract.inner(link.first, r))) + stored
+    return stored * over_mass
 
 
-@contact_energy.register(Nothing)
-def _(law, chain, over_mass, r):
-    return 0.0
-
-
-@by_type
-def _stored(chain, law, r):
-    g = contract.gap_of(chain.first, contract.inner(chain.first, r))
-    return law_of.stored_energy(law, g) + _stored(chain.rest, law, r)
-
-
-@_stored.register(Nothing)
-def _(chain, law, r):
-    return 0.0
-
-
-@by_type
 def energy_uncertainty(chain, law, over_mass, r, s):
     """How far the stored energy per mass moves when each coordinate of r moves by that of s, to first order.
 
     With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
     """
-    surface = chain.first
-    g = contract.gap_of(surface, contract.inner(surface, r))
-    # 2 V/g, which is the force up to the factor (a + 1)/2
-    force = law_of.stiffness(law, g) * select(g > 0.0, g, 0.0) * over_mass
-    here = force * dot(absolute(contract.gradient(surface, r)), place_scale(surface, s))
-    return here + energy_uncertainty(chain.rest, law, over_mass, r, s)
+    found = 0.0
+    for link in reversed(each(chain)):
+        surface = link.first
+        g = contract.gap_of(surface, contract.inner(surface, r))
+        # 2 V/g, which is the force up to the factor (a + 1)/2
+        force = law.stiffness(g) * select(g > 0.0, g, 0.0) * over_mass
+        found = force * dot(absolute(contract.gradient(surface, r)), place_scale(surface, s)) + found
+    return found
 
 
-@energy_uncertainty.register(Nothing)
-def _(chain, law, over_mass, r, s):
-    return 0.0
-
-
-@inlined
 def restored(law, chain, after, gravity, budget, ends):
     """Factor of v after a contact step that restores the energy of the particle, and whether only round-off is missing.
 

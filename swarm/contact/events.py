@@ -1,10 +1,10 @@
 """How a lasting contact begins and ends, one particle at a time: what it becomes at a wall."""
 
 import math
-from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, inlined, outlined
+from ..kernel.jit import outlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import flights
 from ..surfaces import fold as walls
@@ -33,7 +33,7 @@ _EPSILON = 2.220446049250313e-16
 TOUCH = 1e-10
 
 
-class Particle(NamedTuple):
+class Particle(Record):
     """A particle in contact: its energy is twice that per mass, and scale2 is the square of its own speed."""
 
     r: Vec
@@ -43,10 +43,10 @@ class Particle(NamedTuple):
     scale2: float
 
 
-class Next(NamedTuple):
-    """What becomes of it: its velocity along the walls, the speed it keeps across them, its energy, its second wall.
+class Next(Record):
+    """Its phase then, its velocity along the walls, the speed that it keeps across them, its energy, its walls.
 
-    `wait` is how long the hops last that are left out, `impulse` what the wall gave.
+    `impulse` is that of the wall, `wait` how long the hops last that are left out.
     """
 
     phase: int
@@ -54,18 +54,16 @@ class Next(NamedTuple):
     keep: float
     twice: float
     wall: float
-    other: float
-    impulse: float
-    wait: float
+    other: float = -1.0
+    impulse: float = 0.0
+    wait: float = 0.0
 
 
-@inlined
 def own_speed2(p):
     """The square of the speed that a particle's own scale and its motion say."""
     return max(p.scale2, square(p.v))
 
 
-@inlined
 def weightless(rules, gravity, p):
     """An acceleration that is none for this particle: round-off of gravity, and of the pull of walls that bend.
 
@@ -74,12 +72,10 @@ def weightless(rules, gravity, p):
     return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 
 
-@inlined
 def _energy(twice):
     return Energy(twice, 0.5 / twice if twice > 0.0 else 0.0)
 
 
-@inlined
 def _loses(rules, wall):
     return 1.0 - wall_laws.restitution_of(rules.laws, wall) > 0.0
 
@@ -107,7 +103,7 @@ def _bounce(rules, chain, gravity, wall, p):
 
 @outlined
 def enter(rules, chain, gravity, wall, p):
-    """What becomes of a particle that leaves this wall so slowly that it is back at once."""
+    """`Next` of a particle that leaves this wall so slowly that it is back at once."""
     n, u = _normal(chain, wall, p.r), wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
     if dot(relative(u, v), n) > 0.0:
@@ -115,10 +111,10 @@ def enter(rules, chain, gravity, wall, p):
         v, twice, impulse = bounce.v, bounce.twice_energy, bounce.impulse
     away = -dot(relative(u, v), n)
     along = v + away * n
-    flies = Next(FLYING, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+    flies = Next(FLYING, v, 0.0, twice, wall, impulse=impulse)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
     press = _press(chain, wall, p.r, along, pull)
-    if not press > weightless(rules, gravity, p) or wall_laws.is_hot(rules.laws, wall):
+    if not press > weightless(rules, gravity, p) or wall_laws.thermal_of(rules.laws, wall).is_hot():
         return flies
     hop = 2.0 * max(away, 0.0) / press
     short = hop < rules.shortest_flight if rules.shortest_flight > 0.0 else away <= GRAZING * math.sqrt(speed2)
@@ -132,24 +128,23 @@ def enter(rules, chain, gravity, wall, p):
         if towards <= GRAZING * math.sqrt(speed2):
             edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
             if edge.phase == EDGE:
-                return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse, 0.0)
+                return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse)
         if following.time <= _INSTANT * rules.size / math.sqrt(speed2):
-            return Next(CAREFUL, v, 0.0, twice, wall, -1.0, impulse, 0.0)
+            return Next(CAREFUL, v, 0.0, twice, wall, impulse=impulse)
         return flies
     if not _loses(rules, wall):
-        return Next(HELD, along, _kept(away, p), twice, wall, -1.0, impulse, 0.0)
+        return Next(HELD, along, _kept(away, p), twice, wall, impulse=impulse)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
     # the particle than to one that slides, which the caller books, and friction as much less.
     slip = relative(u, along)
     e, speed = wall_laws.restitution_of(rules.laws, wall), norm(slip)
-    spared = wall_laws.number_of(wall_laws.friction(rules.laws), wall) * away
+    spared = wall_laws.of_wall(wall_laws.friction(rules.laws), wall) * away
     # `away` may be below 0 by round-off, and what friction has stopped has no direction.
     faster = along + (spared / speed) * slip if speed > abs(spared) else along
-    twice += square(faster) - square(v) if wall_laws.moves(rules.laws) else square(faster) - square(along) - away * away
+    twice += square(faster) - square(along) - away * away if u is None else square(faster) - square(v)
     return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
 
-@inlined
 def _kept(across, p):
     """The speed across its walls that a particle keeps while it slides."""
     return across if across > _NO_HOP * math.sqrt(own_speed2(p)) else 0.0
@@ -157,32 +152,28 @@ def _kept(across, p):
 
 @outlined
 def _on_edge(rules, chain, gravity, two, p):
-    """What becomes of a particle in an edge: it slides there if both walls press on it."""
+    """`Next` of a particle in an edge: it slides there if both walls press on it."""
     drift = hold.drift(wall_laws.moving(rules.laws), two, chain, p.r)
-    taken = hold.split_at(two, chain, drift, p.r, p.v)
+    taken = two.split_at(chain, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
-    stays = Next(FLYING, p.v, 0.0, p.twice, two.first, -1.0, 0.0, 0.0)
+    stays = Next(FLYING, p.v, 0.0, p.twice, two.first)
     least = weightless(rules, gravity, p)
     if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
-    n, m = hold.presses(two, chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
+    n, m = two.presses(chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
     if not (n > least and m > least):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
-        return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second, 0.0, 0.0)
-    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second, 0.0, 0.0)
+        return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second)
+    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second)
 
 
-@by_type
 def _across2(drift, v, taken):
-    """What a velocity loses of its square where its part across the walls is taken, and the square of that part."""
+    """The square that a velocity loses where its part across the walls is taken, and the square of that part."""
+    if drift is not None:
+        return square(v) - square(taken.along), square(v - taken.along)
     across2 = max(square(v) - square(taken.along), 0.0)
     return across2, across2
-
-
-@_across2.register(hold.Drift)
-def _(drift, v, taken):
-    return square(v) - square(taken.along), square(v - taken.along)
 
 
 # --- While it slides -------------------------------------------------------------------------------------
@@ -190,63 +181,48 @@ def _(drift, v, taken):
 
 @outlined
 def meet(rules, held, chain, gravity, wall, p):
-    """What becomes of a sliding particle at another wall."""
+    """`Next` of a sliding particle at another wall."""
     bounce = _bounce(rules, chain, gravity, wall, p)
-    return after_meeting(
-        rules, held, chain, gravity, wall, Particle(p.r, bounce.v, bounce.impulse, bounce.twice_energy, p.scale2)
-    )
-
-
-@outlined
-def after_meeting(rules, held, chain, gravity, wall, p):
-    """The same with the velocity that the other wall has turned; `left` is its impulse."""
-    impulse = p.left
+    p, impulse = Particle(p.r, bounce.v, p.left, bounce.twice_energy, p.scale2), bounce.impulse
     moving = wall_laws.moving(rules.laws)
     away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
     drift = hold.drift(moving, held, chain, p.r)
-    taken = hold.split_at(held, chain, drift, p.r, p.v)
-    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, -1.0, impulse, 0.0)
+    taken = held.split_at(chain, drift, p.r, p.v)
+    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, impulse=impulse)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
     if away <= slow:
         found = _at_rest_there(held, rules, chain, gravity, wall, p)
         if found.phase != FLYING:
-            return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse, 0.0)
+            return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse)
     across2, kept2 = _across2(drift, p.v, taken)
     keep, twice = _kept(math.sqrt(kept2), p), p.twice
     if _loses(rules, held.first):
         keep, twice = 0.0, p.twice - across2
-    other = hold.second(held)
-    return Next(EDGE if other >= 0.0 else HELD, taken.along, keep, twice, held.first, other, impulse, 0.0)
+    return Next(EDGE if held.second >= 0.0 else HELD, taken.along, keep, twice, held.first, held.second, impulse)
 
 
-@by_type
 def _at_rest_there(held, rules, chain, gravity, wall, p):
-    """What becomes of it where it is too slow to leave the other wall: an edge, or that wall alone."""
+    """`Next` where a particle is too slow to leave the other wall: an edge, or that wall alone."""
+    if isinstance(held, Two):
+        return Next(CAREFUL, p.v, 0.0, p.twice, wall)
     edge = _on_edge(rules, chain, gravity, Two(held.first, wall), p)
     if edge.phase == EDGE:
         return edge
     pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
-    away = -dot(n, relative(wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r), p.v))
+    moving = wall_laws.moving(rules.laws)
+    away = -dot(n, relative(wall_velocity(moving, chain, wall, p.r), p.v))
     along = p.v + away * n
-    least = weightless(rules, gravity, p)
-    if not _press(chain, wall, p.r, along, pull) > least:
+    if not _press(chain, wall, p.r, along, pull) > weightless(rules, gravity, p):
         return edge
-    if (
-        dot(_normal(chain, held.first, p.r), sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration)
-        > 0.0
-    ):
+    drawn = sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration
+    if dot(_normal(chain, held.first, p.r), drawn) > 0.0:
         return edge
     keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
-        keep, twice = 0.0, p.twice - (square(p.v) - square(along) if wall_laws.moves(rules.laws) else away * away)
-    return Next(HELD, along, keep, twice, wall, -1.0, 0.0, 0.0)
-
-
-@_at_rest_there.register(Two)
-def _(held, rules, chain, gravity, wall, p):
-    return Next(CAREFUL, p.v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
+        keep, twice = 0.0, p.twice - (away * away if moving is None else square(p.v) - square(along))
+    return Next(HELD, along, keep, twice, wall)
 
 
 @outlined
@@ -266,7 +242,6 @@ def settles(rules, chain, gravity, p, held):
     return slow and touching.are_carried(chain, gravity, p.r, p.v, TOUCH * rules.size, held)
 
 
-@inlined
 def rests(gravity, force):
     """Whether a particle without speed stays where it is."""
     return norm(force.acceleration) <= ALLOWED * norm(accelerated(gravity, ZERO, 1.0))

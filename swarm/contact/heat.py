@@ -1,24 +1,25 @@
 """Thermal walls: a particle that they accommodate leaves with a velocity of the wall's temperature."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..kernel.jit import outlined
 from ..kernel.random import flux_maxwellian, uniforms
+from ..kernel.record import Record
 from ..kernel.vector import Vec, dot
 from ..surfaces import fold as walls
 from . import laws as wall_laws
 from .reflection import from_relative, given, relative, wall_velocity
 
 
-class Draw(NamedTuple):
-    """What the random numbers of an impact depend on: the seed of the run, the particle, its number of impacts."""
+class Draw(Record):
+    """The source of the random numbers of an impact: the seed of the run, the particle, its number of impacts."""
 
     seed: Any
     particle: Any
     number: Any
 
 
-class Left(NamedTuple):
+class Left(Record):
     """Whether a wall has accommodated a particle, its velocity then, and the normal impulse per mass.
 
     `work` is twice what the wall gives by its motion, per mass; the rest of the change of energy is heat.
@@ -32,8 +33,8 @@ class Left(NamedTuple):
 
 @outlined
 def exchange(laws, chain, wall, arriving, mass, draw):
-    """What a thermal wall makes of a particle that is `arriving` with (r, v)."""
-    law = wall_laws.thermal_of(wall_laws.thermal(laws), wall)
+    """`Left` of a particle that is `arriving` at a thermal wall with (r, v)."""
+    law = wall_laws.thermal_of(laws, wall)
     r, v = arriving
     n = walls.unit_normal(chain, wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)

@@ -9,13 +9,11 @@ c = h^2/(4m) for the midpoint and the trapezoidal rule.
 import math
 from typing import NamedTuple
 
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.jit import select
 from ..kernel.vector import ZERO, square
 from ..surfaces import contract
 from ..surfaces.fold import of_wall
-from . import regularisation as law_of
-from .discrete_gradient import Reaction, illinois, narrowed, reaction
+from .discrete_gradient import Reaction, illinois, narrowed
 from .force import NEEDS as FORCE_NEEDS
 from .force import strength
 
@@ -27,32 +25,25 @@ _TOLERANCE = 1e-8
 SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 _EPSILON = 2.220446049250313e-16
-# What the equation needs of every wall.
+# The equation needs these of every wall.
 NEEDS = (*FORCE_NEEDS, contract.resolve, contract.farthest_push)
 
 
-class AtEnd(NamedTuple):
-    """A form of `reaction`: the force is that at the end of the displacement, and c = h^2/(4m)."""
-
-
-@inlined
 def _residual(law, surface, r, c, kappa):
     """F(kappa)"""
     return kappa - c * strength(law, surface, contract.inner(surface, contract.resolve(surface, r, kappa)))
 
 
-@inlined
 def _guess(surface, law, r, c):
     """kappa if the wall were flat and the spring linear."""
     q = contract.inner(surface, r)
     g = contract.gap_of(surface, q)
     slope, _curvature = contract.gap_slope(surface, q, q)
     # g(s) = g - kappa g'(q) |grad q|^2 and V' = k g(s): kappa (1 + c k g'^2 |grad q|^2) = c k g' g
-    stiff = c * law_of.stiffness(law, g) * slope
+    stiff = c * law.stiffness(g) * slope
     return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(contract.inner_gradient(surface, r, r)))
 
 
-@inlined
 def _improve(surface, law, r, c, kappa):
     """The Newton step of kappa, and whether it was so large that another is needed."""
     f = _residual(law, surface, r, c, kappa)
@@ -70,33 +61,33 @@ guess = of_wall(_guess, 0.0)
 improve = of_wall(_improve, (0.0, False))
 
 
-@by_type
 def reached(chain, wall, r, kappa):
     """s; r where there is no such wall."""
+    if chain is None:
+        return r
     other = reached(chain.rest, wall - 1.0, r, kappa)
     return select(wall == 0.0, contract.resolve(chain.first, r, kappa), other)
 
 
-@reached.register(Nothing)
-def _(chain, wall, r, kappa):
-    return r
+class AtEnd(NamedTuple):
+    """A form of `reaction`: the force is that at the end of the displacement, and c = h^2/(4m)."""
 
-
-@reaction.register(AtEnd)
-def _(form, law, multiplier, surface, step):
-    # A cavity pushes with kappa > 0, a solid with kappa < 0. The force falls along the push: F changes sign by -F(0).
-    r, c = step.r + step.p, step.c
-    f_low = _residual(law, surface, r, c, 0.0)
-    if f_low == 0.0:
-        return Reaction(ZERO, 0.0, True)
-    # Before the pole of `resolve`.
-    farthest = 0.5 * abs(contract.farthest_push(surface))
-    low, high = 0.0, math.copysign(min(abs(f_low), (1.0 - 1e-12) * farthest), -f_low)
-    f_high = _residual(law, surface, r, c, high)
-    kappa, found = high, f_low * f_high <= 0.0
-    for _i in range(_CAREFUL_ITERATIONS):
-        if not found or f_high == 0.0 or abs(high - low) <= 2.0 * _EPSILON * abs(high):
-            break
-        kappa = illinois(low, f_low, high, f_high)
-        low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, _residual(law, surface, r, c, kappa))
-    return Reaction(r - contract.resolve(surface, r, kappa), 0.0, found)
+    def reaction(self, law, multiplier, surface, step):
+        """`Reaction` of a surface."""
+        # A cavity pushes with kappa > 0, a solid with kappa < 0. The force falls along the push: F changes sign by
+        # -F(0).
+        r, c = step.r + step.p, step.c
+        f_low = _residual(law, surface, r, c, 0.0)
+        if f_low == 0.0:
+            return Reaction(ZERO, 0.0, True)
+        # Before the pole of `resolve`.
+        farthest = 0.5 * abs(contract.farthest_push(surface))
+        low, high = 0.0, math.copysign(min(abs(f_low), (1.0 - 1e-12) * farthest), -f_low)
+        f_high = _residual(law, surface, r, c, high)
+        kappa, found = high, f_low * f_high <= 0.0
+        for _i in range(_CAREFUL_ITERATIONS):
+            if not found or f_high == 0.0 or abs(high - low) <= 2.0 * _EPSILON * abs(high):
+                break
+            kappa = illinois(low, f_low, high, f_high)
+            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, _residual(law, surface, r, c, kappa))
+        return Reaction(r - contract.resolve(surface, r, kappa), 0.0, found)

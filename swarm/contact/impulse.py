@@ -9,13 +9,11 @@ A multiplier is a float, or None where the method has none.
 """
 
 import math
-from typing import NamedTuple
 
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, inlined, outlined, select
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
 from ..surfaces import contract
 from ..surfaces.fold import of_wall
-from . import regularisation as law_of
 
 # A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
 # a multiplier its square need only be small, as the loop repairs the rest.
@@ -31,14 +29,14 @@ _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
 # A point whose coordinates would be on the surface within this part of themselves is on it.
 _ON_SURFACE = 8.0 * _EPSILON
-# What the equation and its energy need of every wall; multipliers need `gap_scale` too.
+# The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
     contract.inner, contract.gap_of, contract.gap_slope, contract.gradient, contract.inner_gradient, contract.push,
     contract.rise, contract.farthest_push,
 )  # fmt: skip
 
 
-class Start(NamedTuple):
+class Start(Record):
     """The start of a step at one surface."""
 
     q: float
@@ -47,7 +45,7 @@ class Start(NamedTuple):
     tolerance: float  # of Newton's steps
 
 
-class Residual(NamedTuple):
+class Residual(Record):
     """F(kappa), the left side of (K) less its right side, and what it is made of."""
 
     value: float
@@ -57,15 +55,15 @@ class Residual(NamedTuple):
     rise_slope: float  # g[q0, q1]
 
 
-class LoopRecord(NamedTuple):
-    """What the loop of a multiplier needs of a step."""
+class LoopRecord(Record):
+    """A step as the loop of a multiplier takes it."""
 
     mean: float  # (Phi0 + Phi1)/2
     stored: float  # V1
     gain: float  # dkappa/dlambda
 
 
-class Newton(NamedTuple):
+class Newton(Record):
     """A Newton step of kappa, to be subtracted."""
 
     step: float
@@ -73,50 +71,40 @@ class Newton(NamedTuple):
     record: LoopRecord
 
 
-@inlined
 def _residual(law, multiplier, surface, step, start, kappa):
     rise, drise = contract.rise(surface, step.r, step.p, kappa)
     slope, dslope = contract.gap_slope(surface, start.q, start.q + rise)
     # g1 - g0 = g[q0, q1] (q1 - q0)
     g1 = start.gap + slope * rise
     g1 = select(abs(g1) <= start.round_off, 0.0, g1)
-    force, dforce = law_of.force(multiplier, law, start.gap, g1)
+    force, dforce = law.force(multiplier, start.gap, g1)
     dg1 = drise * (slope + dslope * rise)
     f, df = kappa - step.c * force * slope, 1.0 - step.c * (dforce * dg1 * slope + force * dslope * drise)
     return Residual(f, df, g1, dg1, slope)
 
 
-@by_type
 def start_gap(multiplier, surface, r, q0):
     """The start of a step from r, where q = q0; only multipliers need a gap of round-off to count as 0."""
-    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
     g0 = contract.gap_of(surface, q0)
+    if multiplier is None:
+        return Start(q0, g0, 0.0, _NEWTON_TOLERANCE)
+    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
     round_off = _ON_SURFACE * contract.gap_scale(surface, r)
     return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
 
 
-@start_gap.register(Nothing)
-def _(multiplier, surface, r, q0):
-    return Start(q0, contract.gap_of(surface, q0), 0.0, _NEWTON_TOLERANCE)
-
-
-@by_type
-def loop_record(multiplier, law, g0, g1, g, factor):
+def _loop_record(multiplier, law, g0, g1, g, factor):
     """The `LoopRecord` of the step that ends at gap g; without a multiplier zeros.
 
     dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
     """
-    slope, _curvature = law_of.constraint_slope(law, g0, g1)
-    mean = 0.5 * (law_of.constraint(law, g0) + law_of.constraint(law, g))
-    return LoopRecord(mean, law_of.stored_energy(law, g), factor * slope)
+    if multiplier is None:
+        return LoopRecord(0.0, 0.0, 0.0)
+    slope, _curvature = law.constraint_slope(g0, g1)
+    mean = 0.5 * (law.constraint(g0) + law.constraint(g))
+    return LoopRecord(mean, law.stored_energy(g), factor * slope)
 
 
-@loop_record.register(Nothing)
-def _(multiplier, law, g0, g1, g, factor):
-    return LoopRecord(0.0, 0.0, 0.0)
-
-
-@inlined
 def _guess(surface, law, step):
     """kappa if the wall were flat and the spring linear."""
     q0 = contract.inner(surface, step.r)
@@ -129,7 +117,7 @@ def _guess(surface, law, step):
     #   staying:             g1 = (gf - C g0)/(1 + C)
     #   leaving (g1 < 0):    g1^2 - (gf + g0) g1 + gf g0 - C g0^2 = 0
     e = -slope * drise
-    stiff = 0.5 * step.c * slope * e * law_of.stiffness(law, select(g0 > gf, g0, gf))
+    stiff = 0.5 * step.c * slope * e * law.stiffness(select(g0 > gf, g0, gf))
     entering = g0 <= 0.0
     one = 1.0 + stiff
     inverse = 1.0 / one
@@ -142,7 +130,6 @@ def _guess(surface, law, step):
     return (gf - g1) / e
 
 
-@inlined
 def _improve(surface, law, multiplier, step, kappa):
     """The `Newton` step of kappa.
 
@@ -156,7 +143,7 @@ def _improve(surface, law, multiplier, step, kappa):
     depth = select(g0 > abs(g1), g0, abs(g1))
     # True for NaN.
     more = not (abs(change * f.gap_slope) <= start.tolerance * depth + 2.0 * start.round_off)
-    record = loop_record(multiplier, law, g0, g1, g1 - change * f.gap_slope, step.c * f.rise_slope / f.slope)
+    record = _loop_record(multiplier, law, g0, g1, g1 - change * f.gap_slope, step.c * f.rise_slope / f.slope)
     return Newton(change, more, record)
 
 
@@ -165,7 +152,6 @@ guess = of_wall(_guess, 0.0)
 improve = of_wall(_improve, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)))
 
 
-@inlined
 def end_gap(surface, step, start, kappa):
     """g1 of the step that is pushed with kappa, from g1 - g0: more digits of a small g1 than r1 has."""
     rise, _drise = contract.rise(surface, step.r, step.p, kappa)
@@ -208,19 +194,13 @@ def careful(law, multiplier, surface, step):
     return sign * k, False
 
 
-@by_type
 def _first_push(multiplier, size, df):
     """Where to look for the root first, from |F(0)| and F'(0)."""
     # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to that.
-    return size
-
-
-@_first_push.register(Nothing)
-def _(multiplier, size, df):
-    # Newton's first step, which does not pass the root where the right side of (K) is convex. The value at 0 can be
-    # past the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from
-    # there held the largest of three roots.
-    return size / df if 1.0 < df < math.inf else size
+    # Without one it does not pass the root where the right side of (K) is convex. The value at 0 can be past the root
+    # of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from there held the
+    # largest of three roots.
+    return size / df if multiplier is None and 1.0 < df < math.inf else size
 
 
 @outlined

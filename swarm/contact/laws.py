@@ -2,12 +2,13 @@
 
 from typing import Any, NamedTuple
 
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.jit import select
+from ..kernel.record import Record
 from ..surfaces.fold import Chain
 
 
 class Laws(NamedTuple):
-    """What impacts do to a particle besides turning it round."""
+    """The effects of impacts on a particle besides turning it round."""
 
     restitution: Any  # None, or a Chain of one e a wall
     friction: Any  # None, or a Chain of one mu a wall
@@ -15,7 +16,7 @@ class Laws(NamedTuple):
     moving: Any  # None, or `Moves` where a wall moves
 
 
-class Span(NamedTuple):
+class Span(Record):
     """In a chain of numbers, one that holds for so many walls."""
 
     first: Any
@@ -23,154 +24,64 @@ class Span(NamedTuple):
     rest: Any
 
 
-# What the chain of a law is that some wall has.
+# The chain of a law that some wall has.
 Given = Chain | Span
 
 
-class Moves(NamedTuple):
+class Moves(Record):
     """Walls that move: they do work, and laws act on the velocity relative to them."""
 
     some: float
 
 
-class Thermal(NamedTuple):
+class Thermal(Record):
     """A thermal wall, or one that is not, whose accommodation is 0."""
 
     energy: float  # k_B T [J]
     accommodation: float
 
-
-@by_type
-def number_of(chain, wall):
-    """The number of this wall."""
-    return 0.0
+    def is_hot(self):
+        """Whether it gives particles a speed of its own, so that none slides on it."""
+        return (self.accommodation > 0.0) & (self.energy > 0.0)
 
 
-@number_of.register(Chain)
-def _(chain, wall):
-    return select(wall == 0.0, chain.first, number_of(chain.rest, wall - 1.0))
-
-
-@number_of.register(Span)
-def _(chain, wall):
-    return select(wall < chain.walls, chain.first, number_of(chain.rest, wall - chain.walls))
-
-
-@by_type
-def is_given(chain):
-    """Whether any wall has this law: a constant for the compiler."""
-    return False
-
-
-is_given.register(Given, lambda chain: True)
-
-
-@by_type
-def thermal_of(chain, wall):
-    """`Thermal` of this wall."""
-    return Thermal(0.0, 0.0)
-
-
-@thermal_of.register(Chain)
-def _(chain, wall):
-    return _either(wall == 0.0, chain.first, thermal_of(chain.rest, wall - 1.0))
-
-
-@thermal_of.register(Span)
-def _(chain, wall):
-    return _either(wall < chain.walls, chain.first, thermal_of(chain.rest, wall - chain.walls))
-
-
-@inlined
-def _either(here, first, other):
-    return Thermal(select(here, first.energy, other.energy), select(here, first.accommodation, other.accommodation))
+def of_wall(chain, wall, neutral=0.0):
+    """The entry of this wall, `neutral` where no wall has the law."""
+    if chain is None:
+        return neutral
+    if isinstance(chain, Span):
+        return select(wall < chain.walls, chain.first, of_wall(chain.rest, wall - chain.walls, neutral))
+    return select(wall == 0.0, chain.first, of_wall(chain.rest, wall - 1.0, neutral))
 
 
 # --- Of the laws of a scene, or None ---------------------------------------------------------------------
 
 
-@by_type
-def restitution(laws):
-    """The restitution of all walls."""
-    return
-
-
-@by_type
 def friction(laws):
-    """The friction of all walls."""
-    return
+    """The friction of all walls, or None."""
+    return None if laws is None else laws.friction
 
 
-@by_type
 def thermal(laws):
-    """The temperatures of all walls."""
-    return
+    """The temperatures of all walls, or None."""
+    return None if laws is None else laws.thermal
 
 
-@by_type
 def moving(laws):
     """`Moves`, or None."""
-    return
+    return None if laws is None else laws.moving
 
 
-@by_type
 def loses(laws):
     """Whether an impact may turn energy into heat: a constant for the compiler."""
-    return False
+    return laws is not None and (laws.restitution is not None or laws.friction is not None)
 
 
-@by_type
-def moves(laws):
-    """Whether a wall moves: a constant for the compiler."""
-    return False
-
-
-moves.register(Laws, lambda laws: is_moving(laws.moving))
-
-
-@by_type
-def is_moving(moving):
-    """Whether there is `Moves`: a constant for the compiler."""
-    return False
-
-
-is_moving.register(Moves, lambda moving: True)
-moving.register(Laws, lambda laws: laws.moving)
-loses.register(Laws, lambda laws: is_given(laws.restitution) or is_given(laws.friction))
-restitution.register(Laws, lambda laws: laws.restitution)
-friction.register(Laws, lambda laws: laws.friction)
-thermal.register(Laws, lambda laws: laws.thermal)
-
-
-# --- Of one wall -----------------------------------------------------------------------------------------
-
-
-@by_type
 def restitution_of(laws, wall):
-    """e of this wall."""
-    return 1.0
+    """e of a wall."""
+    return 1.0 if laws is None or laws.restitution is None else of_wall(laws.restitution, wall)
 
 
-@restitution_of.register(Laws)
-def _(laws, wall):
-    return _e(laws.restitution, wall)
-
-
-@by_type
-def _e(chain, wall):
-    return 1.0
-
-
-_e.register(Given, lambda chain, wall: number_of(chain, wall))
-
-
-@by_type
-def is_hot(laws, wall):
-    """Whether this wall gives particles a speed of its own, so that none slides on it."""
-    return False
-
-
-@is_hot.register(Laws)
-def _(laws, wall):
-    found = thermal_of(laws.thermal, wall)
-    return (found.accommodation > 0.0) & (found.energy > 0.0)
+def thermal_of(laws, wall):
+    """`Thermal` of a wall."""
+    return of_wall(thermal(laws), wall, Thermal(0.0, 0.0))

@@ -2,24 +2,21 @@
 
 import math
 
-import numpy as np
-
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, outlined, scratch
+from ..kernel.jit import index, outlined
 from ..kernel.vector import cross, dot, norm, square
 from ..surfaces import fold as walls
-from ..surfaces import near as near_walls
 from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
-from ..surfaces.openings import Openings, is_open, outside
+from ..surfaces.fold import each
+from ..surfaces.openings import is_open, outside
 from . import laws as wall_laws
-from .crossing import at_part, block_of_path
+from .crossing import at_part, bisected, block_of_path
 from .events import TOUCH
-from .hold import second
 from .reflection import relative, wall_velocity
+from .touching import numbers_near
 
-# Places of a step between which the distance to an opening has one least value, and steps of the search for that value
-# and for the place where the opening begins.
-_PLACES, _HALVINGS, _THIRDS = 16, 60, 80
+# Places of a step between which the distance to an opening has one least value, and steps of the search for it.
+_PLACES, _THIRDS = 16, 80
 # The sine of the angle between walls that hold a particle as one.
 _PARALLEL = 1e-7
 
@@ -35,10 +32,9 @@ def _lets_out(openings, rules, chain, wall, r, near):
 @outlined
 def _is_covered(openings, rules, chain, wall, r, near):
     """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
-    count, touch, n = near_walls.count_near(chain, r), TOUCH * rules.size + near, walls.unit_normal(chain, wall, r)
-    number = scratch(count, np.float64)
-    near_walls.list_near(chain, 0, 0.0, r, number)
-    for i in range(count):
+    number = numbers_near(chain, r)
+    touch, n = TOUCH * rules.size + near, walls.unit_normal(chain, wall, r)
+    for i in range(number.size):
         m = walls.unit_normal(chain, number[i], r)
         alike = dot(n, m) > 0.0 and square(cross(n, m)) <= _PARALLEL * _PARALLEL
         here = alike and abs(walls.distance(chain, number[i], r)) <= touch
@@ -57,10 +53,9 @@ def hit_wall(openings, rules, chain, motion, wall, near):
     if not is_open(openings, wall, r, near):
         return wall
     moving, touch = wall_laws.moving(rules.laws), TOUCH * rules.size + near
-    count, found, soonest = near_walls.count_near(chain, r), wall, math.inf
-    number = scratch(count, np.float64)
-    near_walls.list_near(chain, 0, 0.0, r, number)
-    for i in range(count):
+    number = numbers_near(chain, r)
+    found, soonest = wall, math.inf
+    for i in range(number.size):
         w = relative(wall_velocity(moving, chain, number[i], r), v)
         towards, distance = dot(walls.unit_normal(chain, number[i], r), w), walls.distance(chain, number[i], r)
         # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
@@ -75,21 +70,16 @@ def open_wall_of(openings, rules, chain, held, r, near):
     """The wall of those that hold a particle that lets it out at its place, or nearer to that than `near`; or -1."""
     if _lets_out(openings, rules, chain, held.first, r, near):
         return held.first
-    return second(held) if _lets_out(openings, rules, chain, second(held), r, near) else -1.0
+    return held.second if _lets_out(openings, rules, chain, held.second, r, near) else -1.0
 
 
-@by_type_outlined
+@outlined
 def open_wall_at(openings, rules, chain, r, near):
     """A wall at a place that lets out there, or -1."""
-    return -1.0
-
-
-@open_wall_at.register(Openings)
-def _(openings, rules, chain, r, near):
-    count, touch = near_walls.count_near(chain, r), TOUCH * rules.size
-    number = scratch(count, np.float64)
-    near_walls.list_near(chain, 0, 0.0, r, number)
-    for i in range(count):
+    if openings is None:
+        return -1.0
+    number, touch = numbers_near(chain, r), TOUCH * rules.size
+    for i in range(number.size):
         if walls.distance(chain, number[i], r) >= -touch and _lets_out(openings, rules, chain, number[i], r, near):
             return number[i]
     return -1.0
@@ -98,51 +88,31 @@ def _(openings, rules, chain, r, near):
 # --- Steps -----------------------------------------------------------------------------------------------
 
 
-@inlined
 def _reach(path):
     """Twice the length of a step: what is farther from its end, by a distance of first order, is not on its way."""
     return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
-@by_type
 def may_pass(openings, held, path):
     """Whether a step may come into an opening of a wall that holds the particle."""
-    return False
+    found, reach = False, _reach(path)
+    for run in each(openings):
+        enters = False
+        for link in each(run.volumes):
+            enters = enters | _may_enter(link.first, path, reach)
+        found = found | ((_is_of(run, held.first) | _is_of(run, held.second)) & enters)
+    return found
 
 
-@may_pass.register(Openings)
-def _(openings, held, path):
-    reach = _reach(path)
-    return _may_pass(openings, held.first, path, reach) | _may_pass(openings, second(held), path, reach)
+def _is_of(run, wall):
+    """Whether a wall is open in these volumes."""
+    return (wall >= run.first) & (wall < run.last)
 
 
-@by_type
-def _may_pass(openings, wall, path, reach):
-    return False
-
-
-@_may_pass.register(Openings)
-def _(openings, wall, path, reach):
-    here = (wall >= openings.first) & (wall < openings.last) & _may_enter_any(openings.volumes, path, reach)
-    return here | _may_pass(openings.rest, wall, path, reach)
-
-
-@by_type
-def _may_enter_any(volumes, path, reach):
-    return False
-
-
-@_may_enter_any.register(walls.Chain)
-def _(volumes, path, reach):
-    return _may_enter(volumes.first, path, reach) | _may_enter_any(volumes.rest, path, reach)
-
-
-@by_type
 def _may_enter(volume, path, reach):
+    if isinstance(volume, walls.Field):
+        return _may_enter_one(volume.first, path, reach)
     return outside(volume, path.r1) <= reach
-
-
-_may_enter.register(walls.Field, lambda volume, path, reach: _may_enter_one(volume.first, path, reach))
 
 
 @outlined
@@ -157,16 +127,12 @@ def _may_enter_one(members, path, reach):
     return False
 
 
-@by_type
 def part_until_open(openings, rules, chain, held, path, near):
     """The part of a step after which a wall that holds the particle lets it out, deeper than `near`; else infinite."""
-    return math.inf
-
-
-@part_until_open.register(Openings)
-def _(openings, rules, chain, held, path, near):
+    if openings is None:
+        return math.inf
     first = _part_uncovered(openings, rules, chain, held.first, path, near)
-    return min(first, _part_uncovered(openings, rules, chain, second(held), path, near))
+    return min(first, _part_uncovered(openings, rules, chain, held.second, path, near))
 
 
 @outlined
@@ -177,47 +143,31 @@ def _part_uncovered(openings, rules, chain, wall, path, near):
         return low
     for k in range(1, _PLACES + 1):
         high = k / _PLACES
-        if high > low and _lets_out(openings, rules, chain, wall, at_part(path, high), near):
-            for _half in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                if _lets_out(openings, rules, chain, wall, at_part(path, middle), near):
-                    high = middle
-                else:
-                    low = middle
-            return high
+        if high > low and _lets_out_at(openings, rules, chain, wall, path, near, high):
+            return bisected(_lets_out_at, (openings, rules, chain, wall, path, near), low, high)
         low = max(low, high)
     return math.inf
 
 
-@by_type
+def _lets_out_at(openings, rules, chain, wall, path, near, part):
+    return _lets_out(openings, rules, chain, wall, at_part(path, part), near)
+
+
 def _part(openings, wall, path, near):
+    for run in each(openings):
+        if run.first <= wall < run.last:
+            first = math.inf
+            for link in reversed(each(run.volumes)):
+                first = min(_way_into(link.first, path, near), first)
+            return first
     return math.inf
 
 
-@_part.register(Openings)
-def _(openings, wall, path, near):
-    if openings.first <= wall < openings.last:
-        return _first_part(openings.volumes, path, near)
-    return _part(openings.rest, wall, path, near)
-
-
-@by_type
-def _first_part(volumes, path, near):
-    return math.inf
-
-
-@_first_part.register(walls.Chain)
-def _(volumes, path, near):
-    return min(_entry(volumes.first, path, near), _first_part(volumes.rest, path, near))
-
-
-@by_type
-def _entry(volume, path, near):
+def _way_into(volume, path, near):
     """The part of a step after which it is in a volume."""
+    if isinstance(volume, walls.Field):
+        return _way_into_any(volume.first, path, near)
     return _way_in(volume, path, near)
-
-
-_entry.register(walls.Field, lambda volume, path, near: _way_into_any(volume.first, path, near))
 
 
 @outlined
@@ -245,7 +195,7 @@ def _way_in(volume, path, near):
             place = _nearest(volume, path, last, min(k + 1, _PLACES) / _PLACES)
             here = outside(volume, at_part(path, place))
         if here < -near:
-            return _edge(volume, path, last, place)
+            return bisected(_is_in, (volume, path), last, place)
         last = k / _PLACES
     return math.inf
 
@@ -262,13 +212,5 @@ def _nearest(volume, path, low, high):
     return 0.5 * (low + high)
 
 
-@outlined
-def _edge(volume, path, low, high):
-    """The part of a step at which it enters a volume, between two others."""
-    for _half in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if outside(volume, at_part(path, middle)) <= 0.0:
-            high = middle
-        else:
-            low = middle
-    return high
+def _is_in(volume, path, part):
+    return outside(volume, at_part(path, part)) <= 0.0

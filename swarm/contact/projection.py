@@ -1,15 +1,32 @@
 """P, the projection of a vector on what no touched wall forbids: a half-space, the edge of two walls, a corner."""
 
-from typing import NamedTuple
+import math
+from typing import Any
 
-from ..kernel.jit import inlined, outlined, select
-from ..kernel.vector import ZERO, Vec, column, cross, dot, norm
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, column, cross, dot, largest, norm, put, total
+from ..surfaces import fold as walls
 
+_EPSILON = 2.220446049250313e-16
 # Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
-ALLOWED = 64.0 * 2.220446049250313e-16
+ALLOWED = 64.0 * _EPSILON
+# Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
+_SWEEPS = 60
 
 
-class Edge(NamedTuple):
+class Touch(Record):
+    """The walls near a sliding particle, one entry each."""
+
+    number: Any  # of the wall
+    touched: Any  # whether it is
+    normal: Any  # (3, walls): unit normal of the step
+    held: Any  # the part of the velocity that the wall takes
+    depth: Any  # signed distance outside
+    frame: Any  # None, or a velocity with which they move along their normals
+
+
+class Edge(Record):
     """Of two walls i and j: e along their edge, m = e x n_i, and n_j = cosine n_i + sine m."""
 
     e: Vec
@@ -47,7 +64,6 @@ def project(touched, normal, held, w):
     return ZERO
 
 
-@inlined
 def along(normal, i, a):
     """The component of a vector along the normal of wall i."""
     return dot(column(normal, 0, i), a)
@@ -93,7 +109,7 @@ def _edge(normal, i, j):
 
 @outlined
 def _carried(touched, normal, held, w):
-    """What each wall of a corner takes of w: the first three that carry it."""
+    """The part of w that each wall of a corner takes: the first three that carry it."""
     count = touched.size
     for i in range(count):
         for j in range(i):
@@ -109,3 +125,41 @@ def _carried(touched, normal, held, w):
                     if p >= 0.0 and q >= 0.0 and r >= 0.0:
                         held[i], held[j], held[k] = p, q, r
                         return
+
+
+# --- Of a step -------------------------------------------------------------------------------------------
+
+
+@outlined
+def velocity_along(chain, touch, r, w, h):
+    """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
+    u, r1 = ZERO, r
+    for _sweep in range(_SWEEPS):
+        put_normals(chain, touch, touch.touched, r, r1)
+        u = project(touch.touched, touch.normal, touch.held, w)
+        before, r1 = r1, r + h * u
+        if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
+            break
+    return u
+
+
+@outlined
+def put_normals(chain, touch, which, r0, r1):
+    """The unit vector along the discrete gradient of each of these walls, out of the admissible side, into `touch`."""
+    for i in range(which.size):
+        if which[i]:
+            put(touch.normal, 0, i, _normal(chain, touch.number[i], r0, r1))
+
+
+@outlined
+def _normal(chain, wall, r0, r1):
+    """The unit vector along the discrete gradient of a wall, out of the admissible side."""
+    n = walls.unit_normal(chain, wall, r0)
+    d = walls.inner_gradient(chain, wall, r0, r1)
+    length = norm(d)
+    if dot(d, n) < 0.0:
+        length = -length
+    # At a singular point, such as an apex, both may be undefined: the wall then forbids nothing.
+    if length != 0.0 and math.isfinite(length):
+        n = d / length
+    return n if math.isfinite(total(n)) else ZERO

@@ -9,28 +9,26 @@ and close, the quotients would cancel, so each law has forms that do not.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..kernel.jit import by_type, inlined, select
-
-
-class Linear(NamedTuple):
-    """a = 1, a linear spring; alpha is the penalty [N/m for a gap in m]."""
-
-    alpha: float
+from ..kernel.jit import select
+from ..kernel.record import Record
 
 
-class Hertz(NamedTuple):
-    """a = 1.5, Hertz's law of elastic spheres."""
+class Law(Record):
+    """A law of one stiffness alpha, the penalty."""
 
-    alpha: float
+    def stiffened(self: Any, factor: Any) -> Any:
+        """The same law with `factor` times the penalty."""
+        return self._replace(alpha=factor * self.alpha)
 
-
-class Power(NamedTuple):
-    """Any a >= 1. `pow` is a call, so the lane loop is not vectorised: about ten times the cost of `Linear`."""
-
-    alpha: float
-    a: float
+    def force(self: Any, multiplier: Any, g0: Any, g1: Any) -> Any:
+        """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
+        spring, dspring = self.energy_slope(g0, g1)
+        if multiplier is None:
+            return spring, dspring
+        slope, dslope = self.constraint_slope(g0, g1)
+        return spring + multiplier * slope, dspring + multiplier * dslope
 
 
 def regularisation(penalty: float, exponent: float) -> Any:
@@ -42,17 +40,118 @@ def regularisation(penalty: float, exponent: float) -> Any:
     return Power(penalty, exponent)
 
 
-@inlined
 def _positive(g):
     return select(g > 0.0, g, 0.0)
 
 
-@inlined
 def _quotient(v0, v1, force1, d):
     """The plain quotient and its derivative, where one of the gaps is not positive; 0 where both are not."""
     inverse = 1.0 / select(d == 0.0, 1.0, d)
     slope = (v1 - v0) * inverse
     return slope, (force1 - slope) * inverse
+
+
+# --- a = 1 -----------------------------------------------------------------------------------------------
+
+
+class Linear(Law):
+    """a = 1, a linear spring; alpha is the penalty [N/m for a gap in m]."""
+
+    alpha: float
+
+    def stored_energy(self, g):
+        """V(g)"""
+        p = _positive(g)
+        return 0.5 * self.alpha * p * p
+
+    def stiffness(self, g):
+        """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
+        return self.alpha
+
+    def energy_slope(self, g0, g1):
+        """V[g0, g1] and its derivative by g1."""
+        p0, p1 = _positive(g0), _positive(g1)
+        half = 0.5 * self.alpha
+        slope, curvature = _quotient(half * p0 * p0, half * p1 * p1, self.alpha * p1, g1 - g0)
+        both = (g0 >= 0.0) & (g1 >= 0.0)
+        # (g1^2 - g0^2)/(g1 - g0) = g0 + g1
+        return select(both, half * (g0 + g1), slope), select(both, half, curvature)
+
+    def constraint(self, g):
+        """Phi(g)"""
+        return _positive(g)
+
+    def constraint_gradient(self, g):
+        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        return select(g >= 0.0, 1.0, 0.0)
+
+    def constraint_slope(self, g0, g1):
+        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        slope, curvature = _quotient(_positive(g0), _positive(g1), select(g1 >= 0.0, 1.0, 0.0), g1 - g0)
+        both = (g0 >= 0.0) & (g1 >= 0.0)
+        return select(both, 1.0, slope), select(both, 0.0, curvature)
+
+
+# --- a = 1.5 ---------------------------------------------------------------------------------------------
+
+_HERTZ = math.sqrt(0.8)
+
+
+class Hertz(Law):
+    """a = 1.5, Hertz's law of elastic spheres."""
+
+    alpha: float
+
+    def stored_energy(self, g):
+        """V(g)"""
+        p = _positive(g)
+        return self.alpha / 2.5 * p * p * math.sqrt(p)
+
+    def stiffness(self, g):
+        """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
+        return self.alpha * 0.8 * math.sqrt(_positive(g))
+
+    def energy_slope(self, g0, g1):
+        """V[g0, g1] and its derivative by g1."""
+        p0, p1 = _positive(g0), _positive(g1)
+        u0, u1 = math.sqrt(p0), math.sqrt(p1)
+        k = self.alpha / 2.5
+        slope, curvature = _quotient(k * p0 * p0 * u0, k * p1 * p1 * u1, self.alpha * p1 * u1, g1 - g0)
+        both = (g0 > 0.0) & (g1 > 0.0)
+        # with u = sqrt(g): (u1^5 - u0^5)/(u1^2 - u0^2) = (u1^4 + u1^3 u0 + u1^2 u0^2 + u1 u0^3 + u0^4)/(u1 + u0)
+        total = select(both, u0 + u1, 1.0)
+        n = p1 * p1 + u1 * u0 * (p1 + u1 * u0 + p0) + p0 * p0
+        dn = 4.0 * p1 * u1 + 3.0 * p1 * u0 + 2.0 * u1 * p0 + p0 * u0
+        du = 0.5 / select(both, u1, 1.0)
+        s = k * n / total
+        ds = (k * dn - s) / total * du
+        return select(both, s, slope), select(both, ds, curvature)
+
+    def constraint(self, g):
+        """Phi(g)"""
+        p = _positive(g)
+        return _HERTZ * p * math.sqrt(math.sqrt(p))
+
+    def constraint_gradient(self, g):
+        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        return 1.25 * _HERTZ * math.sqrt(math.sqrt(_positive(g)))
+
+    def constraint_slope(self, g0, g1):
+        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        p0, p1 = _positive(g0), _positive(g1)
+        u0, u1 = math.sqrt(p0), math.sqrt(p1)
+        w0, w1 = math.sqrt(u0), math.sqrt(u1)
+        slope, curvature = _quotient(p0 * w0, p1 * w1, 1.25 * w1, g1 - g0)
+        both = (g0 > 0.0) & (g1 > 0.0)
+        # with w = g^(1/4): (w1^5 - w0^5)/(w1^4 - w0^4) = (w1^4 + w1^3 w0 + ... + w0^4)/((w1 + w0)(w1^2 + w0^2))
+        total = select(both, (w0 + w1) * (u0 + u1), 1.0)
+        n = p1 + w1 * w0 * (u1 + w1 * w0 + u0) + p0
+        # their derivatives by w1, and dw/dg = 1/(4 w^3)
+        dn = 4.0 * w1 * u1 + 3.0 * u1 * w0 + 2.0 * w1 * u0 + u0 * w0
+        dtotal = u0 + u1 + 2.0 * w1 * (w0 + w1)
+        s = n / total
+        ds = (dn - s * dtotal) / total * (0.25 / select(both, w1 * u1, 1.0))
+        return _HERTZ * select(both, s, slope), _HERTZ * select(both, ds, curvature)
 
 
 # --- Any a -----------------------------------------------------------------------------------------------
@@ -65,7 +164,6 @@ _WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 _CLOSE = 1.0 / 16.0
 
 
-@inlined
 def _power_slope(b, g0, g1):
     """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
     d = g1 - g0
@@ -85,174 +183,36 @@ def _power_slope(b, g0, g1):
     return select(corner, 1.0, slope), select(corner, 0.0, curvature)
 
 
-@by_type
-def stiffened(law, factor):
-    """The same law with `factor` times the penalty."""
-    return Power(factor * law.alpha, law.a)
+class Power(Law):
+    """Any a >= 1. `pow` is a call, so the lane loop is not vectorised: about ten times the cost of `Linear`."""
 
+    alpha: float
+    a: float
 
-@by_type
-def stored_energy(law, g):
-    """V(g)"""
-    return law.alpha / (law.a + 1.0) * _positive(g) ** (law.a + 1.0)
+    def stored_energy(self, g):
+        """V(g)"""
+        return self.alpha / (self.a + 1.0) * _positive(g) ** (self.a + 1.0)
 
+    def stiffness(self, g):
+        """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
+        return 2.0 * self.alpha / (self.a + 1.0) * _positive(g) ** (self.a - 1.0)
 
-@by_type
-def stiffness(law, g):
-    """2 V(g)/g^2: the linear spring that stores the same energy at the gap g > 0."""
-    return 2.0 * law.alpha / (law.a + 1.0) * _positive(g) ** (law.a - 1.0)
+    def energy_slope(self, g0, g1):
+        """V[g0, g1] and its derivative by g1."""
+        slope, curvature = _power_slope(self.a + 1.0, g0, g1)
+        k = self.alpha / (self.a + 1.0)
+        return k * slope, k * curvature
 
+    def constraint(self, g):
+        """Phi(g)"""
+        return math.sqrt(2.0 / (self.a + 1.0)) * _positive(g) ** (0.5 * (self.a + 1.0))
 
-@by_type
-def energy_slope(law, g0, g1):
-    """V[g0, g1] and its derivative by g1."""
-    slope, curvature = _power_slope(law.a + 1.0, g0, g1)
-    k = law.alpha / (law.a + 1.0)
-    return k * slope, k * curvature
+    def constraint_gradient(self, g):
+        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        return select(g >= 0.0, math.sqrt(0.5 * (self.a + 1.0)) * _positive(g) ** (0.5 * (self.a - 1.0)), 0.0)
 
-
-@by_type
-def constraint(law, g):
-    """Phi(g)"""
-    return math.sqrt(2.0 / (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a + 1.0))
-
-
-@by_type
-def constraint_gradient(law, g):
-    """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
-    return select(g >= 0.0, math.sqrt(0.5 * (law.a + 1.0)) * _positive(g) ** (0.5 * (law.a - 1.0)), 0.0)
-
-
-@by_type
-def constraint_slope(law, g0, g1):
-    """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
-    slope, curvature = _power_slope(0.5 * (law.a + 1.0), g0, g1)
-    k = math.sqrt(2.0 / (law.a + 1.0))
-    return k * slope, k * curvature
-
-
-@by_type
-def force(multiplier, law, g0, g1):
-    """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
-    spring, dspring = energy_slope(law, g0, g1)
-    slope, dslope = constraint_slope(law, g0, g1)
-    return spring + multiplier * slope, dspring + multiplier * dslope
-
-
-@force.register(type(None))
-def _(multiplier, law, g0, g1):
-    return energy_slope(law, g0, g1)
-
-
-# --- a = 1 -----------------------------------------------------------------------------------------------
-
-
-@stiffened.register(Linear)
-def _(law, factor):
-    return Linear(factor * law.alpha)
-
-
-@stored_energy.register(Linear)
-def _(law, g):
-    p = _positive(g)
-    return 0.5 * law.alpha * p * p
-
-
-@stiffness.register(Linear)
-def _(law, g):
-    return law.alpha
-
-
-@energy_slope.register(Linear)
-def _(law, g0, g1):
-    p0, p1 = _positive(g0), _positive(g1)
-    half = 0.5 * law.alpha
-    slope, curvature = _quotient(half * p0 * p0, half * p1 * p1, law.alpha * p1, g1 - g0)
-    both = (g0 >= 0.0) & (g1 >= 0.0)
-    # (g1^2 - g0^2)/(g1 - g0) = g0 + g1
-    return select(both, half * (g0 + g1), slope), select(both, half, curvature)
-
-
-@constraint.register(Linear)
-def _(law, g):
-    return _positive(g)
-
-
-@constraint_gradient.register(Linear)
-def _(law, g):
-    return select(g >= 0.0, 1.0, 0.0)
-
-
-@constraint_slope.register(Linear)
-def _(law, g0, g1):
-    slope, curvature = _quotient(_positive(g0), _positive(g1), select(g1 >= 0.0, 1.0, 0.0), g1 - g0)
-    both = (g0 >= 0.0) & (g1 >= 0.0)
-    return select(both, 1.0, slope), select(both, 0.0, curvature)
-
-
-# --- a = 1.5 ---------------------------------------------------------------------------------------------
-
-
-@stiffened.register(Hertz)
-def _(law, factor):
-    return Hertz(factor * law.alpha)
-
-
-@stored_energy.register(Hertz)
-def _(law, g):
-    p = _positive(g)
-    return law.alpha / 2.5 * p * p * math.sqrt(p)
-
-
-@stiffness.register(Hertz)
-def _(law, g):
-    return law.alpha * 0.8 * math.sqrt(_positive(g))
-
-
-@energy_slope.register(Hertz)
-def _(law, g0, g1):
-    p0, p1 = _positive(g0), _positive(g1)
-    u0, u1 = math.sqrt(p0), math.sqrt(p1)
-    k = law.alpha / 2.5
-    slope, curvature = _quotient(k * p0 * p0 * u0, k * p1 * p1 * u1, law.alpha * p1 * u1, g1 - g0)
-    both = (g0 > 0.0) & (g1 > 0.0)
-    # with u = sqrt(g): (u1^5 - u0^5)/(u1^2 - u0^2) = (u1^4 + u1^3 u0 + u1^2 u0^2 + u1 u0^3 + u0^4)/(u1 + u0)
-    total = select(both, u0 + u1, 1.0)
-    n = p1 * p1 + u1 * u0 * (p1 + u1 * u0 + p0) + p0 * p0
-    dn = 4.0 * p1 * u1 + 3.0 * p1 * u0 + 2.0 * u1 * p0 + p0 * u0
-    du = 0.5 / select(both, u1, 1.0)
-    s = k * n / total
-    ds = (k * dn - s) / total * du
-    return select(both, s, slope), select(both, ds, curvature)
-
-
-_HERTZ = math.sqrt(0.8)
-
-
-@constraint.register(Hertz)
-def _(law, g):
-    p = _positive(g)
-    return _HERTZ * p * math.sqrt(math.sqrt(p))
-
-
-@constraint_gradient.register(Hertz)
-def _(law, g):
-    return 1.25 * _HERTZ * math.sqrt(math.sqrt(_positive(g)))
-
-
-@constraint_slope.register(Hertz)
-def _(law, g0, g1):
-    p0, p1 = _positive(g0), _positive(g1)
-    u0, u1 = math.sqrt(p0), math.sqrt(p1)
-    w0, w1 = math.sqrt(u0), math.sqrt(u1)
-    slope, curvature = _quotient(p0 * w0, p1 * w1, 1.25 * w1, g1 - g0)
-    both = (g0 > 0.0) & (g1 > 0.0)
-    # with w = g^(1/4): (w1^5 - w0^5)/(w1^4 - w0^4) = (w1^4 + w1^3 w0 + ... + w0^4)/((w1 + w0)(w1^2 + w0^2))
-    total = select(both, (w0 + w1) * (u0 + u1), 1.0)
-    n = p1 + w1 * w0 * (u1 + w1 * w0 + u0) + p0
-    # their derivatives by w1, and dw/dg = 1/(4 w^3)
-    dn = 4.0 * w1 * u1 + 3.0 * u1 * w0 + 2.0 * w1 * u0 + u0 * w0
-    dtotal = u0 + u1 + 2.0 * w1 * (w0 + w1)
-    s = n / total
-    ds = (dn - s * dtotal) / total * (0.25 / select(both, w1 * u1, 1.0))
-    return _HERTZ * select(both, s, slope), _HERTZ * select(both, ds, curvature)
+    def constraint_slope(self, g0, g1):
+        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        slope, curvature = _power_slope(0.5 * (self.a + 1.0), g0, g1)
+        k = math.sqrt(2.0 / (self.a + 1.0))
+        return k * slope, k * curvature

@@ -9,15 +9,15 @@ Sources: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki,
 """
 
 import math
-from typing import NamedTuple
 
 from ..kernel.gravity import accelerated
-from ..kernel.jit import by_type, inlined, select
+from ..kernel.jit import select
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from ..surfaces import contract
 from ..surfaces import fold as walls
 from . import laws as wall_laws
-from .hold import Two, along, mean_drift, presses, split_at
+from .hold import Two, mean_drift
 from .reflection import relative, wall_velocity
 
 _EPSILON = 2.220446049250313e-16
@@ -41,53 +41,32 @@ _ERROR = 0.7
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy where it is more than this part of its scale: at a turning point it has no digits.
 _FAST = 1e-12
-# What sliding asks of every wall.
+# Of the time to a stop: each step leaves a thousandth of the speed.
+_BEFORE_STOP = 0.999
+# Sliding needs these of every wall.
 NEEDS = (
     contract.unit_normal, contract.step_normal, contract.outward_acceleration, contract.settle, contract.distance,
     contract.first_hit, contract.inner, contract.inner_gradient, contract.level_of,
 )  # fmt: skip
 
 
-class Force(NamedTuple):
-    """The acceleration of a sliding particle, and how each wall presses on it, per mass; m is the second wall's."""
-
-    acceleration: Vec
-    n: float
-    m: float
-
-
 # --- Friction --------------------------------------------------------------------------------------------
 
 
-@by_type
-def _grip(friction, held, b, c):
-    """sum mu b"""
-    return wall_laws.number_of(friction, held.first) * b + _second_grip(held, friction, c)
+def _grip(friction, held, presses):
+    """sum mu b, where a wall presses with b"""
+    b, c = presses
+    first = wall_laws.of_wall(friction, held.first) * b
+    return first + (wall_laws.of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
 
 
-@_grip.register(type(None))
-def _(friction, held, b, c):
-    return 0.0
-
-
-@by_type
-def _second_grip(held, friction, c):
-    return 0.0
-
-
-@_second_grip.register(Two)
-def _(held, friction, c):
-    return wall_laws.number_of(friction, held.second) * c
-
-
-class Slowed(NamedTuple):
-    """A velocity after friction, and what it has taken of |v|^2."""
+class Slowed(Record):
+    """A velocity after friction, and how much friction has taken of |v|^2."""
 
     v: Vec
     lost: float
 
 
-@by_type
 def slow(friction, held, chain, gravity, r, motion, h):
     """The velocity after a time h of friction alone; `motion` is (v, the direction in which the particle slides, u).
 
@@ -97,73 +76,45 @@ def slow(friction, held, chain, gravity, r, motion, h):
     ds/dt = -(k s^2 + l s + c), with the sum of mu k, mu l and mu c of the walls, is a quadratic equation. Back in time
     gravity may turn a slow particle round between two of these: s is then below 0.
     """
-    return Slowed(motion[0], 0.0)
-
-
-@slow.register(wall_laws.Given)
-def _(friction, held, chain, gravity, r, motion, h):
     v, towards, u = motion
+    if friction is None:
+        return Slowed(v, 0.0)
     slip = relative(u, v)
     speed = math.sqrt(square(slip))
     moving = speed > 0.0
     sign = select(dot(slip, towards) < 0.0, -1.0, 1.0)
     direction = either(moving, slip * (sign / select(moving, speed, 1.0)), towards)
-    k, k2 = presses(held, chain, r, direction, ZERO)
-    c, c2 = presses(held, chain, r, ZERO, accelerated(gravity, ZERO, 1.0))
-    force = _force_of_speed(
-        u,
-        friction,
-        held,
-        chain,
-        gravity,
-        (r, direction, speed),
-        Quadratic(_grip(friction, held, k, k2), 0.0, _grip(friction, held, c, c2)),
-    )
+    k, linear, c = _force_of_speed(friction, held, chain, gravity, r, (direction, speed, u))
     # s1 = 2 s - s0 with s = s0 - h/2 (k s^2 + l s + c)
-    a, b = 0.5 * h * force.k, sign * speed - 0.5 * h * force.c
-    one = 1.0 + 0.5 * h * force.l
+    a, b = 0.5 * h * k, sign * speed - 0.5 * h * c
+    one = 1.0 + 0.5 * h * linear
     root2 = one * one + 4.0 * a * b
     s0, middle = sign * speed, 2.0 * b / (one + math.sqrt(select(root2 > 0.0, root2, 0.0)))
     s1 = 2.0 * middle - s0
     return Slowed(v + (s1 - s0) * direction, s0 * s0 - s1 * s1)
 
 
-class Quadratic(NamedTuple):
-    """k s^2 + l s + c"""
-
-    k: float
-    l: float  # noqa: E741
-    c: float
-
-
-@by_type
-def _force_of_speed(u, friction, held, chain, gravity, at, still):
-    """The force of friction as a function of the speed; `at` is (r, direction, speed), `still` for walls at rest."""
-    return still
-
-
-@_force_of_speed.register(Vec)
-def _(u, friction, held, chain, gravity, at, still):
-    r, direction, speed = at
-    pull, step = accelerated(gravity, ZERO, 1.0), select(speed > 0.0, speed, 1.0)
-    none = _grip(friction, held, *presses(held, chain, r, u, pull))
-    ahead = _grip(friction, held, *presses(held, chain, r, u + step * direction, pull))
-    back = _grip(friction, held, *presses(held, chain, r, u - step * direction, pull))
+def _force_of_speed(friction, held, chain, gravity, r, slip):
+    """(k, l, c) of the force of friction, k s^2 + l s + c; `slip` is (its direction, its speed, u)."""
+    direction, speed, u = slip
+    pull = accelerated(gravity, ZERO, 1.0)
+    if u is None:
+        k = _grip(friction, held, held.presses(chain, r, direction, ZERO))
+        return k, 0.0, _grip(friction, held, held.presses(chain, r, ZERO, pull))
+    step = select(speed > 0.0, speed, 1.0)
+    none = _grip(friction, held, held.presses(chain, r, u, pull))
+    ahead = _grip(friction, held, held.presses(chain, r, u + step * direction, pull))
+    back = _grip(friction, held, held.presses(chain, r, u - step * direction, pull))
     # A force that is negative is none: the wall lets go.
     k, slope = 0.5 * (ahead + back) - none, 0.5 * (ahead - back)
-    return Quadratic(k / (step * step), slope / step, none)
+    return k / (step * step), slope / step, none
 
 
-@by_type
 def direction(friction, v, a):
     """The direction in which a particle slides: of its velocity, or of what sets it in motion."""
-    return ZERO
-
-
-@direction.register(wall_laws.Given)
-def _(friction, v, a):
-    moving = square(v) > 0.0
-    way = either(moving, v, a)
+    if friction is None:
+        return ZERO
+    way = either(square(v) > 0.0, v, a)
     length = math.sqrt(square(way))
     return way / select(length > 0.0, length, 1.0)
 
@@ -171,33 +122,29 @@ def _(friction, v, a):
 # --- Forces ----------------------------------------------------------------------------------------------
 
 
-@inlined
+class Force(Record):
+    """The acceleration of a sliding particle, and how each wall presses on it, per mass; m is the second wall's."""
+
+    acceleration: Vec
+    n: float
+    m: float
+
+
 def force(laws, held, chain, gravity, r, v):
     """The `Force` on a particle that slides with this velocity along the walls."""
     pull, moving, friction = accelerated(gravity, ZERO, 1.0), wall_laws.moving(laws), wall_laws.friction(laws)
-    n, m = presses(held, chain, r, v, pull)
-    taken = split_at(held, chain, None, r, v)
+    n, m = held.presses(chain, r, v, pull)
+    taken = held.split_at(chain, None, r, v)
     a = pull - n * taken.n - m * taken.m
+    if friction is None:
+        return Force(a, n, m)
     slip = relative(wall_velocity(moving, chain, held.first, r), v)
-    drive = relative(wall_acceleration(moving, chain, held.first, r), a)
-    return Force(a - _drag(friction, held, n, m, slip, drive), n, m)
+    drive = relative(None if moving is None else walls.acceleration(chain, held.first, r), a)
+    return Force(a - _drag(_grip(friction, held, (n, m)), slip, drive), n, m)
 
 
-@by_type
-def wall_acceleration(moving, chain, wall, r):
-    """The acceleration of a wall at a point of it, or None where no wall moves."""
-    return
-
-
-@wall_acceleration.register(wall_laws.Moves)
-def _(moving, chain, wall, r):
-    return walls.acceleration(chain, wall, r)
-
-
-@by_type
-def _drag(friction, held, n, m, v, a):
+def _drag(grip, v, a):
     """Coulomb's friction against the velocity; of a particle at rest, against what would move it, and no more."""
-    grip = _grip(friction, held, n, m)
     speed2, pulled = square(v), math.sqrt(square(a))
     moving = speed2 > 0.0
     against = select(moving, 1.0 / math.sqrt(select(moving, speed2, 1.0)), 0.0) * v
@@ -206,32 +153,18 @@ def _drag(friction, held, n, m, v, a):
     return grip * against + held_back * a
 
 
-@_drag.register(type(None))
-def _(friction, held, n, m, v, a):
-    return ZERO
-
-
-@by_type
 def longest(friction, v, a):
     """A time within which a particle that slides with friction surely does not stop."""
+    if friction is None:
+        return math.inf
     # At the rate of now it stops after |v|^2/(-v.a).
     slowing = -dot(v, a)
     return select(slowing > 0.0, _BEFORE_STOP * square(v) / select(slowing > 0.0, slowing, 1.0), math.inf)
 
 
-# Of the time to a stop: each step leaves a thousandth of the speed.
-_BEFORE_STOP = 0.999
-
-
-@longest.register(type(None))
-def _(friction, v, a):
-    return math.inf
-
-
 # --- A step ----------------------------------------------------------------------------------------------
 
 
-@inlined
 def still(r, v, taken, allowed):
     """How far the last sweep but one may move r1, if the walls take so much of v in a composed step."""
     least = _STILL * total(absolute(r))
@@ -240,40 +173,35 @@ def still(r, v, taken, allowed):
     return select(turn < whole, least * whole / select(turn > 0.0, turn, 1.0), least)
 
 
-class Swept(NamedTuple):
+class Swept(Record):
     """One sweep of a step: r1, and whether it needs more than one other."""
 
     r: Vec
     moves: bool
 
 
-@inlined
 def sweep(moving, held, chain, h, step, still):
     """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
-    end = r0 + h * along(held, chain, mean_drift(moving, held, chain, r0, r1, h), r0, r1, w)
+    end = r0 + h * held.along(chain, mean_drift(moving, held, chain, r0, r1, h), r0, r1, w)
     return Swept(end, not (total(absolute(end - r1)) <= still))
 
 
-@inlined
 def part(k):
     """The length of step k of the composition, in units of its length."""
     return select(k == 2, MIDDLE, OUTER)
 
 
-@inlined
 def before(k):
     """How much of the composition comes before its step k."""
     return select(k < 3, OUTER * select(k < 3, 1.0 * k, 0.0), 1.0 - OUTER * (5.0 - k))
 
 
-@inlined
 def inverse_part(k):
     """One over it."""
     return select(k == 2, 1.0 / MIDDLE, 1.0 / OUTER)
 
 
-@inlined
 def lead(k):
     """How far the acceleration of step k is beyond the mean one of the step before, over its change in that.
 
@@ -284,7 +212,6 @@ def lead(k):
     return select(k == 1, first, select(k == 2, middle, select(k == 3, turned, select(k == 4, last, 0.0))))
 
 
-@inlined
 def _lead(before, last, now):
     return (0.5 * last + now / 3.0) / (0.5 * (before + last))
 
@@ -292,7 +219,6 @@ def _lead(before, last, now):
 # --- The end of a composed step --------------------------------------------------------------------------
 
 
-@inlined
 def restored(v, speed2, scale2):
     """A velocity along the walls with |v|^2 as the energy says, where it is known to more digits than v has."""
     now = square(v)
@@ -300,7 +226,6 @@ def restored(v, speed2, scale2):
     return v * (1.0 + select((now > _FAST * scale2) & (abs(f) < 0.1), f, 0.0))
 
 
-@inlined
 def error(h, start, end, allowed):
     """The error of a composed step over what is allowed; start and end are (r, v, a).
 
@@ -314,7 +239,6 @@ def error(h, start, end, allowed):
     return select(off > 0.0, _ERROR * off / allowed, 0.0)
 
 
-@inlined
 def next_step(h, ratio):
     """The length of the next step after one whose error is so much of what is allowed."""
     some = ratio > 0.0

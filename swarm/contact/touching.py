@@ -5,13 +5,13 @@ w0 on the directions that no touched wall forbids, r1 = r0 + h P and w1 = 2 P - 
 (Moreau), so |w1| = |w0|, and with one wall the step is the reflection about its discrete gradient.
 """
 
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import by_type, by_type_outlined, outlined, scratch
+from ..kernel.jit import outlined, scratch
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import contract, flights
 from ..surfaces import fold as walls
@@ -19,7 +19,7 @@ from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near, until_others
 from . import laws as wall_laws
 from . import reflection
-from .projection import ALLOWED, along, project
+from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
 _EPSILON = 2.220446049250313e-16
@@ -31,11 +31,11 @@ _BLOWS = 64
 _SWEEPS = 60
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
-# What these need of every wall; exact reflections need no more.
+# These need of every wall; exact reflections need no more.
 NEEDS = (contract.first_hit, contract.unit_normal, contract.inner_gradient, contract.distance, contract.settle)
 
 
-class Contacts(NamedTuple):
+class Contacts(Record):
     """How impacts are taken."""
 
     contact_step: Any  # None or h
@@ -44,7 +44,7 @@ class Contacts(NamedTuple):
     touch: float  # distance within which walls hold a sliding particle too [m]
 
 
-class Moving(NamedTuple):
+class Moving(Record):
     """A particle, and how much of its frame is left [s]."""
 
     r: Vec
@@ -52,24 +52,13 @@ class Moving(NamedTuple):
     left: float
 
 
-class Landing(NamedTuple):
+class Landing(Record):
     """The particle after the impact, the time it took, and twice its energy per mass."""
 
     r: Vec
     v: Vec
     used: float
     twice_energy: float
-
-
-class Touch(NamedTuple):
-    """The walls near a sliding particle, one entry each."""
-
-    number: Any  # of the wall
-    touched: Any  # whether it is
-    normal: Any  # (3, walls): unit normal of the step
-    held: Any  # what the wall takes of the velocity
-    depth: Any  # signed distance outside
-    frame: Any  # None, or a velocity with which they move along their normals
 
 
 @outlined
@@ -92,8 +81,8 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
         if following.time >= method.shortest or following.wall < 0.0:
             row = walls.row(chain, wall)
             end = reflection.Stepped(r, w, 0.0, given[row])
-            if met == wall:
-                end = _stepped(method.contact_step, chain, gravity, wall, flight, now, end)
+            if method.contact_step is not None and met == wall:
+                end = reflection.contact(method.contact_step, chain, gravity, wall, r, v, flight.left, now)
                 given[row] = end.impulse
             for i in range(given.size):
                 impulse[i, lane] += given[i]
@@ -106,71 +95,48 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
     return _slide(method, carried, gravity, wall, flight, energy, impulse, lane)
 
 
-@by_type_outlined
-def _stepped(contact_step, chain, gravity, wall, flight, energy, reflected):
-    """The impact as a contact step of that length; without one, as it was reflected."""
-    return reflected
-
-
-@_stepped.register(float)
-def _(contact_step, chain, gravity, wall, flight, energy, reflected):
-    return reflection.contact(contact_step, chain, gravity, wall, flight.r, flight.v, flight.left, energy)
-
-
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
     laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
     carried, chain = chain, at(chain, flight.left)
-    count = count_near(chain, r)
-    number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
-    list_near(chain, 0, 0.0, r, number)
+    number = numbers_near(chain, r)
+    count = number.size
+    touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
     _depths(chain, number, r, depth)
     for i in range(count):
         touched[i] = depth[i] >= -method.touch or number[i] == wall
     normal, held, given = scratch((3, count), np.float64), scratch(count, np.float64), scratch(count, np.float64)
-    touch = Touch(number, touched, normal, held, depth, _frame_of(moving, chain, number, touched, r))
-    v, twice_energy = _landed(laws, chain, touch, given, r, relative(touch.frame, flight.v), energy.twice)
-    straight = not wall_laws.moves(laws) and _goes_straight(chain, gravity, touch, r, v)
+    frame = None if moving is None else _frame_of(chain, number, touched, r)
+    touch = Touch(number, touched, normal, held, depth, frame)
+    v, twice_energy = _landed(laws, chain, touch, given, r, relative(frame, flight.v), energy.twice)
+    straight = moving is None and _goes_straight(chain, gravity, touch, r, v)
     h = flight.left if straight else min(method.shortest, flight.left)
     u, h = _unhindered(chain, gravity, touch, r, v, h, method.touch)
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
-    u = from_relative(touch.frame, u)
+    u = from_relative(frame, u)
     if moves(u):
         r = _settled(at(carried, flight.left - h), wall, touch, r + h * u)
-    w = from_relative(touch.frame, w)
-    twice_energy = _twice_energy(moving, gravity, r, w, twice_energy)
+    w = from_relative(frame, w)
+    if moving is not None:
+        # Walls do work.
+        twice_energy = square(w) + 2.0 * potential(gravity, r)
     speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
     half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
         taken = given[i] + 2.0 * touch.held[i]
-        impulse[walls.row(chain, number[i]), lane] += taken
-        _add_work(moving, chain, impulse, lane, number[i], (flight.r, -taken * column(normal, 0, i)))
+        row, behind = walls.row(chain, number[i]), walls.length(chain)
+        impulse[row, lane] += taken
+        if moving is not None and impulse.shape[0] > behind:
+            gained = -taken * column(normal, 0, i)
+            impulse[behind + row, lane] += dot(gained, walls.velocity(chain, number[i], flight.r))
     return Landing(r, w, h, twice_energy)
 
 
-@by_type
-def _add_work(moving, chain, impulse, lane, wall, change):
-    """The work per mass of a wall that moves; `change` is (where, of the velocity)."""
-
-
-@_add_work.register(wall_laws.Moves)
-def _(moving, chain, impulse, lane, wall, change):
-    r, gained = change
-    behind = walls.length(chain)
-    if impulse.shape[0] > behind:
-        impulse[behind + walls.row(chain, wall), lane] += dot(gained, walls.velocity(chain, wall, r))
-
-
-@by_type_outlined
-def _frame_of(moving, chain, number, touched, r):
-    """A velocity with which all touched walls move along their normals, or None where no wall moves."""
-    return
-
-
-@_frame_of.register(wall_laws.Moves)
-def _(moving, chain, number, touched, r):
+@outlined
+def _frame_of(chain, number, touched, r):
+    """A velocity with which all touched walls move along their normals."""
     u = ZERO
     # One wall after the other, as in Kaczmarz' method
     for _sweep in range(_SWEEPS):
@@ -179,17 +145,6 @@ def _(moving, chain, number, touched, r):
                 n = walls.unit_normal(chain, number[i], r)
                 u = u + dot(walls.velocity(chain, number[i], r) - u, n) * n
     return u
-
-
-@by_type
-def _twice_energy(moving, gravity, r, w, kept):
-    """Twice the energy per mass after a step: what is kept, or what there is where walls do work."""
-    return kept
-
-
-@_twice_energy.register(wall_laws.Moves)
-def _(moving, gravity, r, w, kept):
-    return square(w) + 2.0 * potential(gravity, r)
 
 
 @outlined
@@ -237,12 +192,18 @@ def _settled(chain, wall, touch, r):
     return r
 
 
+def numbers_near(chain, r):
+    """The numbers of the walls near a point, in an array of the function that asks."""
+    number = scratch(count_near(chain, r), np.float64)
+    list_near(chain, 0, 0.0, r, number)
+    return number
+
+
 @outlined
 def inside(chain, r):
     """A point that is no more than round-off outside of the walls, moved until it is not."""
-    count = count_near(chain, r)
-    number, outside = scratch(count, np.float64), scratch(count, np.float64)
-    list_near(chain, 0, 0.0, r, number)
+    number = numbers_near(chain, r)
+    outside = scratch(number.size, np.float64)
     for _sweep in range(_SWEEPS):
         _depths(chain, number, r, outside)
         i = np.argmax(outside)
@@ -259,64 +220,29 @@ def _depths(chain, number, r, into):
         into[i] = walls.distance(chain, number[i], r)
 
 
-@by_type_outlined
+@outlined
 def _landed(laws, chain, touch, given, r, v, twice_energy):
-    """Chattering ends: walls that lose energy take what is left of the velocity towards them.
+    """Chattering ends: walls that lose energy take the rest of the velocity towards them.
 
     Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
     would reflect the rest.
     """
-    return v, twice_energy
-
-
-@_landed.register(wall_laws.Laws)
-def _(laws, chain, touch, given, r, v, twice_energy):
+    if laws is None:
+        return v, twice_energy
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
-        lossy[i] = touch.touched[i] and reflection.bounciness(laws, touch.number[i]) < 2.0
-        if lossy[i]:
-            put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r))
+        lossy[i] = touch.touched[i] and 1.0 + wall_laws.restitution_of(laws, touch.number[i]) < 2.0
+    put_normals(chain, touch, lossy, r, r)
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u
     return u, twice_energy - square(v - u)
 
 
 @outlined
-def velocity_along(chain, touch, r, w, h):
-    """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
-    u, r1 = ZERO, r
-    for _sweep in range(_SWEEPS):
-        for i in range(touch.touched.size):
-            if touch.touched[i]:
-                put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r1))
-        u = project(touch.touched, touch.normal, touch.held, w)
-        before, r1 = r1, r + h * u
-        if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
-            break
-    return u
-
-
-@outlined
-def _normal(chain, wall, r0, r1):
-    """The unit vector along the discrete gradient of a wall, out of the admissible side."""
-    n = walls.unit_normal(chain, wall, r0)
-    d = walls.inner_gradient(chain, wall, r0, r1)
-    length = norm(d)
-    if dot(d, n) < 0.0:
-        length = -length
-    # At a singular point, such as an apex, both may be undefined: the wall then forbids nothing.
-    if length != 0.0 and math.isfinite(length):
-        n = d / length
-    return n if math.isfinite(total(n)) else ZERO
-
-
-@outlined
 def _goes_straight(chain, gravity, touch, r, v):
     """Whether the step may have any length: rest, or uniform motion along flat walls that no gravity pulls it from."""
     g = accelerated(gravity, ZERO, 1.0)
-    for i in range(touch.touched.size):
-        if touch.touched[i]:
-            put(touch.normal, 0, i, _normal(chain, touch.number[i], r, r))
+    put_normals(chain, touch, touch.touched, r, r)
     falling = project(touch.touched, touch.normal, touch.held, g)
     if largest(falling) > ALLOWED * largest(g):
         return False

@@ -10,17 +10,16 @@ Source: García Orden & Ortega 2007, eqs. (7), (8).
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, inlined, outlined, scratch, select
+from ..kernel.jit import outlined, scratch, select
+from ..kernel.record import Record
 from ..kernel.vector import Vec
 from ..surfaces import contract
 from ..surfaces import fold as walls
 from . import corner, impulse
-from . import regularisation as law_of
 
 # How the multiplier is updated and started: (8) itself, the secant, or the secant from the reflection's multiplier.
 PLAIN, SECANT, REFLECTION = 0.0, 1.0, 2.0
@@ -34,7 +33,6 @@ _SHORT = 1e-3
 _CHORD_STEPS = 3
 
 
-@inlined
 def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before):
     """lambda after a sweep that missed by alpha Phi_mean: (8), or the secant through the last two sweeps."""
     # NaN before the second sweep, and where the miss does not fall: then (8).
@@ -43,26 +41,23 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
     return multiplier + miss * select(use, stretch * (1.0 - _SHORT), 1.0)
 
 
-@inlined
 def _start_of(surface, r):
     return impulse.start_gap(0.0, surface, r, contract.inner(surface, r))
 
 
-@inlined
 def _has_limit(surface, law, r):
     """Whether the loop has a limit: State I with Phi'(0) > 0.
 
     Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
     """
-    return (_start_of(surface, r).gap == 0.0) & (law_of.constraint_gradient(law, 0.0) > 0.0)
+    return (_start_of(surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
 
-@inlined
 def _multiplier_of(surface, law, r, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
     start = _start_of(surface, r)
     slope, _curvature = contract.gap_slope(surface, start.q, start.q)
-    return select(start.gap == 0.0, kappa / (c * slope * law_of.constraint_gradient(law, 0.0)), 0.0)
+    return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 
 
 # Of all walls: (chain, wall, law, r) and (chain, wall, law, r, c, kappa).
@@ -70,7 +65,6 @@ has_limit = walls.of_wall(_has_limit, False)
 multiplier_of = walls.of_wall(_multiplier_of, 0.0)
 
 
-@inlined
 def reflection(chain, wall, law, step):
     """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
     kappa = walls.chord_guess(chain, wall, step.r, step.p)
@@ -81,28 +75,23 @@ def reflection(chain, wall, law, step):
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
 
 
-@by_type
 def meets_later(chain, wall, law, r, p):
     """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
-    surface = chain.first
-    leaves = contract.level_of(surface, contract.inner(surface, r + p)) > 0.0
-    here = leaves & (wall != 0.0) & (not has_limit(chain, 0.0, law, r))
-    return here | meets_later(chain.rest, wall - 1.0, law, r, p)
+    found = False
+    for k, link in enumerate(walls.each(chain)):
+        leaves = contract.level_of(link.first, contract.inner(link.first, r + p)) > 0.0
+        found = found | (leaves & (wall != float(k)) & (not _has_limit(link.first, law, r)))
+    return found
 
 
-@meets_later.register(Nothing)
-def _(chain, wall, law, r, p):
-    return False
-
-
-class Before(NamedTuple):
-    """What the secant needs of the sweep before, one entry a wall."""
+class Before(Record):
+    """The sweep before, for the secant: one entry a wall."""
 
     multipliers: Any
     misses: Any
 
 
-class Swept(NamedTuple):
+class Swept(Record):
     """The step of one sweep: its end, V there, and whether it was solved."""
 
     r: Vec
@@ -110,7 +99,7 @@ class Swept(NamedTuple):
     solved: bool
 
 
-class Loop(NamedTuple):
+class Loop(Record):
     """The step that the loop ended with."""
 
     r: Vec
@@ -126,7 +115,7 @@ def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
     count = multipliers.shape[0]
     end = corner.hold(method.form, law, multipliers, chain, step, reactions)
     first, last = scratch(count, np.float64), reactions[:, 3]
-    corner.constraints(chain, law, 0, step.r, first)
+    corner.constraints(chain, law, step.r, first)
     stored = 0.0
     for k in range(count):
         stored += 0.5 * law.alpha * last[k] * last[k]

@@ -80,7 +80,7 @@ def _normals(chain, held, r):
 def _rubbed(friction, wall, n, slip):
     """The direction of the force of a wall, -(n + mu s/|s|), without its sign."""
     speed = norm(slip)
-    return n + (wall_laws.number_of(friction, wall) / select(speed > 0.0, speed, 1.0)) * slip
+    return n + (wall_laws.of_wall(friction, wall) / select(speed > 0.0, speed, 1.0)) * slip
 
 
 @by_type
@@ -227,8 +227,8 @@ def _(moving, method, chain, gravity, state, i, p):
             continue
         path = crossing.Path(r, start.u, r1, end.u, h)
         none = crossing.near(method, r)
-        if crossing.meets(now, at(chain, left - h), 0.0, held, path, none):
-            found = crossing.arrival(chain, 0.0, held, path, none, left)
+        if crossing.meets(now, at(chain, left - h), held, path, none):
+            found = crossing.arrival(chain, held, path, none, left)
             if found.time == 0.0:
                 phase = EVENT if used > 0.0 else phase
                 state.contacts.met[i] = found.wall

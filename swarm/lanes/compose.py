@@ -113,7 +113,7 @@ def _(moving, friction, chain, wall, motion):
 def compose(kind, method, chain, gravity, lanes, live):
     """One composed step of every live lane, from its R, V and A to its R1 and V1."""
     rows, unsolved, friction = lanes.rows, lanes.unsolved, methods.friction(method)
-    rubs, moving = wall_laws.is_given(friction), wall_laws.moving(methods.laws(method))
+    rubs, moving = friction is not None, wall_laws.moving(methods.laws(method))
     _start(method, chain, gravity, lanes, live)
     for k in range(slides.PARTS):
         for i in range(live):
@@ -128,7 +128,7 @@ def compose(kind, method, chain, gravity, lanes, live):
                 toward = slides.direction(
                     friction, relative(u, v), _drive(moving, now, rows[WALL, i], r, last, rows[H, i])
                 )
-                held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+                held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
                 slowed = slides.slow(friction, held, now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
                 rows[WORK, i] += slowed.lost
@@ -143,12 +143,12 @@ def compose(kind, method, chain, gravity, lanes, live):
                 break
         for i in range(live):
             h, w, v0, r0 = slides.part(k) * rows[H, i], column(rows, W, i), column(rows, V1, i), column(rows, R1, i)
-            held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+            held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
             left, after = _when(lanes, i, k)
             step, end = during(chain, left, after), column(rows, END, i)
             # The last sweep
             drift = hold.mean_drift(moving, held, step, r0, end, h)
-            taken = hold.split(held, step, drift, r0, end, w)
+            taken = held.split(step, drift, r0, end, w)
             r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
             if rubs:
                 now = at(chain, after)
@@ -187,7 +187,7 @@ def _(moving, chain, wall, r, change, h):
 def _sweep_lane(kind, moving, chain, lanes, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
     rows, unsolved = lanes.rows, lanes.unsolved
-    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
     r0, end, w = column(rows, R1, i), column(rows, END, i), column(rows, W, i)
     left, after = _when(lanes, i, k)
     step = during(chain, left, after)
@@ -208,20 +208,20 @@ def end_steps(kind, method, chain, gravity, lanes, live):
     rows, laws = lanes.rows, methods.laws(method)
     friction, moving = wall_laws.friction(laws), wall_laws.moving(laws)
     for i in range(live):
-        held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+        held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
         start, now = at(chain, rows[LEFT, i]), at(chain, rows[LEFT, i] - rows[H, i])
         h, scale2, keep = rows[H, i], rows[SCALE2, i], rows[KEEP, i]
         r0, v0, a0 = column(rows, R, i), column(rows, V, i), column(rows, A, i)
-        r1 = hold.settle(held, now, column(rows, R1, i))
-        v1 = hold.split_at(held, now, hold.drift(moving, held, now, r1), r1, column(rows, V1, i)).along
+        r1 = held.settle(now, column(rows, R1, i))
+        v1 = held.split_at(now, hold.drift(moving, held, now, r1), r1, column(rows, V1, i)).along
         rest = 2.0 * potential(gravity, r1) + keep * keep
         twice = twice_after(moving, rows[TWICE, i] - rows[WORK, i], square(v1) + rest)
         v1 = _restored(moving, v1, twice - rest, scale2)
         force = slides.force(laws, held, now, gravity, r1, v1)
         ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), rows[ALLOWED, i])
         path = crossing.Path(r0, v0, r1, v1, h)
-        lifted = hold.lets_go(held, force.n, force.m)
-        met = crossing.meets(start, now, 0.0, held, path, crossing.near(method, r1))
+        lifted = held.lets_go(force.n, force.m)
+        met = crossing.meets(start, now, held, path, crossing.near(method, r1))
         good = (ratio <= 1.0) & (lanes.event[i] == 0)
         leaves = is_beyond(lanes.period, r1)
         passes = may_pass(lanes.openings, held, path)
@@ -299,7 +299,7 @@ def account(method, chain, state, lanes, i):
     state.contacts.sliding[p] += rows[H, i]
     push(chain, state, lanes, i, rows[IMPULSE, i], rows[IMPULSE + 1, i])
     rows[TRIALS, i] = 0.0
-    if wall_laws.is_given(methods.friction(method)):
+    if methods.friction(method) is not None:
         lose(state, lanes, i, rows[WORK, i])
     work(wall_laws.moving(methods.laws(method)), chain, state, lanes, i, lanes.gained[i], rows[GIVEN, i])
 
@@ -342,6 +342,6 @@ def with_kept(kind, chain, lanes, i):
     rows, v, keep = lanes.rows, column(lanes.rows, V, i), lanes.rows[KEEP, i]
     if not keep > 0.0:
         return v
-    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
-    taken = hold.split_at(held, chain, None, column(rows, R, i), v)
-    return v + keep * hold.inward(held, taken.n, taken.m)
+    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
+    taken = held.split_at(chain, None, column(rows, R, i), v)
+    return v + keep * held.inward(taken.n, taken.m)

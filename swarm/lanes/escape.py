@@ -1,6 +1,6 @@
 """Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
 
-from ..contact import crossing, hold
+from ..contact import crossing
 from ..contact.passing import hit_wall, open_wall_at, open_wall_of
 from ..kernel.jit import by_type, by_type_outlined, index, inlined
 from ..kernel.vector import column, put
@@ -49,7 +49,7 @@ def is_at_opening(openings, kind, method, chain, state, lanes, i):
 @is_at_opening.register(Openings)
 def _(openings, kind, method, chain, state, lanes, i):
     rows, r = lanes.rows, column(lanes.rows, compose.R, i)
-    held = hold.of_lane(kind, rows[compose.WALL, i], rows[compose.WALL + 1, i])
+    held = kind.of_lane(rows[compose.WALL, i], rows[compose.WALL + 1, i])
     wall = open_wall_of(openings, method, chain, held, r, crossing.near(method, r))
     if wall < 0.0:
         return False

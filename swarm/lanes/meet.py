@@ -6,8 +6,8 @@ from ..contact import events, touching
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
-from ..contact.hold import One, Two, drift, split_at
-from ..contact.reflection import given, loses_energy, wall_velocity
+from ..contact.hold import One, Two, drift
+from ..contact.reflection import given, wall_velocity
 from ..kernel.gravity import potential
 from ..kernel.jit import by_type, by_type_outlined, long_kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
@@ -69,12 +69,12 @@ def _decide(method, chain, gravity, share, i):
     if first >= 0.0 and _exchange_heat(methods.thermal(method), method, carried, gravity, share, i):
         return True
     held = scratch((2, walls.length(chain)), np.float64)
-    if wall_laws.moves(method.laws):
+    if wall_laws.moving(method.laws) is not None:
         settles = is_carried(wall_laws.moving(method.laws), method, carried, gravity, p)
     else:
         settles = events.settles(method, chain, gravity, p, held)
     if again > _OFTEN or settles:
-        found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
+        found = events.Next(CAREFUL, v, 0.0, p.twice, wall)
     elif first < 0.0:
         found = events.enter(method, chain, gravity, wall, p)
     elif second < 0.0:
@@ -157,10 +157,10 @@ def _spare(moving, chain, state, i, found, wall):
     turned = v - found.impulse * walls.unit_normal(chain, wall, r)
     if found.phase == HELD:
         held = One(found.wall)
-        taken = split_at(held, chain, drift(moving, held, chain, r), r, turned)
+        taken = held.split_at(chain, drift(moving, held, chain, r), r, turned)
     else:
         edge = Two(found.wall, found.other)
-        taken = split_at(edge, chain, drift(moving, edge, chain, r), r, turned)
+        taken = edge.split_at(chain, drift(moving, edge, chain, r), r, turned)
         state.impulse[walls.row(chain, found.other), i] += taken.c * state.mass[i]
     state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
 
@@ -191,7 +191,7 @@ def careful_block(method, chain, gravity, share):
 def _rest(method, chain, gravity, share, i, p, held):
     """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
-    loses = loses_energy(methods.laws(method))
+    loses = methods.laws(method) is not None
     for s in range(held.shape[1]):
         taken = held[1, s] if loses else 0.0
         contacts.load[s, i] = held[0, s]
@@ -222,7 +222,7 @@ def _step(method, chain, gravity, share, i):
         return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
-    if not wall_laws.moves(method.laws) and events.settles(method, now, gravity, p, held):
+    if wall_laws.moving(method.laws) is None and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
         return
     phase = carry(state.openings, method, chain, gravity, state, i, p)

@@ -182,9 +182,9 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
     rows[WALL, lane], rows[WALL + 1, lane] = contacts.walls[0, i], contacts.walls[1, i]
     rows[STEP, lane], rows[KEEP, lane], rows[TWICE, lane] = contacts.step[i], contacts.keep[i], twice
     if begins:
-        held, now = hold.of_lane(kind, rows[WALL, lane], rows[WALL + 1, lane]), at(chain, left)
+        held, now = kind.of_lane(rows[WALL, lane], rows[WALL + 1, lane]), at(chain, left)
         # Frames show the speed that is kept across the walls too.
-        v = hold.split_at(held, now, hold.drift(wall_laws.moving(methods.laws(method)), held, now, r), r, v).along
+        v = held.split_at(now, hold.drift(wall_laws.moving(methods.laws(method)), held, now, r), r, v).along
     put(rows, R, lane, r)
     put(rows, V, lane, v)
     phase = _set_going(kind, method, chain, gravity, state, lanes, lane)
@@ -198,7 +198,7 @@ def _load(kind, method, chain, gravity, share, lanes, lane, i):
 def _set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; what it does next, which may be to rest."""
     rows, laws = lanes.rows, methods.laws(method)
-    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
     r, v, left = column(rows, R, i), column(rows, V, i), rows[LEFT, i]
     now = at(chain, left)
     if is_at_opening(lanes.openings, kind, method, now, state, lanes, i):
@@ -208,7 +208,7 @@ def _set_going(kind, method, chain, gravity, state, lanes, i):
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
     if not rows[STEP, i] > 0.0:
         rows[STEP, i] = _FIRST * method.size / np.sqrt(rows[SCALE2, i])
-    if wall_laws.moves(laws):
+    if wall_laws.moving(laws) is not None:
         return stay(wall_laws.moving(laws), kind, method, chain, gravity, state, lanes, i)
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
@@ -278,7 +278,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
         return _give_up(state, lanes, i)
     if event & FAILED:
         return _shorten(kind, method, chain, state, lanes, i)
-    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
     r, v = column(rows, R, i), column(rows, V, i)
     cut = 1.0
     if event & LIFTED:
@@ -288,7 +288,7 @@ def _decide(kind, method, chain, gravity, state, lanes, i):
             return phase
     if event & MET:
         path = crossing.Path(r, v, column(rows, R1, i), column(rows, V1, i), h)
-        met = crossing.arrival(chain, 0.0, held, path, crossing.near(method, r), rows[LEFT, i])
+        met = crossing.arrival(chain, held, path, crossing.near(method, r), rows[LEFT, i])
         # At once, or so soon that the time left does not change.
         if rows[LEFT, i] - met.time * h == rows[LEFT, i]:
             state.contacts.met[lanes.particle[i]] = met.wall

@@ -114,7 +114,7 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
         state.contacts.met[lanes.particle[i]] = met
         put(rows, R, i, walls.settle(then, met, r1))
         return EVENT
-    held = hold.of_lane(kind, first, rows[WALL + 1, i])
+    held = kind.of_lane(first, rows[WALL + 1, i])
     force = slides.force(methods.laws(method), held, then, gravity, r1, v1)
     put(rows, A, i, force.acceleration)
     rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
@@ -131,25 +131,25 @@ def _rubs(kind, laws, now, lanes, i, r, slowest):
 def _(kind, laws, now, lanes, i, r, slowest):
     second = lanes.rows[WALL + 1, i]
     slip = column(lanes.rows, V, i) - walls.velocity(now, second, r)
-    return wall_laws.number_of(wall_laws.friction(laws), second) > 0.0 and square(slip) > slowest
+    return wall_laws.of_wall(wall_laws.friction(laws), second) > 0.0 and square(slip) > slowest
 
 
 @outlined
 def _clear(kind, method, chain, lanes, i, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
     rows, left = lanes.rows, lanes.rows[LEFT, i]
-    held = hold.of_lane(kind, rows[WALL, i], rows[WALL + 1, i])
+    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
         start, then = at(chain, left - time), at(chain, left - end)
         path, near = _way(chain, lanes, i, time, end), crossing.near(method, column(rows, R, i))
-        if not crossing.meets(start, then, 0.0, held, path, near):
+        if not crossing.meets(start, then, held, path, near):
             if end == high:
                 return Clear(high, -1.0)
             time, step = end, 2.0 * step
             continue
-        found = crossing.arrival(chain, 0.0, held, path, near, left - time)
+        found = crossing.arrival(chain, held, path, near, left - time)
         met = found.wall
         if found.time == 0.0 or not time < end:
             break
@@ -174,7 +174,7 @@ def _rests(kind, method, now, gravity, lanes, i, r):
     """Whether a lane that moves with its first wall goes on to do so from here."""
     force, acceleration = _force_at_rest(kind, method, now, gravity, lanes, i, r)
     pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
-    pressed = not hold.lets_go(kind, force.n, force.m)
+    pressed = not kind.lets_go(force.n, force.m)
     return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
 
 
@@ -182,7 +182,7 @@ def _rests(kind, method, now, gravity, lanes, i, r):
 def _force_at_rest(kind, method, now, gravity, lanes, i, r):
     """The force on a lane at r that moves with its first wall, and the acceleration of that."""
     first = lanes.rows[WALL, i]
-    held = hold.of_lane(kind, first, lanes.rows[WALL + 1, i])
+    held = kind.of_lane(first, lanes.rows[WALL + 1, i])
     u = walls.velocity(now, first, r)
     return slides.force(methods.laws(method), held, now, gravity, r, u), walls.acceleration(now, first, r)
 

@@ -9,11 +9,10 @@ from .. import checks
 from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
-from ..contact import regularisation as law_of
 from ..contact.discrete_gradient import form_of, reaction_needs
-from ..contact.laws import is_moving
 from ..contact.records import Step
 from ..contact.reflection import CHORD_NEEDS
+from ..contact.regularisation import regularisation
 from ..contact.touching import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
@@ -162,7 +161,7 @@ class AugmentedLagrangian(base.Method):
         return moment if self.adaptive else fixed_step.whole_time(moment, self.dt)
 
     def law(self) -> Any:
-        return law_of.regularisation(self.penalty, self.exponent)
+        return regularisation(self.penalty, self.exponent)
 
     def has_multipliers(self) -> bool:
         return True
@@ -190,7 +189,7 @@ def _(method, first, second, third):
     return fixed_step.Own(first, second, third)
 
 
-contract.dissipates.register(steps.Numbers, lambda method: is_moving(method.moving))
+contract.dissipates.register(steps.Numbers, lambda method: method.moving is not None)
 # Of all walls, as in fixed_step.py.
 contract.walls_of.register(steps.Numbers, lambda method, chain, left: chain)
 
@@ -305,7 +304,7 @@ def _(method, chain, gravity, lane, wall, lanes, i):
     reaction = corner.total(reactions)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
     corner.add_impulses(reactions, h, lanes.impulse, i)
-    work = corner.add_works(method.moving, over, 0, -2.0 / (h * h), reactions, lanes.impulse, i)
+    work = corner.add_works(method.moving, over, -2.0 / (h * h), reactions, lanes.impulse, i)
     force = 1.0 / h * (2.0 / h * norm(reaction))
     budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, force)
     factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h))

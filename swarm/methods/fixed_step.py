@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import checks
-from ..contact.discrete_gradient import nested
-from ..contact.laws import Moves, is_moving
+from ..contact.discrete_gradient import MeanValue
+from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
@@ -186,7 +186,7 @@ def _(method, first, second, third):
     return Own(first, second, third)
 
 
-contract.dissipates.register(Numbers, lambda method: is_moving(method.moving))
+contract.dissipates.register(Numbers, lambda method: method.moving is not None)
 # Of all walls: each part of a step asks for those that it needs.
 contract.walls_of.register(Numbers, lambda method, chain, left: chain)
 
@@ -251,7 +251,7 @@ def flight(method, chain, gravity, lane):
     to_point = during(chain, start.left * dt, (start.left - point_of(method.form)) * dt)
     touched = walls.touched(to_point, start.r, reach(method.form, dt, method.law, now, gravity, start))
     # Several walls at once, or nested solves: the careful way.
-    alone = (touched.number <= 1.0) & (not nested(method.form))
+    alone = (touched.number <= 1.0) & (not isinstance(method.form, MeanValue))
     wall = select(alone, touched.wall, contract.HARD - touched.wall)
     wall = select(too_fast(method.longest, displacement(gravity, start.v, dt)), contract.HARD, wall)
     return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))

@@ -67,4 +67,4 @@ def _(rule, method, chain, lane, reactions, impulse, i):
     h = method.dt
     corner.add_impulses(reactions, 0.5 * h, impulse, i)
     over = fixed_step.over(h, chain, lane.left)
-    return corner.add_works(method.moving, over, 0, -4.0 / (h * h), reactions, impulse, i)
+    return corner.add_works(method.moving, over, -4.0 / (h * h), reactions, impulse, i)

@@ -134,7 +134,7 @@ def _(method, chain, gravity, lane, impulse, i):
     reactions = scratch((walls.length(chain), 4), np.float64)
     r1, solved = corner.hold(method.form, method.law, None, over, step, reactions)
     corner.add_impulses(reactions, h, impulse, i)
-    work = corner.add_works(method.moving, over, 0, -2.0 / (h * h), reactions, impulse, i)
+    work = corner.add_works(method.moving, over, -2.0 / (h * h), reactions, impulse, i)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
     budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0)
     factor, balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(step.r, r1, v1, h))

@@ -7,9 +7,8 @@ has a part in it, and the exact impacts that replace it.
 import math
 from typing import Any, NamedTuple
 
-from ..contact import regularisation as law_of
 from ..contact import uzawa
-from ..contact.discrete_gradient import nested
+from ..contact.discrete_gradient import MeanValue
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
 from ..kernel.gravity import Nothing
@@ -165,7 +164,7 @@ def _(method, chain, gravity, lane, hit):
     left = lane.left - t
     # A hit in the last instant of a frame is met again in the next one.
     met = met & (hit.wall >= 0.0) & (left > 0.0)
-    wall = select(nested(method.form), contract.HARD - hit.wall, hit.wall)
+    wall = select(isinstance(method.form, MeanValue), contract.HARD - hit.wall, hit.wall)
     return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
 
 
@@ -174,7 +173,7 @@ def _(method, left):
     # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger alpha.
     h = select(method.dt < left, method.dt, left)
     part = method.dt / h
-    return Cut(h, h, law_of.stiffened(method.law, part * part))
+    return Cut(h, h, method.law.stiffened(part * part))
 
 
 @is_new.register(CutSteps)

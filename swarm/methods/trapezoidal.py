@@ -67,6 +67,6 @@ def _(rule, method, chain, lane, reactions, impulse, i):
     corner.add_impulses(reactions, h, impulse, i)
     # h/(2m) |F0|
     factor = 2.0 * lane.own.over_mass / h
-    add_impulses(before, law, factor, 0, lane.r, impulse, i)
+    add_impulses(before, law, factor, lane.r, impulse, i)
     work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
-    return work + corner.add_works(moving, over, 0, -2.0 / (h * h), reactions, impulse, i)
+    return work + corner.add_works(moving, over, -2.0 / (h * h), reactions, impulse, i)

@@ -94,8 +94,8 @@ def _(method, chain, gravity, lane, impulse, i):
     step, over_mass, h = _step(method, chain, gravity, lane), lane.own.over_mass, method.dt
     over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
     after = fixed_step.after(h, chain, lane.left)
-    add_impulses(before, method.law, over_mass, 0, lane.r, impulse, i)
-    add_impulses(after, method.law, over_mass, 0, step.r, impulse, i)
+    add_impulses(before, method.law, over_mass, lane.r, impulse, i)
+    add_impulses(after, method.law, over_mass, step.r, impulse, i)
     work = add_works(method.moving, over, before, method.law, over_mass / h, lane.r, impulse, i)
     work += add_works(method.moving, over, after, method.law, over_mass / h, step.r, impulse, i)
     return fixed_step.Careful(step.r, step.v, True, work)

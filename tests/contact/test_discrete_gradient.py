@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.contact import discrete_gradient as forms
-from swarm.contact import regularisation as laws
 from swarm.contact.records import Step
 from swarm.kernel.vector import vec
 from swarm.surfaces import contract
@@ -54,7 +53,7 @@ def pair_of(surface, point, direction, first, last, along):
 
 
 def constraint(law, surface, point):
-    return call(laws.constraint, law, gap(surface, point))
+    return call(law.constraint, gap(surface, point))
 
 
 def uncertainty(surface, *points):
@@ -64,7 +63,7 @@ def uncertainty(surface, *points):
 
 def steepest(law, surface, *points):
     """The largest Phi' of these points."""
-    return call(laws.constraint_gradient, law, max(0.0, *(gap(surface, point) for point in points)))
+    return call(law.constraint_gradient, max(0.0, *(gap(surface, point) for point in points)))
 
 
 def gap_gradient(surface, point):
@@ -80,7 +79,7 @@ def size(vector):
 def scalar_form(law, radius, r0, r1):
     """The paper's (9) for the cavity |r| <= radius, as written there: 0/0 where |r1| = |r0|."""
     q0, q1 = r0 @ r0, r1 @ r1
-    phi0, phi1 = (call(laws.constraint, law, math.sqrt(q) - radius) for q in (q0, q1))
+    phi0, phi1 = (call(law.constraint, math.sqrt(q) - radius) for q in (q0, q1))
     return (phi1 - phi0) / (q1 - q0) * (r0 + r1)
 
 
@@ -134,7 +133,7 @@ def _is_a_mean_value(law, surface, r0, r1):
     if not 0.0 <= beta <= 1.0:
         return False
     between = r0 + beta * (r1 - r0)
-    low, high = (call(laws.constraint_gradient, law, gap(surface, between) + s) for s in (-unsure, unsure))
+    low, high = (call(law.constraint_gradient, gap(surface, between) + s) for s in (-unsure, unsure))
     blur = (high - low) * size(gap_gradient(surface, between)) + 16 * EPSILON * size(d)
     if size(d - vector(forms.constraint_gradient, law, surface, between)) > blur:
         return False
@@ -230,7 +229,7 @@ def test_one_point_has_the_gradient(name, point, depth):
     wall, normal, _ = frame(surface, point, np.ones(3))
     r = wall + depth * normal
     for law in LAWS.values():
-        expected = call(laws.constraint_gradient, law, gap(surface, r)) * gap_gradient(surface, r)
+        expected = call(law.constraint_gradient, gap(surface, r)) * gap_gradient(surface, r)
         for d in (vector(forms.composite, law, surface, r, r), vector(forms.constraint_gradient, law, surface, r)):
             assert d == pytest.approx(expected, rel=64 * EPSILON, abs=64 * EPSILON * size(expected))
             if gap(surface, r) < 0.0:
@@ -264,7 +263,7 @@ def test_equal_levels_take_the_one_sided_limit(name, point, depth, direction):
     outward = vector(contract.unit_normal, surface, wall_point(surface, r1))
     q0 = call(contract.inner, surface, r0)
     for law in LAWS.values():
-        slope = call(laws.constraint_gradient, law, gap(surface, r0)) * call(contract.gap_slope, surface, q0, q0)[0]
+        slope = call(law.constraint_gradient, gap(surface, r0)) * call(contract.gap_slope, surface, q0, q0)[0]
         for shift in (0.0, 1e-12, 1e-8, -1e-8, 1e-4, -1e-4):
             end = r1 + shift * outward
             d = vector(forms.composite, law, surface, r0, end)
@@ -322,9 +321,7 @@ def test_inside_there_is_none(name, point, direction, first, last):
 
 @pytest.mark.parametrize(("gradient", "kind"), [("composite", forms.Composite), ("mean-value", forms.MeanValue)])
 def test_names_of_the_forms(gradient, kind):
-    """The nested solves of one of them are too long for lanes."""
     assert type(forms.form_of(gradient)) is kind
-    assert forms.nested(forms.form_of(gradient)) == (kind is forms.MeanValue)
 
 
 # --- A step that one wall holds back ---------------------------------------------------------------------
@@ -370,7 +367,7 @@ class Contact:
 
     def force(self, law, part, g0, g1):
         """c (alpha Phi_mean + lambda) Phi[g0, g1]"""
-        return self.c(law) * call(laws.force, self.multiplier(law, part), law, g0, g1)[0]
+        return self.c(law) * call(law.force, self.multiplier(law, part), g0, g1)[0]
 
     def slack(self, law, part, end):
         """How far the reaction moves when both gaps move by round-off."""

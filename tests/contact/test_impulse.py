@@ -90,7 +90,7 @@ class Contact:
             call(contract.gap_of, self.surface, call(contract.inner, self.surface, r)) for r in (self.start, self.far)
         )
         reach = np.linalg.norm(self.start) + np.linalg.norm(self.free) + 1.0
-        force = self.c * call(laws.stiffness, self.law, max(depth, 1e-3)) * 2.0
+        force = self.c * call(self.law.stiffness, max(depth, 1e-3)) * 2.0
         return 64 * EPSILON * force * reach / np.linalg.norm(self.inner_slope(self.start))
 
     def step(self):
@@ -161,7 +161,7 @@ def test_a_head_on_plane_by_hand(law):
     numbers, c, g0, p = numbers_of("plane")._replace(normal=Vec(1.0, 0.0, 0.0), offset=0.0), 1e-4, 0.2, 0.1
     kappa, solved = call(impulse.careful, law, None, numbers, Step(Vec(g0, 0.0, 0.0), Vec(p, 0.0, 0.0), c))
     assert solved
-    assert kappa == pytest.approx(c * call(laws.energy_slope, law, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
+    assert kappa == pytest.approx(c * call(law.energy_slope, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
     if isinstance(law, laws.Linear):
         half = 0.5 * law.alpha * c
         assert kappa == pytest.approx(half * (2 * g0 + p) / (1 + half), rel=8 * EPSILON)

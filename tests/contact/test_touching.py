@@ -7,7 +7,7 @@ import pytest
 from conftest import EPSILON, SURFACES, call, wall_point
 
 import swarm
-from swarm.contact import projection, touching
+from swarm.contact import projection
 from swarm.kernel.vector import vec
 from swarm.surfaces.fold import chain_of
 
@@ -95,7 +95,7 @@ def test_a_sliding_step_keeps_the_energy(name):
             chain = chain_of([surface, plane][:count])
             w = random.standard_normal(3)
             number, none = np.arange(count, dtype=float), np.zeros(count)
-            touch = touching.Touch(number, np.ones(count, bool), np.zeros((3, count)), none.copy(), none, None)
-            u = np.array(call(touching.velocity_along, chain, touch, point, w, h))
+            touch = projection.Touch(number, np.ones(count, bool), np.zeros((3, count)), none.copy(), none, None)
+            u = np.array(call(projection.velocity_along, chain, touch, point, w, h))
             assert np.linalg.norm(2.0 * u - w) == pytest.approx(np.linalg.norm(w), rel=16 * EPSILON)
             assert (touch.held >= 0.0).all()

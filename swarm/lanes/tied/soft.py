@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...contact import regularisation as law_of
 from ...kernel.gravity import Nothing
 from ...kernel.jit import inlined, outlined, scratch
 from ...kernel.vector import ZERO, square
@@ -129,7 +128,7 @@ def _(kind, chain, wall, y):
 def _(kind, body, chain, rule, lanes, paces, i, number):
     touching = body[1]
     pace, held = paces
-    law = law_of.stiffened(kind.law, 1.0 / pace.ease[i] if rule.loop else 1.0)
+    law = kind.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
     found, m = pace.held[i], lanes.f.shape[0]
     contacts = held.name[i], held.frame[i], held.press[i], 1, found
     along, across = scratch((found, m), np.float64), scratch((found, m), np.float64)
@@ -150,7 +149,7 @@ def _(kind, body, chain, rule, lanes, paces, i, number):
         end = g1
         if g0 == 0.0 and held.multiplier[i, a] > 0.0:
             end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
-        force, stiffness = law_of.force(held.multiplier[i, a], law, g0, end)
+        force, stiffness = law.force(held.multiplier[i, a], g0, end)
         missing = force + stiffness * (g1 - end) - held.press[i, 3 * a]
         # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
         give = system[a, a] / (1.0 + stiffness * system[a, a])
@@ -261,7 +260,7 @@ def _stored(kind, body, chain, rule, lanes, paces, i):
             stored += kind.law.alpha * after * after / (8.0 * ties.rest[a])
     for a in range(pace.held[i]):
         g1 = _gap(chain, float(held.name[i, a, 1]), point_of(touching, lanes.r1, held.name[i, a, 0], i))
-        stored += law_of.stored_energy(kind.law, g1) if g1 > NEAR * rule.room else 0.0
+        stored += kind.law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
     return stored
 
 
@@ -277,7 +276,7 @@ def _update(kind, body, chain, rule, lanes, paces, i):
         k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
         g0 = _start(kind, chain, rule, wall, point_of(touching, lanes.ra, k, i))
         g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
-        mean = 0.5 * (law_of.constraint(kind.law, g0) + law_of.constraint(kind.law, g1))
+        mean = 0.5 * (kind.law.constraint(g0) + kind.law.constraint(g1))
         held.multiplier[i, a] += kind.law.alpha / pace.ease[i] * mean
 
 
