@@ -154,15 +154,14 @@ class RecordingWriter:
         if not chosen:
             return
         numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
-        drawn, shown, colour, lines = self._drawn, [], [], []
+        shown, colour, lines = [], [], []
         for number, moment, state, seen in chosen:
-            position, velocity = drawn.points(state.position), drawn.points(state.velocity)
+            position, packed, tints = self._drawn.coloured(state, self._scale, self._values)
             shown.append(position - self._center[:, None])
-            colour.append(self._scale.colours(self._values(position, velocity)))
-            if len(drawn.lines) and not len(drawn.triangles):
-                middles = drawn.middles(position), drawn.middles(velocity)
-                lines.append(self._scale.colours(self._values(*middles)))
-            self._rows.append((number, moment, series.row_of(self._series, moment, seen, self._before)))
+            colour.append(packed)
+            lines.append(tints)
+            values = [line.value(moment, seen, self._before) for line in self._series]
+            self._rows.append((number, moment, values))
             self._before = moment, seen
         points = rows(shown, np.float32)
         try:
