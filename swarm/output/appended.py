@@ -25,54 +25,24 @@ _FORMAT = ("v110", "v110")
 class AppendedFile:
     """A file that is created, or reopened to go on with it.
 
-    It gets its name when `take_name` says so; until then an existing file of that name stays.
-
-    Attributes:
-        file: the open file.
+    It gets its name by `_rename`; until then an existing file of that name stays. Subclasses create it, or find its
+    datasets, and write to them.
     """
 
     def __init__(self, path: Path, what: str, following: bool) -> None:
         self._path, self._what, self._following = path, what, following
         self._part = path if following else paths.part_of(path)
 
-    def open(self) -> h5py.File:
-        """Open the file.
-
-        Raises:
-            FileError: it cannot be.
-        """
-        self._size, self._block = 0, b""
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         try:
-            if not self._following:
-                self._part.touch()
-            self._open("r+" if self._following else "w")
-        except OSError as error:
-            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
-        return self.file
-
-    def _open(self, mode: str) -> None:
-        self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by `close`
-        if mode == "r+":
-            superblock.make_appendable(self._handle)
-        # HDF5's locks would block readers.
-        self.file = driver.opened_to_write(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
-        self._descriptor = _descriptor_of(self.file)
-
-    def close(self, error: BaseException | None) -> None:
-        """Close the file, after an error if there is one.
-
-        Raises:
-            FileError: it cannot be closed, and there was no error before.
-        """
-        try:
-            self.file.close()
+            self._file.close()
         except (OSError, RuntimeError) as problem:
             self._abandon()
             if error is None:
                 raise FileError(f"cannot close the {self._what} {self._path}: {_reason(problem)}") from problem
         finally:
             self._handle.close()
-        if self._part != self._path:
+        if self._is_new():
             # Without a frame there is nothing to be read.
             self._part.unlink(missing_ok=True)
 
@@ -83,19 +53,41 @@ class AppendedFile:
         except OSError as error:
             raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
 
-    def begin(self) -> None:
-        """Switch to SWMR, after which nothing can be created."""
-        self.file.swmr_mode = True
-        self.flush()
+    def _open(self) -> None:
+        """Open the file, or raise a FileError."""
+        self._size, self._block = 0, b""
+        try:
+            if not self._following:
+                self._part.touch()
+            self._open_as("r+" if self._following else "w")
+        except OSError as error:
+            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
 
-    def flush(self) -> None:
+    def _open_as(self, mode: str) -> None:
+        self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by `__exit__`
+        if mode == "r+":
+            superblock.make_appendable(self._handle)
+        # HDF5's locks would block readers.
+        self._file = driver.opened_to_write(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
+        self._descriptor = _descriptor_of(self._file)
+
+    def _find(self) -> None:
+        """Find the datasets of a file that is there, and begin."""
+        raise NotImplementedError
+
+    def _begin(self) -> None:
+        """Switch to SWMR, after which nothing can be created."""
+        self._file.swmr_mode = True
+        self._flush()
+
+    def _flush(self) -> None:
         """Write what HDF5 holds back: then the file can be read, whatever happens to the process."""
-        self.file.flush()
+        self._file.flush()
         self._block = superblock.unmark(self._handle)
         self._size = os.fstat(self._handle.fileno()).st_size
 
     @contextlib.contextmanager
-    def writing(self, what: str) -> Iterator[None]:
+    def _writing(self, what: str) -> Iterator[None]:
         """Write `what`; an error is a FileError that leaves what was written before as it is."""
         try:
             self._require_there()
@@ -109,24 +101,20 @@ class AppendedFile:
                 superblock.put_back(self._handle, self._block)
             raise FileError(f"cannot write {what} to {self._path}: {_reason(error)}") from error
 
-    def take_name(self) -> bool:
-        """Take the name from an older file; whether the file had to be opened again for that."""
-        if self._part == self._path:
-            return False
+    def _rename(self) -> None:
+        """Take the name from an older file."""
         try:
             os.replace(self._part, self._path)
+            self._part = self._path
         except PermissionError:  # Windows renames no file that is open
-            self.file.close()
+            self._file.close()
             self._handle.close()
             os.replace(self._part, self._path)
             self._part = self._path
-            self._open("r+")
-            return True
-        self._part = self._path
-        return False
+            self._open_as("r+")
+            self._find()
 
-    @property
-    def is_new(self) -> bool:
+    def _is_new(self) -> bool:
         """Whether it has no name yet."""
         return self._part != self._path
 
@@ -134,10 +122,10 @@ class AppendedFile:
         """Raise a FileError if the file was removed or truncated, which HDF5 would not notice."""
         mine = os.fstat(self._handle.fileno())
         try:
-            there = os.stat(self._part)
+            there = os.path.samestat(os.stat(self._part), mine)
         except FileNotFoundError:
-            there = None
-        if there is None or not os.path.samestat(there, mine):
+            there = False
+        if not there:
             raise FileError(f"the {self._what} {self._path} was deleted or replaced while the run was writing it")
         if mine.st_size < self._size:
             raise FileError(
@@ -171,7 +159,6 @@ def put(dataset: Any, first: int, values: Any) -> None:
 
 
 def _descriptor_of(file: h5py.File) -> int:
-    """The file descriptor of an open file."""
     return int(file.id.get_vfd_handle())
 
 

@@ -6,13 +6,12 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..particles import State
-from .layout import COUNTS, ESCAPES, IMAGES, PARTS
+from .layout import KEPT
 from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
@@ -23,8 +22,8 @@ _PATIENCE = 0.05
 # memory. With very many particles there is one, which is written while the next is computed.
 _COPIES = 20 * _CHUNK_FRAMES
 _BYTES = 1 << 26
-# What is copied of a state, for the writers, as far as it is there, and its bytes a particle.
-_COPIED, _PARTICLE = (*PARTS, COUNTS, IMAGES, ESCAPES), 88
+# Bytes of a particle that are copied of a state.
+_PARTICLE = 88
 
 Job = Callable[[], None]
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
@@ -35,9 +34,7 @@ class Writer(Protocol):
 
     def __enter__(self) -> WriteFrames: ...
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool | None: ...
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any, /) -> None: ...
 
     def sync(self) -> None:
         """Flush to the disk what was written."""
@@ -60,10 +57,8 @@ class Several:
 
         return write
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> None:
+        self._stack.__exit__(*error)
 
     def sync(self) -> None:
         """Flush to the disk what was written."""
@@ -76,7 +71,8 @@ def _some(state: State, kept: slice) -> State:
 
 
 def _copied(state: State) -> list[str]:
-    return [name for name in _COPIED if getattr(state, name) is not None]
+    """What the writers take of a state, as far as it is there."""
+    return [name for name in KEPT if getattr(state, name) is not None]
 
 
 class Background:
@@ -99,10 +95,8 @@ class Background:
         half = max(1, copies // 2)
         self._at_once = half if half < _CHUNK_FRAMES else half - half % _CHUNK_FRAMES
         self._problem: BaseException | None = None
-        # Time to write a frame of the latest batch [s].
-        self.seconds = 0.0
-        # Number of frames written.
-        self.written = 0
+        self.seconds = 0.0  # to write a frame of the latest batch
+        self.written = 0  # frames
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
 
     def __enter__(self) -> WriteFrame:
@@ -110,9 +104,7 @@ class Background:
         self._thread.start()
         return self._put
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self._frames.put(None)
         self._thread.join()
         problem = self._problem if error is None else None
@@ -168,7 +160,10 @@ class Background:
         frame, latest = self._frames.get(), math.inf
         while frame is not None and not isinstance(frame, threading.Event):
             if callable(frame):
-                self._call(frame)
+                try:
+                    frame()
+                except BaseException as problem:  # the computing thread raises it
+                    self._problem = self._problem or problem
             else:
                 frames.append(frame)
                 latest = min(latest, time.monotonic() + _PATIENCE)
@@ -181,9 +176,3 @@ class Background:
             except queue.Empty:
                 return frames, True
         return frames, frame
-
-    def _call(self, job: Job) -> None:
-        try:
-            job()
-        except BaseException as problem:  # the computing thread raises it
-            self._problem = self._problem or problem

@@ -67,12 +67,12 @@ class Job:
 
     def require_same(self, other: "Job", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
-        for name in ("particles", "method", "scene", "storage", "start", "seed", "kept", "member_impacts", "version"):
-            mine, its = getattr(self, name), getattr(other, name)
-            if mine != its:
-                raise SceneError(
-                    f"{path} is of another run: its {_NAMES[name]} {_one_line(mine)}, got {_one_line(its)}; {_HINT}"
-                )
+        for name, told in _NAMES.items():
+            mine, its = (
+                ", ".join(line for line in str(getattr(job, name)).splitlines() if line) for job in (self, other)
+            )
+            if getattr(self, name) != getattr(other, name):
+                raise SceneError(f"{path} is of another run: its {told} {mine}, got {its}; {_HINT}")
 
 
 _NAMES = {
@@ -88,18 +88,12 @@ _NAMES = {
 }
 
 
-def _one_line(value: Any) -> str:
-    """A value in one line."""
-    return ", ".join(line for line in str(value).splitlines() if line)
-
-
 def digest_of(particles: Particles, body: str = "") -> str:
     """A digest that identifies particles, or the points of bodies together with the text of the body."""
     digest = hashlib.sha256(body.encode())
     for array in (particles.position, particles.velocity, particles.mass, particles.image):
-        if array is None:
-            continue
-        digest.update(np.ascontiguousarray(array).data)
+        if array is not None:
+            digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]
 
 
@@ -157,12 +151,10 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
                 raise ValueError(
                     f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
                 )
-        if "halted.particle" not in run:
-            return
-        particles = arrays["halted.particle"]
-        bounded = np.concatenate([[-1], particles, [len(run["mass"])]])
-        if (np.diff(bounded) <= 0).any():
-            raise ValueError("it names particles that do not exist")
+        if "halted.particle" in run:
+            bounded = np.concatenate([[-1], arrays["halted.particle"], [len(run["mass"])]])
+            if (np.diff(bounded) <= 0).any():
+                raise ValueError("it names particles that do not exist")
 
 
 @contextlib.contextmanager

@@ -13,6 +13,9 @@ from ..methods.base import Method
 from ..particles import Floats, Particles
 from ..scene import Scene
 
+Colours = NDArray[np.uint32]
+Values = Callable[[Floats, Floats], Floats]
+
 BY = ("speed", "energy-error")
 
 # Viridis (https://bids.github.io/colormap) without its darkest third, which is invisible on a dark background. It
@@ -39,7 +42,7 @@ class Scale:
     low: float
     high: float
 
-    def colours(self, values: Floats) -> NDArray[np.uint32]:
+    def colours(self, values: Floats) -> Colours:
         """0xRRGGBBAA of each value."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
         places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
@@ -52,14 +55,8 @@ def table() -> Floats:
     return np.stack([np.interp(places, np.arange(len(_TABLE)), part) for part in _TABLE.T], axis=1) / 255.0
 
 
-def _packed() -> NDArray[np.uint32]:
-    red, green, blue = np.rint(table().T * 255.0).astype(np.uint32)
-    return red << 24 | green << 16 | blue << 8 | 0xFF  # type: ignore[no-any-return]
-
-
-_PACKED: NDArray[np.uint32] = _packed()
-
-Values = Callable[[Floats, Floats], Floats]
+_RED, _GREEN, _BLUE = np.rint(table().T * 255.0).astype(np.uint32)
+_PACKED: Colours = _RED << 24 | _GREEN << 16 | _BLUE << 8 | 0xFF
 
 
 def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[Scale, Values]:
@@ -75,7 +72,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         fastest = _FASTER * math.sqrt(2.0 * scale.mean()) or 1.0
         # Two digits are enough on a legend.
         fastest = float(f"{fastest:.1e}")
-        return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: _speed(velocity)
+        return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: np.sqrt((velocity**2).sum(axis=0))
     if scene.laws() is not None:
         raise SceneError(
             "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature, a motion "
@@ -88,8 +85,3 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         return np.asarray(np.log10(np.maximum(np.abs(now - before) * inverse, 10.0 ** _DECADES[0])))
 
     return Scale("log10 of the relative energy error", *_DECADES), errors
-
-
-def _speed(velocity: Floats) -> Floats:
-    x, y, z = velocity
-    return np.asarray(np.sqrt(x * x + y * y + z * z))

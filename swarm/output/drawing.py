@@ -10,10 +10,11 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..particles import Floats
 from . import colours, series
+from .colours import Colours
 
 # Okabe and Ito's, for a light background.
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -52,23 +53,28 @@ def picture(width: float, height: float) -> Picture:
     return Picture(figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
-def red_green_blue(packed: NDArray[np.uint32]) -> Floats:
+def red_green_blue(packed: Colours) -> Floats:
     """0xRRGGBBAA as three numbers from 0 to 1: (N, 3)."""
     return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
 
 
-def bonds(axes: Any, lines: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
-    """The lines (S, 2, 3) of bodies, wider the fewer there are, and their colours (S,), 0xRRGGBBAA."""
-    width = float(np.clip(300.0 / max(1, len(lines)), 0.9, 2.0))
-    style = {"colors": red_green_blue(packed), "linewidths": width, "zorder": 2, "clip_on": False}
-    return axes.add_collection3d(Line3DCollection(lines, **style), autolim=False)
+def ties(axes: Any, lines: tuple[Floats, Colours], faces: tuple[Floats, Colours]) -> list[Any]:
+    """What ties the points of bodies: faces, or else lines, if there are any; returns what draws them.
 
-
-def faces(axes: Any, triangles: NDArray[Any], packed: NDArray[np.uint32]) -> Any:
-    """The triangles (T, 3, 3) of bodies, shaded, each of the mean colour of its corners (T, 3), 0xRRGGBBAA."""
-    colour = red_green_blue(packed.ravel()).reshape(-1, 3, 3).mean(axis=1)
-    style = {"facecolors": colour, "shade": True, "zorder": 2, "clip_on": False}
-    return axes.add_collection3d(Poly3DCollection(triangles, **style), autolim=False)
+    Lines (S, 2, 3), wider the fewer there are, have colours (S,), 0xRRGGBBAA; triangles (T, 3, 3), which are shaded,
+    have those of their corners (T, 3).
+    """
+    style: dict[str, Any] = {"zorder": 2, "clip_on": False}
+    drawn: list[Any] = []
+    if len(faces[0]):
+        colour = red_green_blue(faces[1].ravel()).reshape(-1, 3, 3).mean(axis=1)
+        drawn.append(Poly3DCollection(faces[0], facecolors=colour, shade=True, **style))
+    elif len(lines[0]):
+        width = float(np.clip(300.0 / len(lines[0]), 0.9, 2.0))
+        drawn.append(Line3DCollection(lines[0], colors=red_green_blue(lines[1]), linewidths=width, **style))
+    for one in drawn:
+        axes.add_collection3d(one, autolim=False)
+    return drawn
 
 
 def particles(

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from ..bodies.body import Body
 from ..bodies.checked import Pairs
-from ..particles import Floats
+from ..particles import Floats, Particles, State
+from .colours import Colours, Scale, Values
 
 # Triangles whose normals differ by less lie in one face of a polyhedron, without a line between them.
 _FLAT = 1e-6
@@ -33,7 +34,8 @@ class Drawn:
         one = size if body is None or not self._faces else len(body.contacts)
         self._every = slice(None, None, math.ceil(self.count / max(1, most // one)))
         self.shown = len(range(self.count)[self._every])
-        edges, faces = (_none(2), _none(3)) if body is None else (_lines(body), body.faces)
+        none = np.zeros((0, 3), np.int64)
+        edges, faces = (none[:, :2], none) if body is None else (_lines(body), body.faces)
         self.lines, self.triangles = self._of_all(edges), self._of_all(faces)
 
     def points(self, rows: Floats) -> Floats:
@@ -45,6 +47,14 @@ class Drawn:
             some = np.einsum("kp,xpn->xkn", self._body.contacts, some)
         return some.reshape(3, -1)
 
+    def coloured(self, frame: Particles | State, scale: Scale, values: Values) -> tuple[Floats, Colours, Colours]:
+        """The points (3, N) of a frame, their colours, and those of the lines that are not edges of faces."""
+        position, velocity = self.points(frame.position), self.points(frame.velocity)
+        lines = np.zeros(0, np.uint32)
+        if len(self.lines) and not len(self.triangles):
+            lines = scale.colours(values(self.middles(position), self.middles(velocity)))
+        return position, scale.colours(values(position, velocity)), lines
+
     def middles(self, rows: Floats) -> Floats:
         """The middles of the lines, from the points that are shown."""
         return np.asarray(0.5 * (rows[:, self.lines[:, 0]] + rows[:, self.lines[:, 1]]))
@@ -52,10 +62,6 @@ class Drawn:
     def _of_all(self, groups: Pairs) -> NDArray[np.int64]:
         """Groups of points of one body, of all that are shown; point p of the i-th is number p shown + i."""
         return (groups[:, None] * self.shown + np.arange(self.shown)[:, None]).reshape(-1, groups.shape[1])
-
-
-def _none(width: int) -> Pairs:
-    return np.zeros((0, width), np.int64)
 
 
 def _lines(body: Body) -> Pairs:

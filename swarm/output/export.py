@@ -6,27 +6,31 @@ A frame is in memory at a time. 10 000 particles and 500 frames take, read and w
 """
 
 import contextlib
-from collections.abc import Callable
+import importlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import checks
 from ..errors import SceneError
 from ..extras import needed_by
 from . import paths
-from .exported import Exported, Progress, Stored
+from .exported import Exported, Progress
 from .replaced import named_when_whole
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
 
 SUFFIXES = (".vtkhdf", ".xyz", ".gsd")
 
 
 def export(
-    trajectory: Stored,
+    trajectory: "Trajectory",
     path: str | Path,
-    frames: slice | int | None = None,
-    particles: int = 1,
-    surfaces: bool = True,
-    overwrite: bool = False,
-    progress: Progress | None = None,
+    frames: slice | int | None,
+    particles: int,
+    surfaces: bool,
+    overwrite: bool,
+    progress: Progress | None,
 ) -> list[Path]:
     """Write a trajectory to a file of another format; see `Trajectory.export`."""
     target = paths.target_of("path", path)
@@ -36,39 +40,24 @@ def export(
     checks.flag("surfaces", surfaces)
     chosen = Exported(trajectory, frames, particles)
     targets = [target]
-    if kind == ".vtkhdf" and surfaces and chosen.trajectory.scene.surfaces:
+    if kind == ".vtkhdf" and surfaces and trajectory.scene.surfaces:
         targets.append(target.with_suffix(".surfaces.vtkhdf"))
     for one in targets:
         paths.check_distinct({"export": one}, {"trajectory": trajectory.path})
         paths.check_target(one, overwrite, "export")
-    shown = _told(chosen, progress)
-    with contextlib.ExitStack() as stack:
-        # What is missing is found before anything is written.
-        if kind == ".gsd":
-            with needed_by("an export as .gsd", "gsd"):
-                from . import gsd
-            gsd.write(chosen, stack.enter_context(named_when_whole(target)), shown)
-        elif kind == ".xyz":
-            from . import xyz
-
-            xyz.write(chosen, stack.enter_context(named_when_whole(target)), shown)
-        else:
-            from . import vtkhdf
-
-            if len(targets) > 1:
-                with needed_by("an export with surfaces, which --no-surfaces or surfaces=False leaves out,", "plot"):
-                    from . import walls
-                drawn = walls.shapes(chosen)
-                walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
-            vtkhdf.write(chosen, stack.enter_context(named_when_whole(target)), shown)
-    return targets
-
-
-def _told(chosen: Exported, progress: Progress | None) -> Callable[[int], None]:
-    """A function that tells how many frames are written."""
 
     def told(done: int) -> None:
         if progress is not None:
             progress(done, len(chosen.numbers))
 
-    return told
+    # What is missing is found before anything is written.
+    with needed_by(f"an export as {kind}", "gsd"):
+        form = importlib.import_module(f".{kind[1:]}", __package__)
+    with contextlib.ExitStack() as stack:
+        if len(targets) > 1:
+            with needed_by("an export with surfaces, which --no-surfaces or surfaces=False leaves out,", "plot"):
+                from . import walls
+            drawn = walls.shapes(chosen)
+            walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
+        form.write(chosen, stack.enter_context(named_when_whole(target)), told)
+    return targets

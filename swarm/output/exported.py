@@ -1,43 +1,20 @@
 """What of a trajectory is exported: some of its frames, and some of its particles or bodies, frame by frame."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks
 from ..errors import SceneError
-from ..particles import Particles
-from ..scene import Scene
 from .stored import whole
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
 
 # Is called with how many frames are written, and how many there are to write.
 Progress = Callable[[int, int], None]
-
-
-class Stored(Protocol):
-    """What is read of a `Trajectory`, which has a method to export it."""
-
-    path: Path
-
-    def __len__(self) -> int: ...
-    @property
-    def times(self) -> NDArray[np.float64]: ...
-    @property
-    def observables(self) -> dict[str, NDArray[Any]]: ...
-    @property
-    def scene(self) -> Scene: ...
-    @property
-    def copies(self) -> int: ...
-    @property
-    def ids(self) -> NDArray[np.int64]: ...
-    @property
-    def bonds(self) -> NDArray[np.int64]: ...
-    def require_frames(self) -> None: ...
-    def frame(self, k: int) -> Particles: ...
-    def columns(self, k: int) -> dict[str, NDArray[Any]]: ...
 
 
 class Moment(NamedTuple):
@@ -62,7 +39,7 @@ class Exported:
         periods: the lengths of the cell that repeats, 0 where none does.
     """
 
-    def __init__(self, trajectory: Stored, frames: slice | int | None, particles: int) -> None:
+    def __init__(self, trajectory: "Trajectory", frames: slice | int | None, particles: int) -> None:
         """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
 
         Raises:

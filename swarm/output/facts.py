@@ -67,33 +67,26 @@ def of_meshes(scene: Any) -> dict[str, str]:
 
 def of_run(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that show whether a run went well."""
-    escaped = {"escaped": f"{int(seen['escaped'][-1])} particles"} if seen.get("escaped", [0])[-1] else {}
-    lost = seen.get("dissipated_energy", [0.0])[-1]
-    # Not of the total energy: the zero of the potential one is arbitrary.
-    kinetic = [f"{seen['kinetic_energy'][k]:.4g} J" for k in (0, -1)]
-    dissipated = {"dissipated": f"{lost:.4g} J; the kinetic energy: {kinetic[0]}, then {kinetic[1]}"} if lost else {}
-    slid = seen.get("sliding_time", [0.0])[-1]
-    sliding = {"sliding": f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"} if slid else {}
-    heats, works = (
-        [f"{given:.4g} J from surfaces[{i}]" for i, given in enumerate(seen.get(name, [[]])[-1]) if given]
-        for name in ("wall_heat", "wall_work")
-    )
-    tied = (
-        {"link error": f"{seen['link_error'].max():.1e} of its length"} if np.any(seen.get("link_error", 0.0)) else {}
-    )
+    rows = {"impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " ")}
+    if slid := seen.get("sliding_time", [0.0])[-1]:
+        rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
+    rows["energy drift"] = f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle"
+    rows["largest penetration"] = f"{seen['max_penetration'].max():.1e} m"
+    if np.any(seen.get("link_error", 0.0)):
+        rows["link error"] = f"{seen['link_error'].max():.1e} of its length"
     if np.any(seen.get("work", 0.0)):
-        tied["work"] = f"{seen['work'][-1]:.4g} J of led anchors"
-    return {
-        "impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " "),
-        **sliding,
-        "energy drift": f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle",
-        "largest penetration": f"{seen['max_penetration'].max():.1e} m",
-        **tied,
-        **dissipated,
-        **({"wall heat": ", ".join(heats)} if heats else {}),
-        **({"wall work": ", ".join(works)} if works else {}),
-        **escaped,
-    }
+        rows["work"] = f"{seen['work'][-1]:.4g} J of led anchors"
+    if lost := seen.get("dissipated_energy", [0.0])[-1]:
+        # Not of the total energy: the zero of the potential one is arbitrary.
+        first, last = (f"{seen['kinetic_energy'][k]:.4g} J" for k in (0, -1))
+        rows["dissipated"] = f"{lost:.4g} J; the kinetic energy: {first}, then {last}"
+    for what in ("heat", "work"):
+        given = enumerate(seen.get(f"wall_{what}", [[]])[-1])
+        if told := ", ".join(f"{energy:.4g} J from surfaces[{i}]" for i, energy in given if energy):
+            rows[f"wall {what}"] = told
+    if seen.get("escaped", [0])[-1]:
+        rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
+    return rows
 
 
 def _what(trajectory: Any) -> dict[str, str]:

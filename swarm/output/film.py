@@ -111,7 +111,7 @@ def _ffmpeg() -> str:
 
 
 def _reason(error: Exception) -> str:
-    """What went wrong, of ffmpeg the last line that it has written."""
+    """The message of an error, of ffmpeg the last line that it has written."""
     if isinstance(error, CalledProcessError):
         said = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
         return (said or "").strip().rpartition("\n")[2] or str(error)
@@ -171,21 +171,17 @@ class _Film:
 
     def show(self, k: int) -> None:
         """Draw frame k on the canvas."""
-        drawn, frame = self._drawn, self._trajectory.frame(k)
-        position, velocity = drawn.points(frame.position), drawn.points(frame.velocity)
-        packed = self._scale.colours(self._values(position, velocity))
+        drawn = self._drawn
+        position, packed, tints = drawn.coloured(self._trajectory.frame(k), self._scale, self._values)
         self._dots.set_offsets(position[:2].T)
         self._dots.set_3d_properties(position[2], "z")
         self._dots.set_facecolor(drawing.red_green_blue(packed))
         if self._scene.moves():
             for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
                 artist.set_segments(curves)
-        ties, points = [], position.T
-        if len(drawn.triangles):
-            ties = [drawing.faces(self._axes, points[drawn.triangles], packed[drawn.triangles])]
-        elif len(drawn.lines):
-            middles = self._scale.colours(self._values(drawn.middles(position), drawn.middles(velocity)))
-            ties = [drawing.bonds(self._axes, points[drawn.lines], middles)]
+        points = position.T
+        faces = points[drawn.triangles], packed[drawn.triangles]
+        ties = drawing.ties(self._axes, (points[drawn.lines], tints), faces)
         of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
         self._title.set_text(f"{drawn.shown}{of} {drawn.noun}, t = {self._seen['time'][k]:.4g} s")
         self._canvas.restore_region(self._still)

@@ -1,7 +1,7 @@
 """Logs of impacts, read on demand. impacts.py describes the file and writes it."""
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,14 +21,9 @@ if TYPE_CHECKING:
 _VECTORS = ("position", "velocity_before", "velocity_after")
 _TEXTS = ("scene", "method", "kept", "start")
 _NEEDED = (
-    "impacts/time",
-    "frames/complete",
-    "frames/time",
-    "frames/rows",
-    "walls/surface",
-    "walls/member",
+    "impacts/time", "frames/complete", "frames/time", "frames/rows", "walls/surface", "walls/member",
     "parameters/scene",
-)
+)  # fmt: skip
 # Rows that are read at once, so that what is left out takes no memory.
 _AT_ONCE = 1 << 20
 
@@ -138,9 +133,9 @@ class ImpactLog(Stored):
         """Of the rows of `table`."""
         real = self._columns["position"].dtype
         fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
-        fields += [(name, real, 3) for name in _VECTORS]
-        fields += [("impulse", real), *((name, real, 3) for name in ("slip",) if name in self._columns)]
-        return np.dtype([*fields, *(("image", "i4", 3) for name in ("image",) if name in self._columns)])
+        fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]
+        fields += [field for field in (("slip", real, 3), ("image", "i4", 3)) if field[0] in self._columns]
+        return np.dtype(fields)
 
     def table(
         self,
@@ -176,11 +171,17 @@ class ImpactLog(Stored):
         Raises:
             SceneError: an argument is out of its range, or the file is damaged.
         """
-        first, last = self._range(begin, end)
+        low = -np.inf if begin is None else checks.number("begin", begin)
+        high = np.inf if end is None else checks.number("end", end)
+        if low > high:
+            raise SceneError(f"end must be begin or later, got {high:g} before {low:g}")
         wanted = _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces())
+        # The rows of the frames that this time is in.
+        begins = np.append(0, self.ends)
+        first = int(begins[np.searchsorted(self.times, low)])
+        last = int(begins[min(int(np.searchsorted(self.times, high)) + 1, len(self.ends))])
         parts = [
-            self._part(rows, wanted, (begin, end))
-            for rows in (slice(k, min(k + _AT_ONCE, last)) for k in range(first, last, _AT_ONCE))
+            self._part(slice(k, min(k + _AT_ONCE, last)), wanted, (low, high)) for k in range(first, last, _AT_ONCE)
         ]
         table = np.concatenate([np.empty(0, self.dtype), *parts])
         return table[np.lexsort((table["particle"], table["time"]))]
@@ -190,22 +191,18 @@ class ImpactLog(Stored):
         with needed_by("a frame of impacts", "table"):
             import pandas
         table = self.table(**chosen)
-        return pandas.DataFrame(dict(_flat(table)))
+        columns: dict[str, Any] = {}
+        for name in self.dtype.names or ():
+            values = table[name]
+            columns |= (
+                {name: values} if values.ndim == 1 else {f"{name}_{x}": values[:, i] for i, x in enumerate("xyz")}
+            )
+        return pandas.DataFrame(columns)
 
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0
 
-    def _range(self, begin: float | None, end: float | None) -> tuple[int, int]:
-        """The rows of the frames that this time is in."""
-        low = -np.inf if begin is None else checks.number("begin", begin)
-        high = np.inf if end is None else checks.number("end", end)
-        if low > high:
-            raise SceneError(f"end must be begin or later, got {high:g} before {low:g}")
-        starts = np.append(0, self.ends)
-        k, last = int(np.searchsorted(self.times, low)), int(np.searchsorted(self.times, high)) + 1
-        return int(starts[min(k, len(self.ends))]), int(starts[min(last, len(self.ends))])
-
-    def _part(self, rows: slice, wanted: tuple[Any, Any], span: tuple[float | None, float | None]) -> NDArray[Any]:
+    def _part(self, rows: slice, wanted: tuple[Any, Any], span: tuple[float, float]) -> NDArray[Any]:
         """What is wanted of some rows."""
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
@@ -214,12 +211,8 @@ class ImpactLog(Stored):
                 raise ValueError(f"expected walls from 0 to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}")
             if len(particle) and not (particle.min() >= 0 and particle.max() < self.count):
                 raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
-            surface = self._surface[wall]
-            taken = np.ones(len(time), np.bool_)
-            for numbers, values in zip(wanted, (particle, surface), strict=True):
-                taken &= numbers is None or numbers[values]
-            begin, end = span
-            taken &= (begin is None or time >= begin) & (end is None or time < end)
+            surface, (particles, surfaces), (begin, end) = self._surface[wall], wanted, span
+            taken = (time >= begin) & (time < end) & particles[particle] & surfaces[surface]
             k = np.flatnonzero(taken)
             table = np.empty(len(k), self.dtype)
             table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
@@ -231,10 +224,10 @@ class ImpactLog(Stored):
         return table
 
 
-def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_] | None:
-    """Which of n are wanted; None for all."""
+def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
+    """Which of n are wanted."""
     if numbers is None:
-        return None
+        return np.ones(n, np.bool_)
     listed = numbers if isinstance(numbers, (Sequence, np.ndarray)) else [numbers]
     found = np.zeros(n, np.bool_)
     for given in listed:
@@ -243,16 +236,6 @@ def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_] | None:
             raise SceneError(f"{name} must be numbers from 0 to {n - 1}, got {i}")
         found[i] = True
     return found
-
-
-def _flat(table: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Every column of a table, and each component of a vector as one."""
-    for name in table.dtype.names or ():
-        if table[name].ndim == 1:
-            yield name, table[name]
-            continue
-        for axis, component in enumerate("xyz"):
-            yield f"{name}_{component}", table[name][:, axis]
 
 
 def load_impacts(path: str | Path) -> ImpactLog:

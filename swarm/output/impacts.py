@@ -8,7 +8,6 @@ parameters/particles, their number, parameters/start, a digest of them at the st
 """
 
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5py
@@ -44,7 +43,7 @@ def about(scene: Scene, method: Method, kept: str, identity: dict[str, Any]) -> 
     }
 
 
-class ImpactWriter:
+class ImpactWriter(AppendedFile):
     """A context that creates the log, or goes on with it, and gives the function that writes what frames add.
 
     Args:
@@ -58,27 +57,21 @@ class ImpactWriter:
     def __init__(
         self, path: Path, columns: Rows, ends: dict[int, int], about: dict[str, Any], start: tuple[int, int] | None
     ) -> None:
-        self._path, self._columns, self._ends, self._about = path, columns, ends, about
+        super().__init__(path, "log of impacts", start is not None)
+        self._columns, self._ends, self._about = columns, ends, about
         self._frames, self._rows = start or (0, 0)
-        self._grown = AppendedFile(path, "log of impacts", start is not None)
-        self._following = start is not None
         self._few: list[Rows] = []
 
     def __enter__(self) -> WriteFrames:
-        self._file = self._grown.open()
-        with self._grown.writing("its beginning"):
+        self._open()
+        with self._writing("its beginning"):
             if not self._following:
                 self._create()
-            self._open()
+            self._find()
             # Rows of frames that are to be computed again are not cut off, which a kill may spoil, but written over;
             # by several threads in another order, so that these frames are not complete from now on.
             self._complete(self._frames)
         return self._write
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._grown.close(error)
 
     def _create(self) -> None:
         file, particles = self._file, int(self._about["parameters/particles"])
@@ -95,22 +88,22 @@ class ImpactWriter:
             file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(1024,))
         file["frames/complete"] = np.zeros(1, np.int64)
 
-    def _open(self) -> None:
+    def _find(self) -> None:
         self._data: dict[str, h5py.Dataset] = {name: self._file[f"impacts/{name}"] for name in self._columns}
         self._time, self._counts = self._file["frames/time"], self._file["frames/rows"]
-        self._grown.begin()
+        self._begin()
 
     def _complete(self, frames: int) -> None:
         """Say how many frames are complete, after these are on file."""
         put(self._file["frames/complete"], 0, [frames])
-        self._grown.flush()
+        self._flush()
 
     def add(self, rows: Rows) -> None:
         """Add rows, whose arrays may be changed when it returns."""
         if len(rows["time"]) < _SOME and sum(len(few["time"]) for few in self._few) < _SOME:
             self._few.append({name: array.copy() for name, array in rows.items()})
             return
-        with self._grown.writing("impacts"):
+        with self._writing("impacts"):
             self._add_few()
             self._put(rows)
 
@@ -125,19 +118,18 @@ class ImpactWriter:
         self._rows += len(rows["time"])
 
     def _write(self, frames: list[Written]) -> None:
-        with self._grown.writing(f"the impacts of frame {frames[0][0]}"):
+        with self._writing(f"the impacts of frame {frames[0][0]}"):
             self._add_few()
             put(self._counts, frames[0][0], [self._ends.pop(number) for number, *_ in frames])
             put(self._time, frames[0][0], [moment for _number, moment, *_ in frames])
             self._file.flush()
             self._complete(frames[-1][0] + 1)
-            if self._grown.is_new and self._grown.take_name():
-                self._file = self._grown.file
-                self._open()
+            if self._is_new():
+                self._rename()
 
     def sync(self) -> None:
         """Flush to the disk what was written."""
-        with self._grown.writing("impacts"):
+        with self._writing("impacts"):
             self._add_few()
-            self._grown.flush()
-        self._grown.sync()
+            self._flush()
+        super().sync()

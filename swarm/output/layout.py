@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from .sources import DamagedError
 
-PARTS = ("position", "velocity")
-# The impacts of each particle, beside these; files of older versions have none.
-COUNTS = "impacts"
-# The cells that each particle has come through, where the scene repeats.
-IMAGES = "image"
-# When each particle has escaped [s], where walls have openings.
-ESCAPES = "escape_time"
+# Of each particle: its impacts, which files of older versions lack; the cells that it has come through, where the scene
+# repeats; when it has escaped [s], where walls have openings.
+PARTS, COUNTS, IMAGES, ESCAPES = ("position", "velocity"), "impacts", "image", "escape_time"
+_INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
+_ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
+    **dict.fromkeys(PARTS, (_REAL, (3,))), COUNTS: (_INTEGER, ()), IMAGES: (_INTEGER, (3,)), ESCAPES: (_REAL, ()),
+}  # fmt: skip
+KEPT = tuple(_ELEMENTS)
 # Long arrays of the scene, by their digests.
 ARRAYS = "arrays"
 _TEXTS = ("scene", "method", "storage")
@@ -25,16 +26,20 @@ _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "
 _DENSEST = 1032
 # Bytes of the header of a heap of texts, and of each object in it; the signature of a heap.
 _HEADER, _HEAP = 16, int.from_bytes(b"GCOL", "little")
-_INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 
-# Observables of every run, besides the impulse of each surface.
-_NUMBERS = (
-    "kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy", "energy_error",
-    "max_penetration", "impacts", "escaped", "unconverged",
-)  # fmt: skip
-
-# Likewise, besides the heat of each surface, but files of older versions have none of them, or only those of bodies.
-_LATER = ("sliding", "sliding_time", "link_error", "work")
+# The shape of an entry of the observables of every run; None stands for one of each surface.
+_OBSERVABLES: dict[str, tuple[int | None, ...]] = {
+    **dict.fromkeys(("kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy"), ()),
+    **dict.fromkeys(("energy_error", "max_penetration", "impacts", "escaped", "unconverged"), ()),
+    "impulse": (None,),
+}
+# Likewise, but files of older versions have none of them, or only those of bodies.
+_LATER: dict[str, tuple[int | None, ...]] = {
+    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work"), ()),
+    **dict.fromkeys(("wall_heat", "wall_work", "wall_energy"), (None,)),
+    **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
+    "wall_orientation": (None, 4),
+}
 
 
 def missing(file: Any) -> str | None:
@@ -75,7 +80,7 @@ def require_shards(file: Any, n: int, path: Path, open_file: Callable[[Path], An
     HDF5 would fill in zeros for what it does not find.
     """
     held: dict[str, dict[str, int]] = {}
-    for name in (*PARTS, IMAGES, COUNTS, ESCAPES):
+    for name in KEPT:
         value = file.get(f"particles/all/{name}/value")
         for one in value.virtual_sources() if value is not None and value.is_virtual else ():
             _begin, end = one.src_space.get_select_bounds()
@@ -104,14 +109,9 @@ def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
     require_fits(kept, len(kept), path)
     if (ids := dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
-    for name in PARTS:
-        require_fits(dataset(file, f"particles/all/{name}/value", _REAL, (n, len(kept), 3)), n, path)
-    if f"particles/all/{IMAGES}" in file:
-        require_fits(dataset(file, f"particles/all/{IMAGES}/value", _INTEGER, (n, len(kept), 3)), n, path)
-    if f"particles/all/{COUNTS}" in file:
-        require_fits(dataset(file, f"particles/all/{COUNTS}/value", _INTEGER, (n, len(kept))), n, path)
-    if f"particles/all/{ESCAPES}" in file:
-        require_fits(dataset(file, f"particles/all/{ESCAPES}/value", _REAL, (n, len(kept))), n, path)
+    for name, (kinds, width) in _ELEMENTS.items():
+        if name in PARTS or f"particles/all/{name}" in file:
+            require_fits(dataset(file, f"particles/all/{name}/value", kinds, (n, len(kept), *width)), n, path)
 
 
 def require_index(file: Any) -> None:
@@ -155,12 +155,8 @@ def text(dataset: Any, path: Path) -> str:
 def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
     """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
-    shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(_NUMBERS, (n,)), "impulse": (n, surfaces)}
-    later: dict[str, tuple[int, ...]] = {**dict.fromkeys(_LATER, (n,)), "wall_heat": (n, surfaces)}
-    later |= {"wall_work": (n, surfaces), "wall_position": (n, surfaces, 3), "wall_orientation": (n, surfaces, 4)}
-    later |= {"wall_energy": (n, surfaces), "wall_velocity": (n, surfaces, 3), "wall_spin": (n, surfaces, 3)}
-    shapes |= {name: shape for name, shape in later.items() if name in seen}
-    for name, shape in shapes.items():
+    for name, entry in {**_OBSERVABLES, **{name: _LATER[name] for name in _LATER if name in seen}}.items():
+        shape = (n, *(surfaces if length is None else length for length in entry))
         if name not in seen or seen[name].shape != shape:
             came = "nothing" if name not in seen else str(seen[name].shape)
             raise ValueError(f"expected {name} of the shape {shape}, got {came}")

@@ -17,15 +17,17 @@ from ..particles import Floats
 from . import paths
 from .sources import DAMAGE, DamagedError, reason, require_file
 
-_BODIES = "/scene/bodies/"
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
-# Recordings of older versions do not say it.
+# Recordings of older versions do not say them.
 _NOUN, _CENTER = "noun", "center"
+_PARTICLES, _LINES, _MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
 _WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
 _TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
+
+Colours = NDArray[np.uint32]
 
 
 class Playback:
@@ -63,109 +65,94 @@ class Playback:
             warnings.simplefilter("ignore")  # about a missing footer, which is_whole reports
             chunks = RrdReader(self.path).stream().to_chunks()
         self.entities: dict[str, int] = {}
-        self.series: dict[str, tuple[Floats, Floats]] = {}
-        self.names: dict[str, str] = {}
-        self.wires: list[tuple[bool, list[Floats]]] = []
-        self._walls: list[str] = []  # the entity of each
-        self._poses: dict[str, dict[int, tuple[Floats, Floats]]] = {}
-        self.about: dict[str, Any] = {_NOUN: "particles"}
-        self.center = np.zeros(3)
-        self._triangles = np.zeros((0, 3), np.int64)
-        # Of each column, where the row of a frame is.
-        self._rows: dict[str, dict[int, tuple[Any, int]]] = {name: {} for name in (_POSITIONS, _STRIPS, _CORNERS)}
-        rows: dict[str, list[tuple[NDArray[np.int64], Floats]]] = {}
+        # By entity and column: what does not change, and where the row of a frame is.
+        self._static: dict[tuple[str, str], Any] = {}
+        self._rows: dict[tuple[str, str], dict[int, tuple[Any, int]]] = {}
+        scalars: dict[str, dict[int, float]] = {}
         for chunk in chunks:
             entity = chunk.entity_path
             if entity.startswith("/__"):
                 continue
             self.entities[entity] = self.entities.get(entity, 0) + chunk.num_rows
             batch = chunk.to_record_batch()
-            names = batch.schema.names
-            for name in self._rows.keys() & names if "frame" in names else ():
-                numbers = batch.column("frame").to_pylist()
-                self._rows[name] |= {number: (batch, row) for row, number in enumerate(numbers)}
-            if _SCALARS in names:
-                values = batch.column(_SCALARS).flatten().to_numpy(zero_copy_only=False)
-                rows.setdefault(entity, []).append((batch.column("frame").to_numpy(), values))
-            if _TURNS in names and "frame" in names:
-                ways, turns = (_numbers(batch, name) for name in (_WAYS, _TURNS))
-                # Rerun keeps matrices column by column.
-                both = zip(ways, turns.reshape(-1, 3, 3).transpose(0, 2, 1), strict=True)
-                found = dict(zip(batch.column("frame").to_pylist(), both, strict=True))
-                self._poses.setdefault(entity, {}).update(found)
-            self._static(entity, batch, names)
-        if not self._rows[_POSITIONS] or "/time" not in rows:
+            columns = dict(zip(batch.schema.names, batch.columns, strict=True))
+            if "frame" not in columns:
+                self._static |= {(entity, name): column[0] for name, column in columns.items()}
+                continue
+            numbers = columns["frame"].to_pylist()
+            if _SCALARS in columns:
+                values = columns[_SCALARS].flatten().to_numpy(zero_copy_only=False)
+                scalars.setdefault(entity, {}).update(zip(numbers, values, strict=True))
+                continue
+            for name, column in columns.items():
+                self._rows.setdefault((entity, name), {}).update({k: (column, i) for i, k in enumerate(numbers)})
+        drawn = self._rows.get((_PARTICLES, _POSITIONS))
+        if not drawn or "/time" not in scalars:
             raise ValueError("it is not a recording of swarm, or holds no frame")
-        missing = [name for name in _ABOUT if name not in self.about]
-        if missing:
-            raise ValueError(f"it does not say its {missing[0]}")
-        moments = {k: t for numbers, values in rows.pop("/time") for k, t in zip(numbers, values, strict=True)}
+        said = {name: column for (entity, name), column in self._static.items() if entity == "/about"}
+        for name in _ABOUT:
+            if name not in said:
+                raise ValueError(f"it does not say its {name}")
+        self.about = {_NOUN: "particles", **{name: said[name].as_py()[0] for name in (*_ABOUT, _NOUN) if name in said}}
+        self.center = np.array(said[_CENTER].as_py()) if _CENTER in said else np.zeros(3)
+        moments = scalars.pop("/time")
         # A crash may have left more points than rows of the time series.
-        self.numbers = sorted(number for number in self._rows[_POSITIONS] if number in moments)
+        self.numbers = sorted(number for number in drawn if number in moments)
         if not self.numbers:
             raise ValueError("it holds no frame whose time is known")
         self.times = np.array([moments[number] for number in self.numbers])
-        for entity, parts in rows.items():
-            numbers, values = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-            self.series[entity] = np.array([moments[number] for number in numbers]), values
-
-    def _static(self, entity: str, batch: Any, names: list[str]) -> None:
-        if "SeriesLines:names" in names:
-            self.names[entity] = batch.column("SeriesLines:names")[0].as_py()[0]
-        if entity == "/about" and _CENTER in names:
-            self.center = np.array(batch.column(_CENTER)[0].as_py())
-        if entity == "/about":
-            self.about |= {name: batch.column(name)[0].as_py()[0] for name in names if name in (*_ABOUT, _NOUN)}
-        if _TRIANGLES in names and entity.startswith(_BODIES):
-            self._triangles = batch.column(_TRIANGLES)[0].values.flatten().to_numpy().reshape(-1, 3)
-        if _STRIPS in names and not entity.startswith(_BODIES):
-            strips = batch.column(_STRIPS)[0].as_py()
-            self.wires.append((entity.startswith("/scene/solids/"), [np.array(strip) for strip in strips]))
-            self._walls.append(entity.rpartition("/")[0])
+        self.series = {
+            entity: (np.array([moments[number] for number in found]), np.array(list(found.values())))
+            for entity, found in scalars.items()
+        }
+        self.names: dict[str, str] = {
+            entity: kept.as_py()[0] for (entity, name), kept in self._static.items() if name == "SeriesLines:names"
+        }
+        strips = {entity: kept for (entity, name), kept in self._static.items() if name == _STRIPS}
+        self._walls = [entity.rpartition("/")[0] for entity in strips]
+        self.wires: list[tuple[bool, list[Floats]]] = [
+            (entity.startswith("/scene/solids/"), [np.array(strip) for strip in kept.as_py()])
+            for entity, kept in strips.items()
+        ]
+        triangles = self._static.get((_MESH, _TRIANGLES))
+        self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
 
     def wires_at(self, number: int) -> list[tuple[bool, list[Floats]]]:
         """The curves of each surface at the frame of this number: surfaces may move."""
         found = []
-        for (solid, curves), entity in zip(self.wires, self._walls, strict=True):
-            pose = self._poses.get(entity, {}).get(number)
-            moved = curves if pose is None else [curve @ pose[1].T + pose[0] for curve in curves]
-            found.append((solid, [curve + self.center for curve in moved]))
+        for (solid, curves), wall in zip(self.wires, self._walls, strict=True):
+            way, turn = (np.array(self._row(wall, name, number)) for name in (_WAYS, _TURNS))
+            if turn.size:
+                # Rerun keeps matrices column by column: this is the transpose.
+                curves = [curve @ turn.reshape(3, 3) + way for curve in curves]
+            found.append((solid, [curve + self.center for curve in curves]))
         return found
 
-    def frame(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
+    def frame(self, number: int) -> tuple[Floats, Colours]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
-        batch, row = self._rows[_POSITIONS][number]
-        return self._points(batch, _POSITIONS, row), _colours(batch, _COLOURS, row)
+        return self._points(_PARTICLES, _POSITIONS, number), self._colours(_PARTICLES, _COLOURS, number)
 
-    def lines(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
+    def lines(self, number: int) -> tuple[Floats, Colours]:
         """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; none where bodies have faces."""
-        batch, row = self._rows[_STRIPS].get(number, (None, 0))
-        if batch is None or _TINTS not in batch.schema.names:
-            return np.zeros((0, 2, 3)), np.zeros(0, np.uint32)
-        ends = batch.column(_STRIPS)[row].values.flatten().flatten().to_numpy(zero_copy_only=False)
-        return ends.reshape(-1, 2, 3) + self.center, _colours(batch, _TINTS, row)
+        colours = self._colours(_LINES, _TINTS, number)
+        return self._points(_LINES, _STRIPS, number)[: 2 * len(colours)].reshape(-1, 2, 3), colours
 
-    def faces(self, number: int) -> tuple[Floats, NDArray[np.uint32]]:
+    def faces(self, number: int) -> tuple[Floats, Colours]:
         """Triangles of bodies (T, 3, 3) and the colours of their corners (T, 3) at a frame."""
-        batch, row = self._rows[_CORNERS].get(number, (None, 0))
-        if batch is None:
-            return np.zeros((0, 3, 3)), np.zeros((0, 3), np.uint32)
-        return self._points(batch, _CORNERS, row)[self._triangles], _colours(batch, _PAINT, row)[self._triangles]
+        corners, colours = self._points(_MESH, _CORNERS, number), self._colours(_MESH, _PAINT, number)
+        return corners[self._triangles], colours[self._triangles]
 
-    def _points(self, batch: Any, name: str, row: int) -> Floats:
+    def _row(self, entity: str, name: str, number: int) -> Any:
+        """What a column holds of a frame, as nested lists; none if it has no such frame."""
+        column, row = self._rows.get((entity, name), {}).get(number, (None, 0))
+        return [] if column is None else column[row].as_py()
+
+    def _points(self, entity: str, name: str, number: int) -> Floats:
         """Positions (n, 3), with the origin of the file."""
-        kept = batch.column(name)[row].values.flatten().to_numpy(zero_copy_only=False).reshape(-1, 3)
-        return np.asarray(kept + self.center)
+        return np.reshape(self._row(entity, name, number), (-1, 3)) + self.center
 
-
-def _numbers(batch: Any, name: str) -> Floats:
-    """A column of vectors or matrices, one row a frame."""
-    rows = batch.column(name)
-    return np.array([np.ravel(row.as_py()[0]) for row in rows])
-
-
-def _colours(batch: Any, name: str, row: int) -> NDArray[np.uint32]:
-    return np.asarray(batch.column(name)[row].values.to_numpy(zero_copy_only=False))
+    def _colours(self, entity: str, name: str, number: int) -> Colours:
+        return np.array(self._row(entity, name, number), np.uint32)
 
 
 def is_whole(path: Path) -> bool:

@@ -107,7 +107,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     rows = []
     for k, moment in enumerate(times):
         now = {name: column[k] for name, column in seen.items()}
-        rows.append(series.row_of(lines, moment, now, before))
+        rows.append([line.value(moment, now, before) for line in lines])
         before = moment, now
     values = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
     shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
@@ -130,17 +130,13 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     drawn = Drawn(len(end), content.body, most)
     start = content.frames.get("start", end)
     scale, values = colours.colouring("speed", content.scene, content.method, start)
-    position, velocity = drawn.points(end.position), drawn.points(end.velocity)
-    points, packed = position.T, scale.colours(values(position, velocity))
-    axes, has_faces = figure.add_subplot(projection="3d"), len(drawn.triangles) > 0
+    position, packed, tints = drawn.coloured(end, scale, values)
+    points, axes = position.T, figure.add_subplot(projection="3d")
     figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
-    drawing.particles(axes, points, drawing.red_green_blue(packed), wires, 0.0 if has_faces else 1.0)
-    if has_faces:
-        drawing.faces(axes, points[drawn.triangles], packed[drawn.triangles])
-    else:
-        middles = scale.colours(values(drawn.middles(position), drawn.middles(velocity)))
-        drawing.bonds(axes, points[drawn.lines], middles)
+    size = 0.0 if len(drawn.triangles) else 1.0
+    drawing.particles(axes, points, drawing.red_green_blue(packed), wires, size)
+    drawing.ties(axes, (points[drawn.lines], tints), (points[drawn.triangles], packed[drawn.triangles]))
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
     title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"

@@ -1,4 +1,4 @@
-"""What becomes of a trajectory in Python: pictures, films, a viewer, tables and labelled arrays."""
+"""What becomes of a trajectory in Python: pictures, films, a viewer, tables, labelled arrays, and other formats."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,34 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from .exported import Progress
+
 
 class Presented(Stored):
-    """The methods of a `Trajectory` that need other libraries, each of which is imported where it is used."""
+    """The methods of a `Trajectory` that need other libraries, each of which is imported where it is used.
+
+    >>> import swarm, tempfile
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+    ...     with swarm.load(folder + "/run.h5") as trajectory:
+    ...         table, figure = trajectory.table(), trajectory.plot(figsize=(10.0, 6.0))
+    ...         film = trajectory.animate(folder + "/run.gif", size=(320, 240))
+    ...         dataset = trajectory.to_xarray().load()
+    ...         written = trajectory.export(folder + "/run.xyz", frames=-1)
+    ...     last = written[0].read_text().splitlines()[2]
+    >>> table[["time", "impacts", "momentum_x"]]
+       time  impacts  momentum_x
+    0   0.0        0         1.0
+    1   1.0        1        -1.0
+    >>> figure.get_suptitle()[:16], film.name
+    ('run.h5: 2 frames', 'run.gif')
+    >>> dict(dataset.position.sizes), float(dataset.velocity.sel(axis="x", particle=0)[-1])
+    ({'time': 2, 'particle': 1, 'axis': 3}, -1.0)
+    >>> last
+    'X 0.0 0.0 0.0 -1.0 0.0 0.0 0 1'
+    """
 
     def __repr__(self: Any) -> str:
         try:
@@ -36,11 +61,6 @@ class Presented(Stored):
             rows = {"problem": str(error)}
         return notebook.table(f"Trajectory {self.path.name}", rows.items())
 
-    def has_particles(self) -> bool:
-        """Whether the file keeps particles."""
-        with self._reading("its particles") as file:
-            return "particles/all" in file
-
     def table(self: Any) -> "pandas.DataFrame":
         """The observables as a pandas frame: `time` first, a row for each frame.
 
@@ -49,18 +69,6 @@ class Presented(Stored):
 
         Raises:
             SceneError: the trajectory is damaged, or pandas is not installed.
-
-        >>> import swarm, tempfile
-        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
-        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
-        ...     with swarm.load(folder + "/run.h5") as trajectory:
-        ...         table = trajectory.table()
-        >>> table[["time", "impacts", "momentum_x"]]
-           time  impacts  momentum_x
-        0   0.0        0         1.0
-        1   1.0        1        -1.0
         """
         return frame_of(self.observables)
 
@@ -79,16 +87,6 @@ class Presented(Stored):
         Raises:
             SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or
                 scikit-image is not installed.
-
-        >>> import swarm, tempfile
-        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     start = swarm.fill(cavity, 10, speed=1.0)
-        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
-        ...     with swarm.load(folder + "/run.h5") as trajectory:
-        ...         figure = trajectory.plot(figsize=(10.0, 6.0))
-        >>> figure.get_suptitle()[:16]
-        'run.h5: 2 frames'
         """
         with needed_by("a plot", "plot"):
             from . import plots
@@ -124,15 +122,6 @@ class Presented(Stored):
             SceneError: an argument is out of its range, the file exists, the trajectory is damaged or keeps no
                 particles, or matplotlib, scikit-image or ffmpeg is not installed.
             FileError: the file cannot be written.
-
-        >>> import swarm, tempfile
-        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     start = swarm.fill(cavity, 10, speed=1.0)
-        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
-        ...     with swarm.load(folder + "/run.h5") as trajectory:
-        ...         trajectory.animate(folder + "/run.gif", size=(320, 240)).name
-        'run.gif'
         """
         with needed_by("a film", "animation"):
             from . import film
@@ -149,18 +138,6 @@ class Presented(Stored):
 
         Raises:
             SceneError: the trajectory is damaged, or xarray is not installed.
-
-        >>> import swarm, tempfile
-        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
-        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
-        ...     with swarm.load(folder + "/run.h5") as trajectory:
-        ...         dataset = trajectory.to_xarray()
-        ...         float(dataset.velocity.sel(axis="x", particle=0)[-1])
-        -1.0
-        >>> dict(dataset.position.sizes)
-        {'time': 2, 'particle': 1, 'axis': 3}
         """
         with needed_by("a Dataset", "xarray"):
             from . import labelled
@@ -184,3 +161,35 @@ class Presented(Stored):
                 import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
             from . import recording
         recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
+
+    def export(
+        self: Any,
+        path: str | Path,
+        frames: slice | int | None = None,
+        particles: int = 1,
+        surfaces: bool = True,
+        overwrite: bool = False,
+        progress: "Progress | None" = None,
+    ) -> list[Path]:
+        """Write the trajectory to a file of another format; units are as they are, and so are the digits of .xyz.
+
+        Args:
+            path: its suffix says the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
+                for HOOMD-blue and freud, in which numbers are float32.
+            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all.
+            particles: k is every k-th particle, or body, beginning with the first.
+            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Those of surfaces of
+                more than 20 000 bodies are left out.
+            overwrite: replace existing files.
+            progress: is called with how many frames are written, and how many there are to write.
+
+        Returns:
+            The files. They have their names when they are whole; one frame at a time is in memory.
+
+        Raises:
+            SceneError: another suffix, an argument out of its range, a library that is missing, or a file that exists.
+            FileError: the file cannot be written.
+        """
+        from .export import export
+
+        return export(self, path, frames, particles, surfaces, overwrite, progress)

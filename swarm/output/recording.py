@@ -18,12 +18,10 @@ import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from .. import checks
 from ..bodies.body import Body
@@ -31,10 +29,10 @@ from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, paths, series, viewer
+from . import colours, looks, paths, series, viewer
 from .drawn import Drawn
 from .origin import origin_of
-from .shapes import Shape, shapes_of, since_start
+from .shapes import shapes_of, since_start
 from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -48,15 +46,6 @@ _ROWS, _PATIENCE = 50, 0.5
 _LONGEST = 10.0
 # Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
 _LATEST = 9.2e9
-
-_LINES, _MESH = "/scene/bodies/lines", "/scene/bodies/mesh"
-_BACKGROUND = (24, 24, 27)
-_CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
-# Between the faces of bodies, which have no shading.
-_EDGE = (10, 10, 12, 255)
-_CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
-# Okabe and Ito's, without those that are invisible on a dark background.
-LINES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
 
 
 @dataclass(frozen=True)
@@ -135,20 +124,20 @@ class RecordingWriter:
         sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
         try:
             sinks += [rr.FileSink(self._path)] if self._path else []
-            looks = _blueprint(self._series, self._drawn.noun)
+            blueprint = looks.blueprint(self._series, self._drawn.noun)
             if sinks:
-                self.stream.set_sinks(*sinks, default_blueprint=looks)
+                self.stream.set_sinks(*sinks, default_blueprint=blueprint)
             else:
-                self.stream.send_blueprint(looks)
+                self.stream.send_blueprint(blueprint)
         except RuntimeError as error:
             raise FileError(f"cannot write the recording {self._path}: {error}") from error
         self.stream.set_log_time_enabled(False)
-        self._begin()
+        looks.log_static(self.stream, self._drawn, self._shapes, self._center)
+        looks.log_series(self.stream, self._series)
+        looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center)
         return self._write
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if self._failed:
             return  # another flush never returns
         try:
@@ -160,64 +149,19 @@ class RecordingWriter:
             if error is None:
                 raise FileError(f"cannot close the recording {self._path}: {problem}") from problem
 
-    def _begin(self) -> None:
-        """Log what does not change."""
-        log = self.stream.log
-        log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
-        drawn, width = self._drawn, rr.Radius.ui_points(1.0)
-        if len(drawn.triangles):
-            log(_MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)
-            log(_LINES, rr.LineStrips3D.from_fields(radii=width, colors=[_EDGE]), static=True)
-        elif len(drawn.lines):
-            log(_LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
-        for shape in self._shapes:
-            path = _path(shape)
-            face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
-            if len(shape.vertices):
-                mesh = rr.Mesh3D(
-                    vertex_positions=shape.vertices - self._center, triangle_indices=shape.triangles,
-                    vertex_normals=shape.normals, albedo_factor=face,
-                )  # fmt: skip
-                log(f"{path}/mesh", mesh, static=True)
-            if shape.wires:
-                wires = [curve - self._center for curve in shape.wires]
-                lines = rr.LineStrips3D(wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
-                log(f"{path}/wires", lines, static=True)
-        for colour, line in zip(_cycled(self._series), self._series, strict=True):
-            log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
-        scale, shown = self._scale, drawn.shown
-        of = f" of {drawn.count}" if shown < drawn.count else ""
-        every = f", every {self._stride}th frame" if self._stride > 1 else ""
-        text = (
-            f"**{shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
-            f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
-            f"plots {series.NOTHING:g} is the logarithm of 0."
-        )
-        if self._center.any():
-            text += f" Positions are less {tuple(self._center.tolist())} m."
-            log("/about", rr.AnyValues(center=self._center), static=True)
-        log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
-        values = rr.AnyValues(
-            quantity=scale.quantity, low=scale.low, high=scale.high, particles=drawn.count, shown=shown,
-            stride=self._stride, noun=drawn.noun,
-        )  # fmt: skip
-        log("/about", values, static=True)
-
     def _write(self, frames: list[Written]) -> None:
         chosen = [frame for frame in frames if frame[0] % self._stride == 0 or frame[0] == self._last]
         if not chosen:
             return
         numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
-        drawn, shown, colour, lines = self._drawn, [], [], []
+        shown, colour, lines = [], [], []
         for number, moment, state, seen in chosen:
-            position, velocity = drawn.points(state.position), drawn.points(state.velocity)
+            position, packed, tints = self._drawn.coloured(state, self._scale, self._values)
             shown.append(position - self._center[:, None])
-            colour.append(self._scale.colours(self._values(position, velocity)))
-            if len(drawn.lines) and not len(drawn.triangles):
-                middles = drawn.middles(position), drawn.middles(velocity)
-                lines.append(self._scale.colours(self._values(*middles)))
-            self._rows.append((number, moment, series.row_of(self._series, moment, seen, self._before)))
+            colour.append(packed)
+            lines.append(tints)
+            values = [line.value(moment, seen, self._before) for line in self._series]
+            self._rows.append((number, moment, values))
             self._before = moment, seen
         points = rows(shown, np.float32)
         try:
@@ -247,10 +191,10 @@ class RecordingWriter:
             strips = points[:, drawn.lines].reshape(-1, 2, 3)
             tinted = {"colors": lines.ravel()} if lines.size else {}
             columns = rr.LineStrips3D.columns(strips=strips, **tinted)
-            self._send(_LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
+            self._send(looks.LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
         if len(drawn.triangles):
             columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
-            self._send(_MESH, numbers, times, columns.partition([n] * frames))
+            self._send(looks.MESH, numbers, times, columns.partition([n] * frames))
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
@@ -261,7 +205,7 @@ class RecordingWriter:
                 # From the centre: x1 - c = A (x0 - c) + (b + A c - c)
                 ways = ways + (turns @ self._center - self._center)
                 columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
-                self._send(_path(shape), numbers, times, columns)
+                self._send(looks.path_of(shape), numbers, times, columns)
 
     def sync(self) -> None:
         """Do nothing: no checkpoint refers to a recording."""
@@ -283,39 +227,6 @@ class RecordingWriter:
             rr.TimeColumn("sim_time", duration=np.clip(times, -_LATEST, _LATEST)),
         ]
         self.stream.send_columns(path, indexes, columns)
-
-
-def _path(shape: Shape) -> str:
-    return f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
-
-
-# --- Looks ------------------------------------------------------------------------------------------------
-
-
-def _cycled(lines: list[series.Line]) -> list[tuple[int, int, int]]:
-    """The colour of each line; every view starts with the first."""
-    return [LINES[k % len(LINES)] for together in series.views_of(lines).values() for k in range(len(together))]
-
-
-def _blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
-    """The 3-D view beside the plots, paused at the start."""
-    scene = rrb.Spatial3DView(
-        origin="/scene", name=noun, background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
-    )
-    plots = []
-    for group, together in series.views_of(lines).items():
-        view, logarithm = series.VIEWS[group]
-        legend = rrb.PlotLegend(visible=len(together) > 1)
-        name = f"{view}, log10" if logarithm else view
-        paths = [line.path for line in together]
-        plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
-    about = rrb.TextDocumentView(origin="/about", name="legend")
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[8, 1]), rrb.Vertical(*plots), column_shares=[3, 2]),
-        rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-    )
 
 
 # --- From a trajectory -----------------------------------------------------------------------------------

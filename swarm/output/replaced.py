@@ -24,8 +24,12 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-        if os.name == "posix":
-            _sync_folder(path.parent)
+        if os.name == "posix":  # other systems cannot open folders
+            folder = os.open(path.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise FileError(f"cannot write the {what} {path}: {error}; the previous {what} is unchanged") from error
@@ -42,19 +46,10 @@ def named_when_whole(target: Path) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, target)
+    except SwarmError:
+        raise
     except (OSError, RuntimeError) as error:
-        if isinstance(error, SwarmError):
-            raise
         raise FileError(f"cannot write {target}: {error}") from error
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
-
-
-def _sync_folder(path: Path) -> None:
-    """Flush the names in a folder to the disk; other systems cannot open folders."""
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)

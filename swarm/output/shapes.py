@@ -1,9 +1,10 @@
 """The walls of a scene as shapes to draw, for any phi: triangles, their area, and the curves of a wire frame."""
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import contourpy
 import numpy as np
@@ -35,6 +36,9 @@ _MARGIN = 2.0
 _BEYOND = 1.2
 
 Corners = tuple[Floats, Floats]
+# Vertices (V, 3) [m], triangles (T, 3) and normals (V, 3).
+Mesh = tuple[Floats, NDArray[np.int64], Floats]
+_NOTHING: Mesh = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3))
 
 
 @dataclass(frozen=True)
@@ -61,42 +65,26 @@ class Shape:
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
 
-class Still(NamedTuple):
-    """A scene at one time [s]."""
-
-    scene: Scene
-    time: float
-
-
 def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = math.inf) -> list[Shape]:
     """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go.
 
     That of a surface of more than `most` bodies is empty.
     """
-    still = Still(scene, time)
-    box = _box(still, positions)
-    coarse = _triangles(still, box)
+    walls = _Walls(scene, positions, time)
     # On a grid around all of them the many bodies of a scene would be too small, and a grid around each too slow.
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     shapes = []
-    for i, surface in enumerate(scene.surfaces):
+    for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
+        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
+        mesh, wires = _NOTHING, list[Floats]()
+        if bodies <= most and isinstance(surface, Spheres):
+            mesh, wires = _placed(at, *_balls(surface))
+        elif bodies and bodies <= most:
+            mesh, wires = _placed(at, *_bodies(surface, _given(walls.box, at)))
+        elif not bodies:
+            mesh, wires = walls.drawn(i, at)
         name = f"{i}_{type(surface).__name__.lower()}"
-        if isinstance(surface, Many) and len(surface) > most:
-            shapes.append(Shape(name, True, np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3)), []))
-            continue
-        if isinstance(surface, Spheres):
-            shapes.append(_placed(Shape(name, True, *_balls(surface)), scene.poses(time)[i]))
-            continue
-        if isinstance(surface, Many) or i in grouped:
-            pose = scene.poses(time)[i]
-            shapes.append(_placed(Shape(name, True, *_bodies(surface, _given(box, pose))), pose))
-            continue
-        own = _of_surface(still, i, *coarse)
-        around = _around(own[0], box) if len(own[0]) else _near(surface, scene.poses(time)[i], box)
-        # Again, on a grid around this surface only.
-        vertices, triangles, normals = _of_surface(still, i, *_triangles(still, around))
-        wires = _wires(still, i, vertices, box) if len(vertices) else []
-        shapes.append(Shape(name, surface.is_solid(), vertices, triangles, normals, wires))
+        shapes.append(Shape(name, bodies > 0 or surface.is_solid(), *mesh, wires))
     return shapes
 
 
@@ -111,10 +99,11 @@ def since_start(scene: Scene, i: int, position: Floats, orientation: Floats) -> 
     return turn, position - turn @ first.position()
 
 
-def _placed(shape: Shape, pose: Pose) -> Shape:
-    """A shape where its surface is now."""
-    vertices, normals = pose.placed(shape.vertices.T).T, pose.turned(shape.normals.T).T
-    return replace(shape, vertices=vertices, normals=normals, wires=[pose.placed(wire.T).T for wire in shape.wires])
+def _placed(pose: Pose, mesh: Mesh, wires: list[Floats]) -> tuple[Mesh, list[Floats]]:
+    """A mesh and wires where their surface is now."""
+    vertices, triangles, normals = mesh
+    moved = pose.placed(vertices.T).T, triangles, pose.turned(normals.T).T
+    return moved, [pose.placed(wire.T).T for wire in wires]
 
 
 def _given(box: Corners, pose: Pose) -> Corners:
@@ -123,14 +112,25 @@ def _given(box: Corners, pose: Pose) -> Corners:
     return corners.min(axis=1), corners.max(axis=1)
 
 
-def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:
-    """Vertices, triangles, normals and wires of many balls: coarse, so that thousands can be drawn."""
-    low, high = np.full(3, -1.3), np.full(3, 1.3)
-    axis = np.linspace(-1.3, 1.3, _COARSE)
-    distance = np.sqrt((np.array(np.meshgrid(axis, axis, axis, indexing="ij")) ** 2).sum(axis=0))
-    spacing = tuple((high - low) / (_COARSE - 1.0))
-    unit, triangles, _normals, _values = marching_cubes(distance, 1.0, spacing=spacing)
-    unit = unit + low
+def _axes(box: Corners, count: int) -> list[Floats]:
+    return [np.linspace(low, high, count) for low, high in zip(*box, strict=True)]
+
+
+def _mesh(values: Floats, box: Corners) -> Mesh:
+    """Where the values at the points of a grid in the box are 0."""
+    if not values.min() < 0.0 < values.max():
+        return _NOTHING
+    low, high = box
+    spacing = tuple((high - low) / (len(values) - 1.0))
+    vertices, triangles, normals, _values = marching_cubes(values, 0.0, spacing=spacing)
+    return vertices + low, triangles.astype(np.int64), normals.astype(np.float64)
+
+
+def _balls(spheres: Spheres) -> tuple[Mesh, list[Floats]]:
+    """Many balls: coarse, so that thousands can be drawn."""
+    box = np.full(3, -1.3), np.full(3, 1.3)
+    grid = np.array(np.meshgrid(*_axes(box, _COARSE), indexing="ij"))
+    unit, triangles, _normals = _mesh(np.sqrt((grid**2).sum(axis=0)) - 1.0, box)
     normals = unit / np.sqrt((unit**2).sum(axis=1))[:, None]
     center, radius = spheres.centers[:, None, :], spheres.radii[:, None, None]
     vertices = (center + radius * normals).reshape(-1, 3)
@@ -140,42 +140,32 @@ def _balls(spheres: Spheres) -> tuple[Floats, NDArray[np.int64], Floats, list[Fl
     some = slice(None, None, max(1, len(spheres) // _MOST_WIRES))
     circles = [np.roll(circle, k, axis=1) for k in range(3)]
     wires = [c + r * one for c, r in zip(spheres.centers[some], spheres.radii[some], strict=True) for one in circles]
-    return vertices, (triangles + first).reshape(-1, 3).astype(np.int64), np.tile(normals, (len(spheres), 1)), wires
+    return (vertices, (triangles + first).reshape(-1, 3), np.tile(normals, (len(spheres), 1))), wires
 
 
-def _bodies(surface: Surface, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats, list[Floats]]:
-    """The same of bodies of another kind, each on a grid of its own."""
+def _bodies(surface: Surface, box: Corners) -> tuple[Mesh, list[Floats]]:
+    """Bodies of another kind, each on a grid of its own."""
     solids = surface.solids() if isinstance(surface, Many) else [surface]
-    vertices, triangles, normals = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3))]
+    meshes: list[Mesh] = [_NOTHING]
     wires: list[Floats] = []
     first = 0
     for solid in solids[:: max(1, len(solids) // _MOST_WIRES)]:
         low, high = (np.array(corner) for corner in replace(solid, side="inside").bounds())  # type: ignore[call-arg]
-        low, high = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
-        axes = [np.linspace(a, b, _BODY) for a, b in zip(low, high, strict=True)]
+        low, high = own = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
+        axes = _axes(own, _BODY)
         gap = -solid.phi(np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)).reshape(3 * (_BODY,))
-        if not (low < high).all() or not gap.min() < 0.0 < gap.max():
+        vertices, triangles, normals = _mesh(gap, own) if (low < high).all() else _NOTHING
+        if not len(vertices):
             continue
-        spacing = tuple((high - low) / (_BODY - 1.0))
-        points, faces, across, _values = marching_cubes(gap, 0.0, spacing=spacing)
-        vertices.append(points + low)
-        triangles.append(faces.astype(np.int64) + first)
-        normals.append(across.astype(np.float64))
-        first += len(points)
+        meshes.append((vertices, triangles + first, normals))
+        first += len(vertices)
         for axis in range(3):
             u, v = (axes[k] for k in range(3) if k != axis)
             middle = 0.5 * (gap.take(_BODY // 2 - 1, axis) + gap.take(_BODY // 2, axis))
             lines = contourpy.contour_generator(u, v, middle.T).lines(0.0)
             wires += [np.insert(np.asarray(line), axis, 0.5 * (low + high)[axis], axis=1) for line in lines]
-    return np.concatenate(vertices), np.concatenate(triangles), np.concatenate(normals), wires
-
-
-def _box(scene: Still, positions: Floats) -> Corners:
-    low, high = (np.array(corner) for corner in scene.scene.bounds(scene.time))
-    reach = _BEYOND * max(scene.scene.extent(), float(np.abs(positions).max()))
-    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
-    margin = _MARGIN * (high - low) / (_POINTS - 1.0)
-    return low - margin, high + margin
+    vertices, triangles, normals = (np.concatenate(parts) for parts in zip(*meshes, strict=True))
+    return (vertices, triangles, normals), wires
 
 
 def _around(points: Floats, box: Corners) -> Corners:
@@ -185,72 +175,81 @@ def _around(points: Floats, box: Corners) -> Corners:
     return np.maximum(low - margin, box[0]), np.minimum(high + margin, box[1])
 
 
-def _near(surface: Any, pose: Pose, box: Corners) -> Corners:
-    """Where to look for a surface that is smaller than the cells of the coarse grid."""
-    size = surface.size()
-    if not math.isfinite(size) or not hasattr(surface, "center"):
-        return box
-    center, half = pose.placed(np.array(surface.center)[:, None])[:, 0], 4.0 * size
-    return np.maximum(center - half, box[0]), np.minimum(center + half, box[1])
+class _Walls:
+    """The walls of a scene at one time [s], in a box around them and particles (3, N)."""
 
+    def __init__(self, scene: Scene, positions: Floats, time: float) -> None:
+        self._scene, self._time = scene, time
+        low, high = (np.array(corner) for corner in scene.bounds(time))
+        reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
+        low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+        margin = _MARGIN * (high - low) / (_POINTS - 1.0)
+        self.box: Corners = low - margin, high + margin
 
-def _gap(scene: Still, points: Floats) -> Floats:
-    """The largest gap of all surfaces at points (3, N): 0 on every wall. No particle is where phi is not a number."""
-    with np.errstate(all="ignore"):
-        gap = scene.scene.gaps(points, scene.time).max(axis=0)
-    return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
+    def drawn(self, i: int, pose: Pose) -> tuple[Mesh, list[Floats]]:
+        """The part of surface i that is a wall, and its wires."""
+        (found, *_rest), (low, high) = self._part(i, self._coarse), self.box
+        surface: Any = self._scene.surfaces[i]
+        around = self.box
+        if len(found):
+            around = _around(found, self.box)
+        elif math.isfinite(surface.size()) and hasattr(surface, "center"):  # smaller than the cells of the coarse grid
+            center, half = pose.placed(np.array(surface.center)[:, None])[:, 0], 4.0 * surface.size()
+            around = np.maximum(center - half, low), np.minimum(center + half, high)
+        # Again, on a grid around this surface only.
+        mesh = self._part(i, self._all_in(around))
+        return mesh, self._wires(i, mesh[0]) if len(mesh[0]) else []
 
+    @functools.cached_property
+    def _coarse(self) -> tuple[Mesh, NDArray[np.int64]]:
+        return self._all_in(self.box)
 
-def _triangles(scene: Still, box: Corners) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Vertices, triangles and normals of all walls in a box."""
-    low, high = box
-    axes = [np.linspace(a, b, _POINTS) for a, b in zip(low, high, strict=True)]
-    grid = np.array(np.meshgrid(*axes, indexing="ij"))
-    gap = _gap(scene, grid.reshape(3, -1)).reshape(grid.shape[1:])
-    if not gap.min() < 0.0 < gap.max():
-        return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3))
-    spacing = tuple((high - low) / (_POINTS - 1.0))
-    vertices, triangles, normals, _values = marching_cubes(gap, 0.0, spacing=spacing)
-    return vertices + low, triangles.astype(np.int64), normals.astype(np.float64)
+    def _all_in(self, box: Corners) -> tuple[Mesh, NDArray[np.int64]]:
+        """All walls in a box, and the surface that each triangle lies on."""
+        grid = np.array(np.meshgrid(*_axes(box, _POINTS), indexing="ij"))
+        mesh = _mesh(self._gap(grid.reshape(3, -1)).reshape(grid.shape[1:]), box)
+        vertices, triangles, _normals = mesh
+        middles = vertices[triangles].mean(axis=1).T
+        return mesh, self._owner(middles) if len(triangles) else np.empty(0, np.int64)
 
+    def _part(self, i: int, found: tuple[Mesh, NDArray[np.int64]]) -> Mesh:
+        """Those triangles that lie on surface i, with their vertices only."""
+        (vertices, triangles, normals), owner = found
+        kept, places = np.unique(triangles[owner == i], return_inverse=True)
+        return vertices[kept], places.reshape(-1, 3), normals[kept]
 
-def _of_surface(
-    scene: Still, i: int, vertices: Floats, triangles: NDArray[np.int64], normals: Floats
-) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Those triangles that lie on surface i, with their vertices only."""
-    if not len(triangles):
-        return vertices, triangles, normals
-    middles = vertices[triangles].mean(axis=1)
-    kept, places = np.unique(triangles[_owner(scene, middles.T) == i], return_inverse=True)
-    return vertices[kept], places.reshape(-1, 3), normals[kept]
+    def _gap(self, points: Floats) -> Floats:
+        """The largest gap of all surfaces at points (3, N): 0 on every wall. No particle is where phi is no number."""
+        with np.errstate(all="ignore"):
+            gap = self._scene.gaps(points, self._time).max(axis=0)
+        return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
 
+    def _owner(self, points: Floats) -> NDArray[np.int64]:
+        """The surface that each of the points (3, N) near a wall lies on, -1 where that is open."""
+        with np.errstate(all="ignore"):
+            gaps = self._scene.gaps(points, self._time)
+            owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
+            for i, volumes in enumerate(self._scene.volumes):
+                owner[(owner == i) & are_open(volumes, points)] = -1
+        return owner
 
-def _owner(scene: Still, points: Floats) -> NDArray[np.int64]:
-    """The surface that each of the points (3, N) near a wall lies on, -1 where that is open."""
-    with np.errstate(all="ignore"):
-        owner = np.asarray(np.nan_to_num(scene.scene.gaps(points, scene.time), nan=-np.inf).argmax(axis=0))
-        for i, volumes in enumerate(scene.scene.volumes):
-            owner[(owner == i) & are_open(volumes, points)] = -1
-    return owner
-
-
-def _wires(scene: Still, i: int, vertices: Floats, box: Corners) -> list[Floats]:
-    """Where planes across the three axes cut surface i, from end to end."""
-    first, last = vertices.min(axis=0), vertices.max(axis=0)
-    low, high = _around(vertices, box)
-    curves = []
-    for axis in range(3):
-        u, v = (k for k in range(3) if k != axis)
-        across = np.linspace(low[u], high[u], _FINE), np.linspace(low[v], high[v], _FINE)
-        for part in np.linspace(_END, 1.0 - _END, _PLANES):
-            points = np.empty((3, _FINE, _FINE))
-            points[axis] = first[axis] + part * (last[axis] - first[axis])
-            points[u], points[v] = np.meshgrid(*across)
-            gap = _gap(scene, points.reshape(3, -1)).reshape(_FINE, _FINE)
-            for line in contourpy.contour_generator(*across, gap).lines(0.0):
-                curve = np.insert(np.asarray(line), axis, points[axis, 0, 0], axis=1)
-                curves += _runs(curve, _owner(scene, curve.T) == i)
-    return curves
+    def _wires(self, i: int, vertices: Floats) -> list[Floats]:
+        """Where planes across the three axes cut surface i, from end to end."""
+        first, last = vertices.min(axis=0), vertices.max(axis=0)
+        low, high = _around(vertices, self.box)
+        curves = []
+        for axis in range(3):
+            u, v = (k for k in range(3) if k != axis)
+            across = np.linspace(low[u], high[u], _FINE), np.linspace(low[v], high[v], _FINE)
+            for part in np.linspace(_END, 1.0 - _END, _PLANES):
+                points = np.empty((3, _FINE, _FINE))
+                points[axis] = first[axis] + part * (last[axis] - first[axis])
+                points[u], points[v] = np.meshgrid(*across)
+                gap = self._gap(points.reshape(3, -1)).reshape(_FINE, _FINE)
+                for line in contourpy.contour_generator(*across, gap).lines(0.0):
+                    curve = np.insert(np.asarray(line), axis, points[axis, 0, 0], axis=1)
+                    curves += _runs(curve, self._owner(curve.T) == i)
+        return curves
 
 
 def _runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:

@@ -87,7 +87,12 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             cells[-1].imshow(found[place])
             cells[-1].set_axis_off()
         else:
-            _places(cells[-1], playback, playback.numbers[k])
+            number = playback.numbers[k]
+            (positions, packed), faces = playback.frame(number), playback.faces(number)
+            size = 0.0 if len(faces[0]) else 1.0
+            wires = playback.wires_at(number)
+            drawing.particles(cells[-1], positions, drawing.red_green_blue(packed), wires, size)
+            drawing.ties(cells[-1], playback.lines(number), faces)
     about = playback.about
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
@@ -96,15 +101,3 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     for place, group in enumerate(group for group in series.VIEWS if group in groups):
         drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], groups[group])
     return picture
-
-
-def _places(axes: Any, playback: Playback, number: int) -> None:
-    """The particles, or the bodies, of the frame of this number."""
-    positions, packed = playback.frame(number)
-    lines, faces = playback.lines(number), playback.faces(number)
-    size = 0.0 if len(faces[0]) else 1.0
-    drawing.particles(axes, positions, drawing.red_green_blue(packed), playback.wires_at(number), size)
-    if len(lines[0]):
-        drawing.bonds(axes, *lines)
-    if len(faces[0]):
-        drawing.faces(axes, *faces)

@@ -62,9 +62,7 @@ class Stored:
     @property
     def start(self) -> str:
         """A digest of the particles at the start; "" if the file has none."""
-        with self._reading("its start") as file:
-            stored = "parameters/start" in file
-        return self._text("start") if stored else ""
+        return self._text("start") if self._has("parameters/start") else ""
 
     @property
     def seed(self) -> int:
@@ -89,6 +87,10 @@ class Stored:
         """The method that was run."""
         with self._reading("its method"):
             return tables.method_of(tomllib.loads(self._text("method")))
+
+    def _has(self, name: str) -> bool:
+        with self._reading(f"its {name}") as file:
+            return name in file
 
     def _text(self, name: str) -> str:
         with self._reading(f"its {name.replace('_', ' ')}") as file:

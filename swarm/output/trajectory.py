@@ -27,7 +27,6 @@ from .stored import finite, opened, times_of, whole
 if TYPE_CHECKING:
     from ..bodies.body import Body
     from ..bodies.state import Bodies
-    from .exported import Progress
 
 
 class Trajectory(Presented):
@@ -114,10 +113,7 @@ class Trajectory(Presented):
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
-            kept = [
-                name for name in (*layout.PARTS, layout.COUNTS, layout.IMAGES, layout.ESCAPES) if name in everything
-            ]
-            held = {name: everything[f"{name}/value"][k] for name in kept}
+            held = {name: everything[f"{name}/value"][k] for name in layout.KEPT if name in everything}
             return held | {name: finite(held[name], "particle") for name in layout.PARTS}
 
     def bodies(self, k: int) -> "Bodies":
@@ -145,9 +141,7 @@ class Trajectory(Presented):
     def impacts(self, k: int) -> NDArray[np.int64]:
         """How many impacts each of the particles of frame k has had since the start, (N,)."""
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
-        with self._reading("its impacts") as file:
-            kept = name in file
-        if not kept:
+        if not self._has(name):
             raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
         with self._reading(f"the impacts of frame {k}") as file:
             counts = file[f"{name}/value"][k].astype(np.int64)
@@ -210,60 +204,19 @@ class Trajectory(Presented):
                 raise ValueError(f"expected numbers from 0 to {self.count - 1}, got {bonds.min()} to {bonds.max()}")
         return np.asarray(bonds)
 
+    def has_particles(self) -> bool:
+        """Whether the file keeps particles."""
+        return self._has("particles/all")
+
     def _require_particles(self) -> None:
-        with self._reading("its particles") as file:
-            kept = "particles/all" in file
-        if not kept:
+        if not self.has_particles():
             raise SceneError(f'{self.path} keeps no particles: it was run with frames = "none"')
-
-    def export(
-        self,
-        path: str | Path,
-        frames: slice | int | None = None,
-        particles: int = 1,
-        surfaces: bool = True,
-        overwrite: bool = False,
-        progress: "Progress | None" = None,
-    ) -> list[Path]:
-        """Write the trajectory to a file of another format; units are as they are, and so are the digits of .xyz.
-
-        Args:
-            path: its suffix says the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
-                for HOOMD-blue and freud, in which numbers are float32.
-            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all.
-            particles: k is every k-th particle, or body, beginning with the first.
-            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Those of surfaces of
-                more than 20 000 bodies are left out.
-            overwrite: replace existing files.
-            progress: is called with how many frames are written, and how many there are to write.
-
-        Returns:
-            The files. They have their names when they are whole; one frame at a time is in memory.
-
-        Raises:
-            SceneError: another suffix, an argument out of its range, a library that is missing, or a file that exists.
-            FileError: the file cannot be written.
-
-        >>> import swarm, tempfile
-        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
-        ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
-        ...     with swarm.load(folder + "/run.h5") as trajectory:
-        ...         written = trajectory.export(folder + "/run.xyz", frames=-1)
-        ...     print(written[0].read_text().splitlines()[2])
-        X 0.0 0.0 0.0 -1.0 0.0 0.0 0 1
-        """
-        from .export import export
-
-        return export(self, path, frames, particles, surfaces, overwrite, progress)
 
     @functools.cached_property
     def body(self) -> "Body | None":
         """The body whose copies were run; None for particles."""
-        with self._reading("its body") as file:
-            if "parameters/body" not in file:
-                return None
+        if not self._has("parameters/body"):
+            return None
         from ..bodies.table import body_of
 
         with self._reading("its body"):
@@ -286,9 +239,7 @@ class Trajectory(Presented):
     @property
     def scene_text(self) -> str | None:
         """The scene file that was run."""
-        with self._reading("its scene file") as file:
-            stored = "parameters/scene_file" in file
-        return self._text("scene_file") if stored else None
+        return self._text("scene_file") if self._has("parameters/scene_file") else None
 
 
 def load(path: str | Path) -> Trajectory:

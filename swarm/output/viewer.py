@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +62,15 @@ class _Viewer:
 
     def wait_for(self, port: int) -> None:
         """Return when it listens."""
+        self.wait_until(lambda: _listens(port), "start")
+
+    def wait_until(self, ready: Callable[[], Any], did: str) -> None:
+        """Return when it is ready."""
         deadline = time.monotonic() + _PATIENCE
-        while not _listens(port):
+        while not ready():
             self.require_alive()
             if time.monotonic() > deadline:
-                raise RunError(f"the Rerun viewer did not start in {_PATIENCE:g} s")
+                raise RunError(f"the Rerun viewer did not {did} in {_PATIENCE:g} s")
             time.sleep(_PAUSE)
 
     def require_alive(self) -> None:
@@ -124,7 +128,12 @@ def headless(recording: Path) -> Iterator[Any]:
         process.wait_for(port)
         client = ViewerClient.connect(_url(port))
         client.open(str(recording.resolve()))
-        _loaded(client, process)
+
+        def is_loaded() -> bool:
+            state = client.get_state()
+            return bool(state.recordings and state.views and not state.loading)
+
+        process.wait_until(is_loaded, "load the recording")
         yield client
     except RunError:
         raise
@@ -136,18 +145,6 @@ def headless(recording: Path) -> Iterator[Any]:
         raise RunError(f"the Rerun viewer did not draw: {error}") from error
     finally:
         process.end()
-
-
-def _loaded(client: Any, process: _Viewer) -> None:
-    deadline = time.monotonic() + _PATIENCE
-    while True:
-        process.require_alive()
-        state = client.get_state()
-        if state.recordings and state.views and not state.loading:
-            return
-        if time.monotonic() > deadline:
-            raise RunError(f"the Rerun viewer did not load the recording in {_PATIENCE:g} s")
-        time.sleep(_PAUSE)
 
 
 def pictures(recording: Path, numbers: list[int], folder: Path) -> list[Path]:

@@ -1,8 +1,7 @@
 """Writing trajectories: frames are appended, the times last. There are as many complete frames as times."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -17,7 +16,7 @@ from ..scene import Scene
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import ARRAYS, COUNTS, ESCAPES, IMAGES, PARTS
+from .layout import ARRAYS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ Written = tuple[int, float, State, dict[str, Any]]
 WriteFrames = Callable[[list[Written]], None]
 
 
-class TrajectoryWriter:
+class TrajectoryWriter(AppendedFile):
     """A context that creates the file, or reopens it, and gives the function that writes frames.
 
     Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once cost little more than one:
@@ -61,31 +60,22 @@ class TrajectoryWriter:
         identity: dict[str, Any],
         following: bool = False,
     ) -> None:
-        self._path, self._storage, self._scene, self._method = path, storage, scene, method
+        super().__init__(path, "trajectory", following)
+        self._storage, self._scene, self._method = storage, scene, method
         self._bodies = None if isinstance(particles, Particles) else particles
         particles = particles if isinstance(particles, Particles) else particles.particles()
         self._kept = storage.kept(identity.get("first", 0))
         self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
-        self._identity, self._following = identity, following
-        self._grown = AppendedFile(path, "trajectory", following)
+        self._identity = identity
         self._edges: Any = None
 
     def __enter__(self) -> WriteFrames:
-        self._file = self._grown.open()
+        self._open()
         if self._following:
-            self._open()
+            self._find()
         else:
             self._create()
         return self._write
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._grown.close(error)
-
-    def sync(self) -> None:
-        """Flush to the disk what was written."""
-        self._grown.sync()
 
     def _create(self) -> None:
         file = self._file
@@ -123,23 +113,24 @@ class TrajectoryWriter:
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
-        for name, width, kind in _kept_of(self._scene, self._storage.precision):
+        kept: list[tuple[str, tuple[int, ...], Any]] = [(name, (3,), self._storage.precision) for name in PARTS]
+        kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
+        kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * any(self._scene.volumes)]
+        for name, width, kind in kept:
             self._make_particles(name, (n, *width), kind)
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
         """The element of the particles of this name."""
-        n, *width = shape
-        options = _PACKED[self._storage.compression]
+        packed = _PACKED[self._storage.compression]
         # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
-        deep = 1 if options else _CHUNK[0]
-        options = {**options, "rdcc_nbytes": self._cache()}
-        chunk = deep, min(n, _CHUNK[1]), *width
+        chunk = 1 if packed else _CHUNK[0], min(shape[0], _CHUNK[1]), *shape[1:]
+        options = {**packed, "rdcc_nbytes": self._cache()}
         self._values[name] = self._element(f"particles/all/{name}", shape, kind, chunk, **options)
 
-    def _open(self) -> None:
+    def _find(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
-        kept = [name for name in (*PARTS, IMAGES, COUNTS, ESCAPES) if f"particles/all/{name}" in self._file]
+        kept = [name for name in KEPT if f"particles/all/{name}" in self._file]
         self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (
@@ -149,7 +140,7 @@ class TrajectoryWriter:
         access.set_chunk_cache(*access.get_chunk_cache()[:1], self._cache(), 0.75)
         for name, dataset in self._values.items():
             self._values[name] = h5py.Dataset(h5py.h5d.open(self._file.id, dataset.name.encode(), access))
-        self._grown.begin()
+        self._begin()
 
     def _cache(self) -> int:
         """Bytes of the chunk cache of positions, of velocities, and of impacts, which need less."""
@@ -163,50 +154,33 @@ class TrajectoryWriter:
         return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *shape), chunks=chunks, **options)
 
     def _write(self, frames: list[Written]) -> None:
-        with self._grown.writing(f"frame {frames[0][0]}"):
-            first, seen = frames[0][0], frames[0][3]
+        with self._writing(f"frame {frames[0][0]}"):
+            numbers, times, states, observed = zip(*frames, strict=True)
+            first, seen = numbers[0], observed[0]
             if not self._observables:
                 for name in (name for name in seen if name != "time"):
                     entry = np.asarray(seen[name])
-                    self._observables[name] = self._element(
-                        f"observables/{name}", entry.shape, entry.dtype, (_entries(entry), *entry.shape)
-                    )
-                self._grown.begin()
+                    chunk = max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
+                    self._observables[name] = self._element(f"observables/{name}", entry.shape, entry.dtype, chunk)
+                self._begin()
             for name, dataset in self._values.items():
-                parts = [getattr(state, name) for _number, _moment, state, _seen in frames]
+                parts = [getattr(state, name) for state in states]
                 put(dataset, first, parts if name in (COUNTS, ESCAPES) else rows(parts, dataset.dtype))
             if self._edges is not None:
                 put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():
-                put(dataset, first, [seen[name] for _number, _moment, _state, seen in frames])
+                put(dataset, first, [seen[name] for seen in observed])
             self._file.flush()
-            put(self._step, first, [number for number, _moment, _state, _seen in frames])
-            put(self._time, first, [moment for _number, moment, _state, _seen in frames])
-            self._grown.flush()
-            if self._grown.is_new:
+            put(self._step, first, numbers)
+            put(self._time, first, times)
+            self._flush()
+            if self._is_new():
                 self._take_name()
 
     def _take_name(self) -> None:
         """Take the name of the trajectory from an older file, and remove the checkpoint of that one."""
-        if self._grown.take_name():
-            self._file = self._grown.file
-            self._open()
+        self._rename()
         paths.checkpoint_of(self._path).unlink(missing_ok=True)
-
-
-def _entries(entry: NDArray[Any]) -> int:
-    return max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes)))
-
-
-def _kept_of(scene: Scene, precision: str) -> Iterator[tuple[str, tuple[int, ...], Any]]:
-    """What a frame has of each particle: its name, the shape of one entry, and its type."""
-    for name in PARTS:
-        yield name, (3,), precision
-    if scene.period is not None:
-        yield IMAGES, (3,), np.int64
-    yield COUNTS, (), np.int64
-    if any(scene.volumes):
-        yield ESCAPES, (), np.float64
 
 
 def rows(frames: list[NDArray[Any]], dtype: DTypeLike) -> NDArray[Any]:

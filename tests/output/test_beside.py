@@ -1,6 +1,7 @@
 """Files that others have open in the same process, before, while and after they are written and read."""
 
-import time
+import signal
+import threading
 
 import h5py
 import MDAnalysis
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import driver, stored
+from swarm.output import driver, stored, writer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(0.5)])
 START = swarm.fill(SCENE, 4, speed=0.5, seed=1)
@@ -41,21 +42,32 @@ def frames_of(opened):
     return len(opened["parameters/time"] if isinstance(opened, h5py.File) else opened)
 
 
+@pytest.fixture
+def written(monkeypatch):
+    """Set when three frames are on file."""
+    event, write = threading.Event(), writer.TrajectoryWriter._write
+
+    def noted(self, frames):
+        write(self, frames)
+        if frames[-1][0] >= 2:
+            event.set()
+
+    monkeypatch.setattr(writer.TrajectoryWriter, "_write", noted)
+    return event
+
+
 @pytest.mark.parametrize("name", READERS)
-def test_every_reader_reads_what_this_process_writes(tmp_path, name):
+def test_every_reader_reads_what_this_process_writes(tmp_path, name, written):
     path, seen = tmp_path / "run.h5", []
 
     def look(frame):
-        while not seen and frame.number == 3:
-            time.sleep(0.01)  # for the thread that writes
-            if not path.exists():
-                continue
+        if frame.number == 3:
+            assert written.wait(600.0)
             with swarm.load(path) as first:
-                if len(first) >= 3:
-                    opened = READERS[name](path)
-                    with swarm.load(path) as last:
-                        seen.extend([frames_of(first), frames_of(opened), frames_of(last)])
-                    opened.close()
+                opened = READERS[name](path)
+                with swarm.load(path) as last:
+                    seen.extend([frames_of(first), frames_of(opened), frames_of(last)])
+                opened.close()
 
     run(path, progress=look)
     assert len(seen) == 3
@@ -71,14 +83,10 @@ def test_a_run_is_resumed_while_its_file_is_open(tmp_path, name):
 
     def stop(frame):
         if frame.number == 3:
-            raise KeyboardInterrupt
-
-    def calmly(frame):
-        time.sleep(0.02)
-        stop(frame)
+            signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(KeyboardInterrupt):
-        run(path, progress=calmly, checkpoint=0.01)
+        run(path, progress=stop, checkpoint=600.0)
     opened = READERS[name](path)
     result = run(path, resume=True)
     opened.close()

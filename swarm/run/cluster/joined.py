@@ -6,7 +6,6 @@ It is read as that of one run. The shards are named relative to it: it can be mo
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -84,12 +83,10 @@ class JoinedWriter(TrajectoryWriter):
             task.options.scene_text, identity,
         )  # fmt: skip
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.sync()
-            self._grown.take_name()
+            self._rename()
         super().__exit__(kind, error, trace)
 
     def _take_name(self) -> None:

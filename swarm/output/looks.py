@@ -1,0 +1,96 @@
+"""The parts of a recording that do not change: layout, walls, legend, names and colours of time series."""
+
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from ..particles import Floats
+from . import series
+from .colours import Scale
+from .drawn import Drawn
+from .shapes import Shape
+
+LINES, MESH = "/scene/bodies/lines", "/scene/bodies/mesh"
+_BACKGROUND = (24, 24, 27)
+_CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
+# Between the faces of bodies, which have no shading.
+_EDGE = (10, 10, 12, 255)
+_CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
+# Okabe and Ito's, without those that are invisible on a dark background.
+_CURVES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
+
+
+def path_of(shape: Shape) -> str:
+    """The entity of a wall."""
+    return f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
+
+
+def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -> None:
+    """Log the walls, and how particles and bodies look."""
+    stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
+    width = rr.Radius.ui_points(1.0)
+    if len(drawn.triangles):
+        stream.log(MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)
+        stream.log(LINES, rr.LineStrips3D.from_fields(radii=width, colors=[_EDGE]), static=True)
+    elif len(drawn.lines):
+        stream.log(LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
+    for shape in shapes:
+        face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
+        if len(shape.vertices):
+            mesh = rr.Mesh3D(
+                vertex_positions=shape.vertices - center, triangle_indices=shape.triangles,
+                vertex_normals=shape.normals, albedo_factor=face,
+            )  # fmt: skip
+            stream.log(f"{path_of(shape)}/mesh", mesh, static=True)
+        if shape.wires:
+            wires = [curve - center for curve in shape.wires]
+            lines = rr.LineStrips3D(wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
+            stream.log(f"{path_of(shape)}/wires", lines, static=True)
+
+
+def log_series(stream: Any, lines: list[series.Line]) -> None:
+    """Log the names and the colours of time series; every view starts with the first colour."""
+    for together in series.views_of(lines).values():
+        for k, line in enumerate(together):
+            colour = _CURVES[k % len(_CURVES)]
+            stream.log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
+
+
+def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats) -> None:
+    """Log the meaning of the colours, what is shown of how many, and the origin."""
+    of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
+    every = f", every {stride}th frame" if stride > 1 else ""
+    text = (
+        f"**{drawn.shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
+        f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
+        f"plots {series.NOTHING:g} is the logarithm of 0."
+    )
+    if center.any():
+        text += f" Positions are less {tuple(center.tolist())} m."
+        stream.log("/about", rr.AnyValues(center=center), static=True)
+    stream.log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
+    values = rr.AnyValues(**vars(scale), particles=drawn.count, shown=drawn.shown, stride=stride, noun=drawn.noun)
+    stream.log("/about", values, static=True)
+
+
+def blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
+    """The 3-D view beside the plots, paused at the start."""
+    scene = rrb.Spatial3DView(
+        origin="/scene", name=noun, background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
+    )
+    plots = []
+    for group, together in series.views_of(lines).items():
+        view, logarithm = series.VIEWS[group]
+        legend = rrb.PlotLegend(visible=len(together) > 1)
+        name = f"{view}, log10" if logarithm else view
+        paths = [line.path for line in together]
+        plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
+    about = rrb.TextDocumentView(origin="/about", name="legend")
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[8, 1]), rrb.Vertical(*plots), column_shares=[3, 2]),
+        rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
