@@ -84,6 +84,7 @@ class Session:
         from ..output.writer import body_text, descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
+        self._owners = task.scene.members()
         body = "" if task.bodies is None else body_text(task.bodies.body)
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}
@@ -152,6 +153,7 @@ class Session:
         if checkpoint.SHARDS in arrays:
             raise SceneError(f"{self._path} is of a run on a cluster; resume it on one, by cluster= or --cluster")
         saved.require_same(self._job, self._path)
+        checkpoint.require_owners(self._path, arrays, self._owners)
         if not trajectory.exists():
             raise SceneError(
                 f"{self._path} needs its trajectory {trajectory}, which does not exist; start again without resume"
@@ -237,7 +239,7 @@ class Session:
             self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),
             rows=0 if self._log is None else self._log.total,
         )  # fmt: skip
-        checkpoint.save(self._path, job, run.arrays())
+        checkpoint.save(self._path, job, run.arrays(), self._owners)
 
     def finish(self) -> None:
         """Remove the checkpoint: all frames are written."""
