@@ -197,8 +197,10 @@ class ReactingRun(BaseRun):
         return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        still = self._scene.placed(seen["wall_position"], seen["wall_orientation"])
-        failures.require_admissible(still, self.state, seen, self._deepest, moment)
+        scene = self._scene
+        if seen["max_penetration"] > self._deepest:
+            scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
+        failures.require_admissible(scene, self.state, seen, self._deepest, moment)
 
     # --- Checkpoints -------------------------------------------------------------------------------------
 
