@@ -55,10 +55,8 @@ class Run(BaseRun):
         n = len(particles)
         self._numbers, self._law = method.numbers(scene), method.law()
         self._chain, self._gravity = scene.chain(), scene.pull()
-        pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
-        super().__init__(
-            scene, method, n, pool, Tier(compile, (self._numbers, self._law, self._chain), n), seeding.first
-        )
+        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._chain), n)
+        super().__init__(scene, method, n, pool, tier, seeding.first)
         self._impacts, self._tally = watched
         self._booked = lanes.booked(self._chain)
         self.state = state_of(scene, particles, method, self._booked)
@@ -261,8 +259,6 @@ class Run(BaseRun):
         if self._tier.choose(self.calls()):
             self._pace = math.inf
 
-    # --- Checkpoints -------------------------------------------------------------------------------------
-
     def arrays(self) -> Arrays:
         found: Arrays = {}
         for name, value in {"phase": self._phase, "halted": self._halted, **self.state._asdict()}.items():
@@ -282,12 +278,11 @@ class Run(BaseRun):
             self._kinds = set(_KINDS)
             self._choose_tier()
 
-    # --- What is observed --------------------------------------------------------------------------------
-
     def seen(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
-        is_open = self._far < math.inf
-        escaped = self._tier.kernel(observables.count_escaped)(*self._escaping()) if is_open else 0
+        escaped = 0
+        if self._far < math.inf:
+            escaped = self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:
             escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
         if self._scene.moves():

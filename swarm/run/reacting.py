@@ -50,8 +50,8 @@ class ReactingRun(BaseRun):
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None,
         )  # fmt: skip
         self._scenery, self._gravity = scenery_of(scene, 0.0), gravity
-        pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
-        super().__init__(scene, method, n, pool, Tier(compile, (self._scenery, gravity), n))
+        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._scenery, gravity), n)
+        super().__init__(scene, method, n, pool, tier)
         state, number = self.state, np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
@@ -160,8 +160,6 @@ class ReactingRun(BaseRun):
         yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing(chain_now(self._scene, self._scenery, self._freedoms))
 
-    # --- What is observed --------------------------------------------------------------------------------
-
     def _observing(self, chain: Any) -> tuple[Any, ...]:
         drawn = np.arange(len(self._partial))
         return None, chain, self._gravity, self.state, drawn, observables.CHUNK, self._partial
@@ -201,8 +199,6 @@ class ReactingRun(BaseRun):
         if seen["max_penetration"] > self._deepest:
             scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
         failures.require_admissible(scene, self.state, seen, self._deepest, moment)
-
-    # --- Checkpoints -------------------------------------------------------------------------------------
 
     def share_done(self, span: float) -> float:
         return float(self._clock[NOW] / span)
