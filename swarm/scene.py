@@ -1,7 +1,6 @@
-"""The scene: surfaces, gravity, and the volume that the surfaces enclose."""
+"""The scene: surfaces and gravity, checked, and as kernels take them."""
 
 import copy
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,39 +15,29 @@ from .contact.laws import Laws, Moves, Span, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
-from .particles import Particles
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, chain_in, order_of
-from .surfaces.fields.many import Many, in_straight_flights, members_of
+from .surfaces.fields.many import in_straight_flights, members_of
 from .surfaces.fields.members import Members
 from .surfaces.fold import Chain, Field
 from .surfaces.free import cell_in
-from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
-from .surfaces.instant import box_of, gaps_of, gradient_of, planes_of
+from .surfaces.images import Lengths, corners_of, images_of, lengths_of
 from .surfaces.moving import Carried, carried
 from .surfaces.openings import Openings, openings_in, require_few, volumes_of
 from .surfaces.period import Period
-from .surfaces.polyhedron import polyhedron_bounds
-from .surfaces.room import has_room
-from .surfaces.surface import UNBOUNDED, Box, Surface
+from .surfaces.surface import Surface
+from .volume import Volume
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
-# Points whose gaps are found at once.
-_BATCH = 4096
-# A slot thinner than this part of the scene's extent is none of its lengths: steps that are a part of it end in the
-# round-off of a time.
-_THIN = 1e-6
-# Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
-_AT_ORIGIN = 1e-15
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Scene:
+class Scene(Volume):
     """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
 
     Args:
@@ -159,11 +148,11 @@ class Scene:
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
-        return any(surface.motion is not None or surface.reacts() for surface in self.surfaces)
+        return self._moves
 
     def reacts(self) -> bool:
         """Whether impacts move a surface."""
-        return any(surface.reacts() for surface in self.surfaces)
+        return self._reacts
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
         """The scene whose walls that react stay where `wall_position` and `wall_orientation` of a frame say."""
@@ -184,12 +173,9 @@ class Scene:
         if self.moves():
             fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
             return carried(fields, others, moment)
-
-        def taken(members: Members) -> Members:
-            straight = self.gravity is None and own is None
-            return in_straight_flights(members, self.period is not None) if straight else members
-
-        return chain_in(self.order, self._pieces, self._groups, own or (), taken)
+        if own is None:
+            return self._chain
+        return chain_in(self.order, self._pieces, self._groups, own, lambda members: members)
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""
@@ -203,17 +189,6 @@ class Scene:
         pulls = self.gravity or (0.0, 0.0, 0.0)
         falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
         return cell_in(self.period, self.surfaces, self._has_fields(), Vec(*falls) if any(falls) else None)
-
-    def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""
-        return into_cell(self.period or (None, None, None), checks.array("points", points))
-
-    def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
-        """Where particles are (3, N), with all cells that they have come through: position + image * period."""
-        if self.period is None or particles.image is None:
-            return np.array(particles.position)
-        lengths = np.array([length or 0.0 for length in self.period])
-        return np.asarray(particles.position + particles.image * lengths[:, None])
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""
@@ -252,6 +227,27 @@ class Scene:
         return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
 
     @cached_property
+    def _moves(self) -> bool:
+        return self._reacts or any(surface.motion is not None for surface in self.surfaces)
+
+    @cached_property
+    def _reacts(self) -> bool:
+        return any(surface.reacts() for surface in self.surfaces)
+
+    @cached_property
+    def _chain(self) -> Chain | Field | None:
+        """The chain for particles where nothing moves."""
+
+        def taken(members: Members) -> Members:
+            return in_straight_flights(members, self.period is not None) if self.gravity is None else members
+
+        return chain_in(self.order, self._pieces, self._groups, (), taken)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Whoever has a copy makes a chain of its own: `apart` of other walls, a worker of what is compiled there.
+        return {name: value for name, value in self.__dict__.items() if name != "_chain"}
+
+    @cached_property
     def _pieces(self) -> tuple[Surface, ...]:
         """The surfaces, and the images of those that reach over a face of the cell."""
         return tuple(image for images in self._images for image in images)
@@ -278,113 +274,6 @@ class Scene:
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""
         return [self.owners_of_pieces[i] for i in self.order.fields]
-
-    def size(self) -> float:
-        """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
-        smallest = min(surface.size() for surface in self.surfaces)
-        if math.isfinite(smallest):
-            return smallest
-        low, high = self.bounds()
-        return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
-
-    def finite_size(self) -> float:
-        """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
-        size, extent = self.size(), self.extent()
-        return size if _THIN * extent < size < math.inf else extent
-
-    def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
-        rows = checks.array("points", points)
-        if self.period is not None:
-            rows, _image = into_cell(self.period, rows)
-        return np.array([gaps_of(images, rows, time).max(axis=0) for images in self._images])
-
-    def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
-        rows = points if self.period is None else into_cell(self.period, points)[0]
-        admitted = np.ones(rows.shape[1], np.bool_)
-        for image in (image for images in self._images for image in images):
-            if isinstance(image, Many):
-                admitted[admitted] = ~image.contain(rows[:, admitted])
-            else:
-                admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
-        return admitted
-
-    def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
-        rows = checks.array("points", points)
-        if self.period is not None:
-            rows, _image = into_cell(self.period, rows)
-        found = []
-        for images in self._images:
-            slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
-            # At the centre of a ball the slope is 0, and a point is as far inside as can be.
-            with np.errstate(over="ignore"):
-                found.append((gaps_of(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
-        return np.array(found)
-
-    def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
-        found = []
-        # In batches, so that NumPy's intermediate results stay in the processor's cache.
-        for begin in range(0, points.shape[1], _BATCH):
-            batch = points[:, begin : begin + _BATCH]
-            suspects = np.flatnonzero(~self.admits(batch))
-            if suspects.size:
-                near = (self.distances_outside(batch[:, suspects]) <= distance).all(axis=0)
-                found.append(begin + suspects[~near])
-        return np.concatenate(found) if found else np.empty(0, np.intp)
-
-    def is_open(self) -> bool:
-        """Whether a particle may fly to infinity."""
-        return not np.isfinite(self.bounds()).all()
-
-    def poses(self, time: float) -> list[motions.Pose]:
-        """Where every surface is at a time [s]."""
-        return [motions.pose(surface.motion, time) for surface in self.surfaces]
-
-    def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
-        """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
-        faces = [
-            (*n, offset) for surface in self.surfaces for n, offset in planes_of(surface, surface.open_faces(), time)
-        ]
-        rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
-        # Through a face across the period nobody leaves.
-        repeats = np.array([length is not None for length in self.period or (None,) * 3])
-        rows = rows[(rows[:, :3][:, repeats] == 0.0).all(axis=1)]
-        return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])
-
-    def bounds(self, time: float = 0.0) -> Box:
-        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
-        low, high = self._bounds(time, self.surfaces)
-        return tuple(low.tolist()), tuple(high.tolist())
-
-    def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A box around the volume that some of the surfaces leave, and the cell that repeats."""
-        boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
-        low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-        if self.period is not None:
-            corners = np.array(cell_of(self.period))
-            low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
-        planes = [plane for surface in surfaces for plane in planes_of(surface, surface.half_spaces(), time)]
-        if planes:
-            low, high = polyhedron_bounds(planes, low, high)
-        return low, high
-
-    def _has_volume(self) -> bool:
-        low, high = (np.array(corner) for corner in self.bounds())
-        if not (low < high).all():
-            return False
-        # Open directions are searched as far as the scene itself extends.
-        reach = 2.0 * self.extent()
-        low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
-        return has_room(low, high, self.gaps, lambda i, points: gradient_of(self._images[i], points))
-
-    def extent(self) -> float:
-        """Distance from the origin within which the scene's surfaces lie."""
-        lengths = [length for length in self.period or () if length is not None]
-        farthest = max([*(surface.extent() for surface in self.surfaces), *lengths])
-        return farthest if farthest > _AT_ORIGIN else 1.0
 
     def _images_of(self, i: int) -> tuple[Surface, ...]:
         if self.period is None:

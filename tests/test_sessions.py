@@ -20,6 +20,7 @@ from swarm.output import checkpoint, paths
 from swarm.run import progress
 from swarm.run.engine import Run
 from swarm.run.progress import lines
+from swarm.surfaces.fields import grouped
 
 DOWN = (0.0, 0.0, -1.0)
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
@@ -230,6 +231,33 @@ def test_another_run_is_refused_with_both_values(tmp_path, change, words):
     if "every" not in change:
         assert [file.read_bytes() for file in (path, paths.checkpoint_of(path))] == before
     assert len(run(path, resume=True).observables["time"]) == 5
+
+
+def test_rows_of_walls_in_another_order_are_refused(tmp_path, monkeypatch):
+    """What the row of a wall holds would go to another one, as the energy that another one has taken in."""
+    path = tmp_path / "run.h5"
+
+    def scene():
+        floor = swarm.Plane((0.0, 0.0, 1.0), -0.2, temperature=300.0)
+        return swarm.Scene([floor, swarm.Sphere(0.5)])
+
+    with monkeypatch.context() as before:
+        # An older version, whose kernels had the walls as they were listed.
+        before.setattr(grouped, "by_kind", lambda things, numbers: list(things))
+        stopped_at(path, 2, scene=scene())
+    saved = paths.checkpoint_of(path)
+    files = path.read_bytes(), saved.read_bytes()
+    assert scene().owners() == [1, 0]
+    with pytest.raises(swarm.SceneError, match=r"another order of walls: its rows are of surfaces 0, 1, got 1, 0; st"):
+        run(path, scene=scene(), resume=True)
+    job, arrays = checkpoint.read(saved)
+    checkpoint.save(saved, job, {name: array for name, array in arrays.items() if name != "owners"})
+    with pytest.raises(swarm.SceneError, match=r"does not say which surface each of its rows is of: an older version"):
+        run(path, scene=scene(), resume=True)
+    saved.write_bytes(files[1])
+    assert path.read_bytes() == files[0]
+    monkeypatch.setattr(grouped, "by_kind", lambda things, numbers: list(things))
+    assert len(run(path, scene=scene(), resume=True).observables["time"]) == 5
 
 
 def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):

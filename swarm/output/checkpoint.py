@@ -31,6 +31,11 @@ _FIRST = b"job.npy"
 _HEAD = 30 + len(_FIRST)
 # The array of a checkpoint of a run on a cluster that holds the bounds of its shards.
 SHARDS = "shards"
+# The array that says which surface, and which member of it, each wall of the kernels is, by which rows are in order.
+_OWNERS = "owners"
+# Surfaces that a sentence lists.
+_SHOWN = 12
+_ANEW = "start a new run from the last frame of its trajectory (from = in [particles]), or start again with --overwrite"
 _HINT = "use the inputs that it was started with, or start again with --overwrite"
 
 
@@ -97,12 +102,15 @@ def digest_of(particles: Particles, body: str = "") -> str:
     return digest.hexdigest()[:16]
 
 
-def save(path: Path, job: Job, arrays: Arrays) -> None:
+def save(path: Path, job: Job, arrays: Arrays, owners: NDArray[np.int64] | None = None) -> None:
     """Replace the checkpoint; the old one stays until the new one is completely on the disk.
+
+    `owners` are those of the rows that the arrays have for walls, as `Scene.members`.
 
     Raises:
         FileError: it cannot be written.
     """
+    arrays = arrays if owners is None else {_OWNERS: owners, **arrays}
     with replaced(path, "checkpoint") as file:
         np.savez(file, allow_pickle=False, job=json.dumps(asdict(job)), **arrays)
 
@@ -133,6 +141,25 @@ def read(path: Path) -> tuple[Job, Arrays]:
         if job.frame < 0 or not all(map(math.isfinite, (job.time, job.wall_time, job.following or 0.0))):
             raise ValueError(f"it cannot be at frame {job.frame}, {job.time} s")
     return job, arrays
+
+
+def require_owners(path: Path, arrays: Arrays, owners: NDArray[np.int64]) -> None:
+    """Raise a SceneError unless the rows of a checkpoint are of the same walls as those of the run; drop `owners`."""
+    saved = arrays.pop(_OWNERS, None)
+    if saved is None:
+        raise SceneError(
+            f"{path} does not say which surface each of its rows is of: an older version of swarm wrote it, whose "
+            f"walls may be in another order; {_ANEW}"
+        )
+    if not np.array_equal(saved, owners):
+        raise SceneError(
+            f"{path} is of a version of swarm with another order of walls: its rows are of surfaces "
+            f"{_shortened(saved[0])}, got {_shortened(owners[0])}; {_ANEW}"
+        )
+
+
+def _shortened(surfaces: NDArray[np.int64]) -> str:
+    return ", ".join(map(str, surfaces[:_SHOWN])) + ", ..." * (len(surfaces) > _SHOWN)
 
 
 def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:

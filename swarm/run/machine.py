@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,13 +14,14 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
+from .base import BaseRun
 from .compiling import Compilations
-from .impacts import Impacts, log_of
+from .impacts import log_of
 from .options import Task
 from .outputs import recorder_of, writer_of
-from .runs import AnyRun, run_of
+from .runs import run_of
 from .session import Session
-from .tally import Watched, tally_of
+from .tally import Tally, Watched, tally_of
 
 if TYPE_CHECKING:
     from ..output.background import Background
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("swarm")
 # The observable that holds the sums over chunks of a shard: those of all shards are joined from it.
 CHUNK_SUMS = "chunk_sums"
+# So many frames are packed into arrays: as Python objects they take 3 kB each.
+_PACKED = 1024
 
 
 class End(NamedTuple):
@@ -42,16 +46,81 @@ class End(NamedTuple):
     members: list[NDArray[np.int64]] | None
 
 
+class Columns:
+    """The observables of all frames, each as an array with one entry a frame."""
+
+    def __init__(self) -> None:
+        self._frames: list[dict[str, Any]] = []
+        self._packed: list[dict[str, NDArray[Any]]] = []
+
+    def add(self, seen: dict[str, Any]) -> None:
+        """Add a frame."""
+        self._frames.append(seen)
+        if len(self._frames) == _PACKED:
+            self._pack()
+
+    def _pack(self) -> None:
+        if self._frames:
+            self._packed.append({name: np.array([seen[name] for seen in self._frames]) for name in self._frames[0]})
+            self._frames = []
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Those of all frames, in the order of a file: the time, then the others by their names."""
+        self._pack()
+        names = sorted(self._packed[0], key=lambda name: (name != "time", name)) if self._packed else []
+        return {name: np.concatenate([part[name] for part in self._packed]) for name in names}
+
+
 def carry_out(task: Task, session: Session) -> End:
     """Carry out a run that is checked."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()
+    until, span_of, kept = task.options.until, task.method.span, Columns()
+    with _begun(task, session) as (run, writer, show, (log, tally)):
+        with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
+            for number, before, moment in session.frames(task.options.times):
+                if number == 0:
+                    run.observe()
+                else:
+                    span = span_of("time", moment) - span_of("time", before)
+                    if log is not None:
+                        log.begin = before
+                    while not run.advance(span, moment, *_meanwhile(session, writer, show)):
+                        show.within(before + run.share_done(span) * (moment - before), until)
+                        session.look(run, writer, number - 1, before, moment)
+                seen = {"time": moment, **run.seen()}
+                # Those of a shard are joined to those of the others.
+                if task.is_shard:
+                    seen[CHUNK_SUMS] = run.chunk_sums()
+                else:
+                    kept.add(seen)
+                run.require_admissible(seen, moment)
+                if log is not None:
+                    log.ends[number] = log.total
+                write(number, moment, run.state, seen)
+                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
+                if moment < until:
+                    session.look(run, writer, number, moment, None)
+        session.finish()
+        return _end(task, session, run, kept, tally)
 
+
+class _Begun(NamedTuple):
+    """A run and who observes it."""
+
+    run: BaseRun
+    writer: "Background | None"
+    show: "Display"
+    watched: Watched
+
+
+@contextlib.contextmanager
+def _begun(task: Task, session: Session) -> Iterator[_Begun]:
+    """A run at its start or its checkpoint; until the context ends signals stop it, and its files are locked."""
     from .progress import display  # rich is imported only when it is shown
 
-    recorder = recorder_of(task)
-    log, tally = log_of(task), tally_of(task)
-    runs: list[AnyRun] = []
+    recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task))
+    runs: list[BaseRun] = []
 
     def stop() -> None:
         session.stop()
@@ -59,78 +128,32 @@ def carry_out(task: Task, session: Session) -> End:
             one.halt()
 
     shown, compilations = display(task.options.progress), Compilations()
-    with (
-        session,
-        interrupt.taken_by(stop),
-        shown as show,
-        kernels_compiled(show.compiling, compilations.sentence),
-    ):
-        session.prepare(task, log)
+    with session, interrupt.taken_by(stop), shown as show, kernels_compiled(show.compiling, compilations.sentence):
+        session.prepare(task, watched.log)
         _require_room(task, session)
-        run = run_of(task, Watched(log, tally))
-        runs.append(run)
+        runs.append(run := run_of(task, watched))
         compilations.calls = run.calls
         session.restore(run)
-        writer = writer_of(task, session, recorder, log)
-        history = _frames(task, session, run, writer, show, log)
-        session.finish()
-        return End(
-            task.particles,
-            _observables(task, history),
-            session.wall_time(),
-            run.state.multipliers,
-            run.state.impacts,
-            np.full(len(task.particles), np.nan) if run.state.escape_time is None else run.state.escape_time,
-            None if tally is None else tally.of_members(),
-        )
+        yield _Begun(run, writer_of(task, session, recorder, watched.log), show, watched)
 
 
-def _observables(task: Task, history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Those of all frames; none of a shard, which are joined to those of the others."""
-    if task.is_shard:
-        return {}
-    trajectory = task.options.trajectory
-    return _columns(history) if trajectory is None else read_back(trajectory)
+def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:
+    state = run.state
+    is_whole = session.first == 0 or task.is_shard
+    return End(
+        task.particles,
+        kept.arrays() if is_whole else read_back(task.options.trajectory),
+        session.wall_time(),
+        state.multipliers,
+        state.impacts,
+        np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
+        None if tally is None else tally.of_members(),
+    )
 
 
 def warn_open() -> None:
     """Warn that the scene is open."""
     _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
-
-
-def _frames(
-    task: Task, session: Session, run: AnyRun, writer: "Background | None", show: "Display", log: Impacts | None
-) -> list[dict[str, Any]]:
-    """All frames of this session: their observables, if no trajectory holds them."""
-    history: list[dict[str, Any]] = []
-    until, span_of = task.options.until, task.method.span
-    with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
-        for number, before, moment in task.options.times:
-            session.require_same_time(number, moment)
-            if number < session.first:
-                continue
-            if number == 0:
-                run.observe()
-            else:
-                span = span_of("time", moment) - span_of("time", before)
-                if log is not None:
-                    log.begin = before
-                while not run.advance(span, moment, *_meanwhile(session, writer, show)):
-                    show.within(before + run.share_done(span) * (moment - before), until)
-                    session.look(run, writer, number - 1, before, moment)
-            seen = {"time": moment, **run.seen()}
-            if task.is_shard:
-                seen[CHUNK_SUMS] = run.chunk_sums()
-            run.require_admissible(seen, moment)
-            if task.options.trajectory is None:
-                history.append(seen)
-            if log is not None:
-                log.ends[number] = log.total
-            write(number, moment, run.state, seen)
-            show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
-            if moment < until:
-                session.look(run, writer, number, moment, None)
-    return history
 
 
 def _meanwhile(session: Session, writer: "Background | None", show: "Display") -> tuple[float, float]:
@@ -145,12 +168,8 @@ def _require_room(task: Task, session: Session) -> None:
     options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed)
 
 
-def _columns(history: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    return {name: np.array([seen[name] for seen in history]) for name in history[0]}
-
-
 def read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
-    """All frames of all sessions. During the run they are not kept in memory, which would grow without limit."""
+    """The observables of all frames of all sessions."""
     from ..output.trajectory import load
 
     with load(trajectory) as written:

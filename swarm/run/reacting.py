@@ -1,13 +1,13 @@
-"""The state of a run with walls that react; what `engine.Run` is for particles that are independent of one another."""
+"""The run of particles and walls that react: all depend on all others."""
 
 import itertools
 import math
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import observables
 from ..errors import RunError
@@ -22,14 +22,9 @@ from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
 from ..scene import Scene
 from ..status import Status
 from . import failures
+from .base import Arrays, BaseRun, result_of
 from .tiers import Tier
-from .waiting import result_of
 
-# Beyond this part of the scene's size a particle outside rigid walls is an error.
-_OUTSIDE = 1e-9
-# A particle this many times the scene's extent away from the origin has escaped from an open scene.
-_FAR = 100.0
-_NEVER = 2**62
 # Fewer particles than this are predicted sooner than another thread is awake.
 _FEW = 4096
 # So many are predicted at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the next.
@@ -41,23 +36,23 @@ _WIDTH, _TOO_SHORT, _TOO_LONG = 0.1, 4.0, 32.0
 _ALL_AHEAD = -1.0
 
 
-class ReactingRun:
-    """The particles and the walls that react, advanced from frame to frame; a context that ends its threads."""
+class ReactingRun(BaseRun):
+    """The run of particles and walls that react; the arrays of the particles become a part of its state."""
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
         compile: str = "always",
     ) -> None:  # fmt: skip
-        n, walls = len(particles), len(scene.owners())
-        self._scene, self._method, self._owners = scene, method, scene.owners()
-        self._gravity = scene.pull()
-        energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(self._gravity, vec(particles.position))
+        n, walls, gravity = len(particles), len(scene.owners()), scene.pull()
+        energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None,
         )  # fmt: skip
-        state = self.state
-        number = np.arange(n)
+        self._scenery, self._gravity = scenery_of(scene, 0.0), gravity
+        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._scenery, gravity), n)
+        super().__init__(scene, method, n, pool, tier)
+        state, number = self.state, np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
@@ -67,45 +62,23 @@ class ReactingRun:
         speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
         self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
         self._clock = np.zeros(CLOCK)
-        self._halt = np.full(1, _NEVER)
-        self._scenery = scenery_of(scene, 0.0)
         self._walls = observed(scene, self._freedoms, 0.0)
-        self._deepest = _OUTSIDE * scene.finite_size()
-        self._far = _FAR * scene.extent() if scene.is_open() else math.inf
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._threads = threads if n >= _FEW else 1
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="swarm")
-        self._cut_short = False
         self._start = math.nan
-        self._tier = Tier(compile, (self._scenery, self._gravity), n)
-        self._tier.choose(self.calls())
-
-    def __enter__(self) -> "ReactingRun":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.halt()
-        self._pool.shutdown(wait=True)
-
-    def halt(self, passes: int = 0) -> None:
-        """Make the kernel call of this frame return after so many events; 0: at once."""
-        np.minimum(self._halt, passes, out=self._halt)
+        self._choose_tier()
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        """Advance the particles and walls by `span` [s] and observe them: whether the frame is done."""
         self._scenery = scenery_of(self._scene, moment)
-        rule = Rule(span, self._halt)
-        if self._tier.is_plain:
-            if self._tier.left <= 0.0:
-                self._tier.choose(self.calls())
-            latest = min(latest, time.monotonic() + self._tier.left)
+        rule = Rule(span, self._watch.passes)
+        latest = self._limit(latest)
         began = time.perf_counter()
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
         status, particle = self._take(rule, latest)
         self._tier.spend(time.perf_counter() - began)
-        self._halt[0] = _NEVER
+        self._watch.end()
         self._cut_short = status == Status.INTERRUPTED
         if status == Status.STALLED:
             raise RunError(self._stalled(particle, moment - span))
@@ -123,7 +96,7 @@ class ReactingRun:
         """Predict where leases have ended, and take events, to the end of the frame or a halt: (status, particle)."""
         taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
         leases = 0
-        while self._predict(rule, latest) and leases < self._halt[0]:
+        while self._predict(rule, latest) and leases < self._watch.passes[0]:
             leases += 1
             status, particle = result_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest, self.halt)
             if status != Status.LEASE_ENDED:
@@ -140,7 +113,7 @@ class ReactingRun:
         n, plain = len(self.state.mass), self._tier.is_plain
         size = _AT_ONCE_PLAIN if plain else _AT_ONCE
         while self._clock[TAKEN] < 0.0:
-            if self._halt[0] == 0:
+            if self._watch.passes[0] == 0:
                 return False
             first = int(_ALL_AHEAD - self._clock[TAKEN])
             last = min(first + size, n)
@@ -177,9 +150,8 @@ class ReactingRun:
             "of which some react"
         )
 
-    def calls(self) -> Any:
-        """Every kernel of a frame, with arguments of the types that it is called with."""
-        rule, part = Rule(0.0, self._halt), (0, 0)
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        rule, part = Rule(0.0, self._watch.passes), (0, 0)
         moving = self._freedoms, self._queue, self._clock, rule
         yield events.lease, (self._scenery, self._freedoms, self._clock)
         yield events.predict, (self._scenery, *moving, *part)
@@ -188,31 +160,18 @@ class ReactingRun:
         yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing(chain_now(self._scene, self._scenery, self._freedoms))
 
-    # --- What is observed --------------------------------------------------------------------------------
-
     def _observing(self, chain: Any) -> tuple[Any, ...]:
         drawn = np.arange(len(self._partial))
         return None, chain, self._gravity, self.state, drawn, observables.CHUNK, self._partial
 
     def observe(self) -> None:
-        """Observe the start."""
         self._observe(0.0)
-        self._start = self._balance()
+        self._start = _balance(self._summary())
 
     def _observe(self, moment: float) -> None:
         self._walls = observed(self._scene, self._freedoms, moment)
         chain = chain_now(self._scene, self._scenery, self._freedoms)
         self._tier.kernel(observables.observe)(*self._observing(chain))
-
-    def _balance(self) -> float:
-        """The energy of particles and walls, with what was lost and without the work of walls that are moved."""
-        seen = self._summary()
-        kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum()
-        return kept
-
-    def chunk_sums(self) -> NDArray[np.float64]:
-        """What `observables.summed` takes: no shard has walls that react."""
-        raise NotImplementedError
 
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False)
@@ -229,41 +188,32 @@ class ReactingRun:
         }
 
     def seen(self) -> dict[str, Any]:
-        """The observables of the last frame."""
         seen = self._summary()
-        kept = self._balance()
+        kept = _balance(seen)
         scale = seen["kinetic_energy"] + self._walls.kinetic.sum() + abs(seen["potential_energy"])
         seen["energy_error"] = abs(kept - self._start) / scale if scale > 0.0 else 0.0
-        return {**seen, "escaped": self._escaped()}
-
-    def _escaped(self) -> int:
-        if self._far == math.inf:
-            return 0
-        return int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())
+        return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError where a state is not finite, or a particle outside its walls."""
-        still = self._scene.placed(seen["wall_position"], seen["wall_orientation"])
-        failures.require_admissible(still, self.state, seen, self._deepest, moment)
-
-    # --- Checkpoints -------------------------------------------------------------------------------------
+        scene = self._scene
+        if seen["max_penetration"] > self._deepest:
+            scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
+        failures.require_admissible(scene, self.state, seen, self._deepest, moment)
 
     def share_done(self, span: float) -> float:
-        """How much of a frame that was cut short is done."""
         return float(self._clock[NOW] / span)
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """What `restore` needs to continue with the same bits, not copied."""
+    def arrays(self) -> Arrays:
         queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass")}
         freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
         return {**queue, **freedoms, "key": self._queue.heap.key, "clock": self._clock}
 
-    def restore(self, arrays: dict[str, NDArray[Any]], cut_short: bool) -> None:
-        """Take the state of the run that gave these `arrays`."""
-        self._start = math.nan
-        self._walls = observed(self._scene, self._freedoms, 0.0)
-        self._observe(0.0)
-        self._start = self._balance()
-        for name, array in self.arrays().items():
-            np.copyto(array, arrays[name], casting="no")
-        self._cut_short = cut_short
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        self.observe()
+        super().restore(arrays, cut_short)
+
+
+def _balance(seen: dict[str, Any]) -> float:
+    """The energy of particles and walls, with what was lost and without the work of walls that are moved."""
+    kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum()
+    return kept

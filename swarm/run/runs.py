@@ -1,5 +1,6 @@
 """The run of a task: one class for particles alone, one for bodies, one for walls that react."""
 
+from .base import BaseRun
 from .bodies import BodyRun
 from .engine import Run
 from .options import Task
@@ -8,10 +9,9 @@ from .state import Seeding
 from .tally import Watched
 
 _UNWATCHED = Watched()
-AnyRun = Run | BodyRun | ReactingRun
 
 
-def run_of(task: Task, watched: Watched = _UNWATCHED) -> AnyRun:
+def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
     """The state of a run at its start, and the threads that advance it."""
     options = task.options
     how = options.thread_count(), options.block_size, options.compile

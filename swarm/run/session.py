@@ -5,16 +5,18 @@ import dataclasses
 import math
 import os
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import CompleteError, SceneError, WallTimeError
+from ..frames import FrameTimes
 from ..output import paths
 from ..version import VERSION
+from .base import BaseRun
 from .impacts import Impacts
 from .options import RunOptions, Task
-from .runs import AnyRun
 
 if TYPE_CHECKING:
     from ..output.background import Background
@@ -84,6 +86,7 @@ class Session:
         from ..output.writer import body_text, descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
+        self._owners = task.scene.members()
         body = "" if task.bodies is None else body_text(task.bodies.body)
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}
@@ -152,6 +155,7 @@ class Session:
         if checkpoint.SHARDS in arrays:
             raise SceneError(f"{self._path} is of a run on a cluster; resume it on one, by cluster= or --cluster")
         saved.require_same(self._job, self._path)
+        checkpoint.require_owners(self._path, arrays, self._owners)
         if not trajectory.exists():
             raise SceneError(
                 f"{self._path} needs its trajectory {trajectory}, which does not exist; start again without resume"
@@ -167,7 +171,7 @@ class Session:
             raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
         self._job, self._arrays = saved, arrays
 
-    def restore(self, run: AnyRun) -> None:
+    def restore(self, run: BaseRun) -> None:
         """Put the run into the state of the checkpoint."""
         if self._arrays is not None and self._job is not None and self._path is not None:
             from ..output.checkpoint import require_fit
@@ -178,17 +182,23 @@ class Session:
             run.restore(self._arrays, self._job.following is not None)
             self._arrays = {}
 
-    def require_same_time(self, number: int, moment: float) -> None:
-        """Raise a SceneError if the frame of this number was, or was to be, at another time."""
+    def frames(self, times: FrameTimes) -> Iterator[tuple[int, float, float]]:
+        """The frames of this session: number, the time before, and the time [s].
+
+        Raises:
+            SceneError: a frame of the checkpoint was, or was to be, at another time.
+        """
         job = self._job
-        if self._arrays is None or job is None:
-            return
-        for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
-            if number == frame and saved is not None and saved != moment:
-                raise SceneError(
-                    f"{self._path} is of another run: its frame {number} is at {saved:g} s, got {moment:g} s; leave "
-                    "until and every as they were, or make until later"
-                )
+        for number, before, moment in times:
+            if self._arrays is not None and job is not None:
+                for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
+                    if number == frame and saved is not None and saved != moment:
+                        raise SceneError(
+                            f"{self._path} is of another run: its frame {number} is at {saved:g} s, got {moment:g} s; "
+                            "leave until and every as they were, or make until later"
+                        )
+            if number >= self.first:
+                yield number, before, moment
 
     @property
     def latest(self) -> float:
@@ -204,7 +214,7 @@ class Session:
         return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
 
     def look(
-        self, run: AnyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+        self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
         """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
 
@@ -224,7 +234,7 @@ class Session:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
     def _save(
-        self, run: AnyRun, writer: "Background | None", frame: int, moment: float, following: float | None
+        self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
         from ..output import checkpoint
 
@@ -237,7 +247,7 @@ class Session:
             self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),
             rows=0 if self._log is None else self._log.total,
         )  # fmt: skip
-        checkpoint.save(self._path, job, run.arrays())
+        checkpoint.save(self._path, job, run.arrays(), self._owners)
 
     def finish(self) -> None:
         """Remove the checkpoint: all frames are written."""

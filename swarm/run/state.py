@@ -1,4 +1,4 @@
-"""The state of a run at its start, of particles that are independent of one another."""
+"""The state of particles that are independent of one another, at the start of a run and of a frame."""
 
 import math
 from typing import NamedTuple
@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
-from ..surfaces.openings import Openings
-from ..surfaces.period import Period
 
 
 class Seeding(NamedTuple):
@@ -26,6 +25,7 @@ class Seeding(NamedTuple):
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
     n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())
+    period, openings = scene.cell(), scene.openings()
     return State(
         particles.position,
         particles.velocity,
@@ -39,21 +39,28 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         _no_contacts(surfaces, n) if method.may_slide() else None,
         None if laws is None or laws.thermal is None else np.zeros((surfaces, n)),
         particles.image,
-        *_cell(scene, n),
-        *_none_escaped(scene, n),
+        None if period is None or period.fall is None else np.zeros(n),
+        period,
+        None if openings is None else np.full(n, math.nan),
+        openings,
     )
 
 
-def _cell(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Period | None]:
-    """What the state needs besides images where a scene repeats."""
-    period = scene.cell()
-    return None if period is None or period.fall is None else np.zeros(n), period
-
-
-def _none_escaped(scene: Scene, n: int) -> tuple[NDArray[np.float64] | None, Openings | None]:
-    """What the state needs besides where walls have openings."""
-    openings = scene.openings()
-    return None if openings is None else np.full(n, math.nan), openings
+def begin(state: State, phase: NDArray[np.int8], span: float, lasts: bool) -> None:
+    """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted."""
+    contacts = state.contacts
+    if contacts is None or not lasts:
+        phase.fill(FLYING)
+    else:
+        contacts.short_steps.fill(0.0)
+        phase[:] = contacts.phase
+        rests = contacts.phase == ARRIVED
+        if rests.any():
+            # What is at rest costs this much.
+            state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
+            contacts.sliding[:] += span * rests
+    if state.escape_time is not None:
+        phase[~np.isnan(state.escape_time)] = ARRIVED
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:

@@ -54,3 +54,14 @@ class Turns:
         still: NDArray[np.int64] = mine[now[left[now] == self._left[then]]]
         self._particles, self._left = mine, left
         return still
+
+
+def left_behind(before: Halted, phase: NDArray[np.int8], now: list[Halted]) -> Halted:
+    """What halts have left in the lanes: `now`, and `before` what no lane has taken since."""
+    picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(left.particle for left in now)])
+    waiting = ~np.isin(before.particle, picked_up)
+    parts = [Halted(before.particle[waiting], before.rows[:, waiting]), *now]
+    particle = np.concatenate([part.particle for part in parts])
+    order = np.argsort(particle)
+    rows = np.concatenate([part.rows for part in parts], axis=1)[:, order]
+    return Halted(particle[order], np.ascontiguousarray(rows))

@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
+import threading
 from typing import NamedTuple
 
 import numpy as np
@@ -78,18 +78,53 @@ def alone(tmp_path_factory):
     return swarm.simulate(*cavity(), until=8.0, every=0.5, trajectory=path, compile="never"), path
 
 
-def test_a_worker_that_is_killed_changes_no_bit(client, alone, tmp_path):
-    killed = []
+@pytest.fixture
+def kept(client):
+    """The shards of the workers tell of their first checkpoint, and stay there until they are killed."""
 
-    def kill(frame):
-        path = tmp_path / "run.shards" / "0001.h5.checkpoint"
-        if not killed and path.exists() and not shards.end_of(path.parent, 1).exists():
-            killed.extend(client.run(os.getpid).values())
+    def keep():
+        import threading
+
+        from distributed import get_worker
+
+        from swarm.run.session import Session
+
+        Session.let_go = threading.Event()
+
+        def look(session, *about, real=Session.look):
+            real(session, *about)
+            if session._path.exists() and not Session.let_go.is_set():
+                get_worker().log_event("kept", session._trajectory.name)
+                Session.let_go.wait()
+
+        Session.look = look
+
+    def let_go():
+        from swarm.run.session import Session
+
+        # Of the workers that take their places nothing is kept.
+        if hasattr(Session, "let_go"):
+            Session.let_go.set()
+
+    client.run(keep)
+    yield
+    client.run(let_go)
+
+
+def test_a_worker_that_is_killed_changes_no_bit(client, alone, kept, tmp_path):
+    workers, killed = list(client.run(os.getpid).values()), []
+
+    async def kill(event):
+        _when, name = event
+        if not killed and name == "0001.h5":
+            killed.extend(workers)
             for pid in killed:
                 os.kill(pid, signal.SIGKILL)
 
-    options = {"until": 8.0, "every": 0.5, "compile": "never", "checkpoint": 0.05, "trajectory": tmp_path / "run.h5"}
-    result = swarm.simulate(*cavity(), **options, cluster=client, progress=kill)
+    client.subscribe_topic("kept", kill)
+    options = {"until": 8.0, "every": 0.5, "compile": "never", "checkpoint": 0.01, "trajectory": tmp_path / "run.h5"}
+    result = swarm.simulate(*cavity(), **options, cluster=client)
+    client.unsubscribe_topic("kept")
     assert len(killed) == 2
     require_same(alone[0], result, (alone[1], tmp_path / "run.h5"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.shards"]
@@ -122,25 +157,34 @@ def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(cl
 
 @pytest.fixture
 def held(client):
-    """The shards of the workers stay at their first frame until they are told to stop."""
+    """The shards of the workers tell of their first frame, and stay there until they are told to stop."""
 
     def hold():
-        import time
+        import threading
+
+        from distributed import get_worker
 
         from swarm.run.session import Session
 
         def look(session, *about, real=Session.look):
-            # Also those of a test that fails are let go: they would hold the workers of all that follow.
-            while Session.look is not Session.free and not session._stops:
-                time.sleep(0.01)
+            if not Session.let_go.is_set():
+                get_worker().log_event("held", session._trajectory.name)
+                Session.let_go.wait()
             real(session, *about)
 
-        Session.free, Session.look = Session.look, look
+        def stop(session, real=Session.stop):
+            real(session)
+            Session.let_go.set()
+
+        Session.let_go, Session.free = threading.Event(), (Session.look, Session.stop)
+        Session.look, Session.stop = look, stop
 
     def let_go():
         from swarm.run.session import Session
 
-        Session.look = Session.free
+        # Also those of a test that fails: they would hold the workers of all that follow.
+        Session.let_go.set()
+        Session.look, Session.stop = Session.free
 
     client.run(hold)
     yield lambda: client.run(let_go)
@@ -152,14 +196,19 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     scene, output = tmp_path / "scene.toml", tmp_path / "run.h5"
     scene.write_text(SCENE.replace("UNTIL", "8.0"))
     command = [sys.executable, "-m", "swarm", "run", str(scene), "-o", str(output), "--cluster", address]
+    reached = threading.Event()
+
+    async def reach(event):
+        reached.set()
+
+    client.subscribe_topic("held", reach)
     # A shell that starts the tests in the background has told them to ignore this signal, and they who they start.
     process = subprocess.Popen(
         [*command, "--shards", "3"], stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
-    while not (tmp_path / "run.shards" / "0000.h5").exists():
+    while not reached.wait(1.0):
         assert process.poll() is None
-        time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _out, said = process.communicate(timeout=100)
     assert process.returncode == 130, said

@@ -14,7 +14,7 @@ from ... import observables
 from ...lanes.arrays import booked
 from ...output.trajectory import load
 from ...output.writer import TrajectoryWriter
-from .. import bodies
+from .. import energies
 from ..machine import CHUNK_SUMS
 from ..options import Task
 from . import shards
@@ -54,7 +54,7 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
         has_heat = laws is not None and laws.thermal is not None
         added = observables.summed(sums, owners, booked(task.scene.chain()), has_heat)
     else:
-        added = bodies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
+        added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.
     for name in (name for name in parts[0] if name != CHUNK_SUMS):

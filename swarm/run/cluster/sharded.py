@@ -45,6 +45,8 @@ class Sharded(Session):
         if checkpoint.SHARDS not in arrays:
             raise SceneError(f"{path} is of a run without a cluster; resume it without one")
         saved.require_same(self._job, path)
+        # Sums that the shards have written have rows of walls too.
+        checkpoint.require_owners(path, arrays, self._owners)
         if (was := arrays["times"]).tolist() != self._times.tolist():
             raise SceneError(
                 f"{path} is of a run with until = {was[0]:g} s and every = {was[1]:g} s, got {self._times[0]:g} and "
@@ -74,7 +76,9 @@ class Sharded(Session):
         assert self._job is not None
         assert self._path is not None
         job = dataclasses.replace(self._job, frame=frame, time=moment, wall_time=self.wall_time())
-        checkpoint.save(self._path, job, {checkpoint.SHARDS: np.array(self._bounds), "times": self._times})
+        checkpoint.save(
+            self._path, job, {checkpoint.SHARDS: np.array(self._bounds), "times": self._times}, self._owners
+        )
 
     def finish(self) -> None:
         """Remove what only an unfinished run needs."""

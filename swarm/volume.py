@@ -1,0 +1,153 @@
+"""The volume that surfaces enclose: what is inside of it, how large it is, where it is open."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import checks
+from . import motion as motions
+from .particles import Particles
+from .surfaces.fields.many import Many
+from .surfaces.images import Lengths, cell_of, into_cell
+from .surfaces.instant import box_of, gaps_of, gradient_of, planes_of
+from .surfaces.polyhedron import polyhedron_bounds
+from .surfaces.room import has_room
+from .surfaces.surface import UNBOUNDED, Box, Surface
+
+# Points whose gaps are found at once.
+_BATCH = 4096
+# A slot thinner than this part of the scene's extent is none of its lengths: steps that are a part of it end in the
+# round-off of a time.
+_THIN = 1e-6
+# Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
+_AT_ORIGIN = 1e-15
+
+
+class Volume:
+    """The volume of a `Scene`, which is the intersection of the admissible sides of its surfaces."""
+
+    surfaces: tuple[Surface, ...]
+    gravity: checks.Vector | None
+    period: Lengths | None
+    # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
+    _images: tuple[tuple[Surface, ...], ...]
+
+    def size(self) -> float:
+        """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
+        smallest = min(surface.size() for surface in self.surfaces)
+        if math.isfinite(smallest):
+            return smallest
+        low, high = self.bounds()
+        return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
+
+    def finite_size(self) -> float:
+        """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
+        size, extent = self.size(), self.extent()
+        return size if _THIN * extent < size < math.inf else extent
+
+    def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""
+        return into_cell(self.period or (None, None, None), checks.array("points", points))
+
+    def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
+        """Where particles are (3, N), with all cells that they have come through: position + image * period."""
+        if self.period is None or particles.image is None:
+            return np.array(particles.position)
+        lengths = np.array([length or 0.0 for length in self.period])
+        return np.asarray(particles.position + particles.image * lengths[:, None])
+
+    def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
+        rows = checks.array("points", points)
+        if self.period is not None:
+            rows, _image = into_cell(self.period, rows)
+        return np.array([gaps_of(images, rows, time).max(axis=0) for images in self._images])
+
+    def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
+        rows = points if self.period is None else into_cell(self.period, points)[0]
+        admitted = np.ones(rows.shape[1], np.bool_)
+        for image in (image for images in self._images for image in images):
+            if isinstance(image, Many):
+                admitted[admitted] = ~image.contain(rows[:, admitted])
+            else:
+                admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
+        return admitted
+
+    def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
+        rows = checks.array("points", points)
+        if self.period is not None:
+            rows, _image = into_cell(self.period, rows)
+        found = []
+        for images in self._images:
+            slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
+            # At the centre of a ball the slope is 0, and a point is as far inside as can be.
+            with np.errstate(over="ignore"):
+                found.append((gaps_of(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
+        return np.array(found)
+
+    def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
+        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
+        found = []
+        # In batches, so that NumPy's intermediate results stay in the processor's cache.
+        for begin in range(0, points.shape[1], _BATCH):
+            batch = points[:, begin : begin + _BATCH]
+            suspects = np.flatnonzero(~self.admits(batch))
+            if suspects.size:
+                near = (self.distances_outside(batch[:, suspects]) <= distance).all(axis=0)
+                found.append(begin + suspects[~near])
+        return np.concatenate(found) if found else np.empty(0, np.intp)
+
+    def is_open(self) -> bool:
+        """Whether a particle may fly to infinity."""
+        return not np.isfinite(self.bounds()).all()
+
+    def poses(self, time: float) -> list[motions.Pose]:
+        """Where every surface is at a time [s]."""
+        return [motions.pose(surface.motion, time) for surface in self.surfaces]
+
+    def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
+        """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
+        faces = [
+            (*n, offset) for surface in self.surfaces for n, offset in planes_of(surface, surface.open_faces(), time)
+        ]
+        rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
+        # Through a face across the period nobody leaves.
+        repeats = np.array([length is not None for length in self.period or (None,) * 3])
+        rows = rows[(rows[:, :3][:, repeats] == 0.0).all(axis=1)]
+        return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])
+
+    def bounds(self, time: float = 0.0) -> Box:
+        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
+        low, high = self._bounds(time, self.surfaces)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A box around the volume that some of the surfaces leave, and the cell that repeats."""
+        boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
+        low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
+        if self.period is not None:
+            corners = np.array(cell_of(self.period))
+            low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
+        planes = [plane for surface in surfaces for plane in planes_of(surface, surface.half_spaces(), time)]
+        if planes:
+            low, high = polyhedron_bounds(planes, low, high)
+        return low, high
+
+    def _has_volume(self) -> bool:
+        low, high = (np.array(corner) for corner in self.bounds())
+        if not (low < high).all():
+            return False
+        # Open directions are searched as far as the scene itself extends.
+        reach = 2.0 * self.extent()
+        low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
+        return has_room(low, high, self.gaps, lambda i, points: gradient_of(self._images[i], points))
+
+    def extent(self) -> float:
+        """Distance from the origin within which the scene's surfaces lie."""
+        lengths = [length for length in self.period or () if length is not None]
+        farthest = max([*(surface.extent() for surface in self.surfaces), *lengths])
+        return farthest if farthest > _AT_ORIGIN else 1.0
