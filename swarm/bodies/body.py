@@ -1,4 +1,4 @@
-"""What a body is: base points with masses, what ties them together, and the points that touch walls.
+"""Bodies: base points with masses, the ties between them, and the points that touch walls.
 
 A body is P base points r_p with a constant mass matrix M (P, P), times the identity of R^3. Pairs of them are tied by
     links      |r_i - r_j| stays as it is,

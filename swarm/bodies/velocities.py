@@ -1,4 +1,4 @@
-"""Whether the velocities of bodies agree with what holds their points: links, guides, and paths of anchored points.
+"""Velocities of bodies that agree with links, guides, and the paths of anchored points.
 
 A stage keeps lengths by lambda, so velocities along a link that contradict it turn at each step and never vanish.
 """

@@ -1,4 +1,4 @@
-"""What commands share: arguments, what they print, and how a run or a sweep that was stopped goes on."""
+"""Parts of several commands: arguments, output, and the command that goes on with what was stopped."""
 
 import itertools
 import shlex

@@ -91,7 +91,7 @@ class Hand:
             return None
 
     def _death(self) -> str:
-        """How the process ended, in a sentence."""
+        """The end of the process, in a sentence."""
         code = self._process.wait()
         size = self._printed.seek(0, os.SEEK_END)
         self._printed.seek(max(0, size - _LAST))

@@ -18,7 +18,7 @@ _WORTH = 20.0
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is: numbers of runs, and the sum of the shares that the running ones have done."""
+    """The progress of a sweep: numbers of runs, and the sum of the shares that the running ones have done."""
 
     all: int
     done: int
@@ -66,7 +66,7 @@ class Pool:
             hand.kill()
 
     def progress(self) -> Progress:
-        """How far the runs are."""
+        """The progress of the runs."""
         with self._lock:
             sentence, self._sentence = self._sentence, ""
             return Progress(

@@ -37,7 +37,7 @@ def of_trajectory(path: Path, until: float) -> dict[str, int | float] | None:
 
 
 class Results:
-    """What is known of the runs of a plan, in memory and in the folder.
+    """The outcomes of the runs of a plan, in memory and in the folder.
 
     Args:
         plan: the runs.
@@ -61,7 +61,7 @@ class Results:
         return self.folder / f"{variant.stem}.impacts.h5" if variant.has_impacts else None
 
     def status_file(self, variant: Variant) -> Path:
-        """Where its end is noted."""
+        """The file that notes its end."""
         return self.folder / f"{variant.stem}.json"
 
     def find(self) -> None:

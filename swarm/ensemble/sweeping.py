@@ -29,7 +29,7 @@ _TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """How a sweep is carried out; `sweep` describes each, `walltime` as of `simulate`."""
+    """The options of a sweep; `sweep` describes each, `walltime` as of `simulate`."""
 
     folder: str | os.PathLike[str] | None = None
     processes: int | None = None

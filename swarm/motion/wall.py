@@ -112,7 +112,7 @@ class Guide(Given):
         checks.assign(self, axis=axis, speed=speed, stiffness=checks.magnitude("stiffness", self.stiffness))
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """Where a point of the wall is before anything moves it."""
+        """The path of a point of the wall before anything moves it: none."""
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
