@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 # Magnitudes whose squares and inverse squares are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
-_PARTICLE, _FEW = 146, 1_000_000
+_PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
 # Characters of a value that are shown in a sentence.
 _SHOWN = 200
@@ -36,6 +36,18 @@ def shown(value: Any) -> str:
     except Exception:  # of an object of others, or a number of too many digits
         return f"a {type(value).__name__}"
     return " ".join(said.split())[:_SHOWN]
+
+
+def assign(frozen: Any, **values: Any) -> None:
+    """Give a frozen dataclass the values of its fields as they have been checked."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
+def of_class(name: str, value: Any, cls: type[Any]) -> None:
+    """Raise a `SceneError` unless `value` is an object of a public class."""
+    if not isinstance(value, cls):
+        raise SceneError(f"{name} must be a swarm.{cls.__name__}, got {shown(value)}")
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
@@ -84,6 +96,13 @@ def magnitude(name: str, value: Any) -> float:
     return result
 
 
+def bounded(name: str, value: Any) -> float:
+    """`value` as a number of either sign, whose square is finite."""
+    result = number(name, value)
+    magnitude(f"|{name}|", abs(result))
+    return result
+
+
 def count(name: str, value: Any, least: int = 1) -> int:
     """`value` as an integer not below `least`."""
     try:
@@ -125,15 +144,21 @@ def in_bytes(size: float) -> str:
     return f"{size:.3g} {units[0]}"
 
 
+def _too_large(name: str, given: str, size: float) -> SceneError:
+    return SceneError(f"{name} must fit in memory{given} {in_bytes(size)}; this machine has {in_bytes(memory())}")
+
+
+def require_memory(name: str, given: str, size: float) -> None:
+    """Raise a `SceneError` if what is given, of so many bytes, does not fit in the memory of this machine."""
+    if size > memory():
+        raise _too_large(name, given, size)
+
+
 def particles_fit(name: str, count: int) -> None:
-    """Raise a SceneError if this many particles do not fit in the memory of this machine."""
+    """Raise a `SceneError` if this many particles do not fit in the memory of this machine."""
     count = min(count, 10**300)  # which float() can convert
-    size = _PARTICLE * count
-    if count > _FEW and size > memory():
-        raise SceneError(
-            f"{name} must fit in memory, got {count:.6g} particles, which take {in_bytes(size)}; this machine has "
-            f"{in_bytes(memory())}"
-        )
+    if count > FEW:
+        require_memory(name, f", got {count:.6g} particles, which take", _PARTICLE * count)
 
 
 def duration(name: str, value: str) -> float:
@@ -152,19 +177,24 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
+def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
+    """`value` as a tuple of so many parts; `expected` says what they are."""
+    try:
+        # One more than there should be: what has no end is refused as well.
+        parts = tuple(itertools.islice(value, count + 1))
+    except TypeError:
+        raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
+    if len(parts) != count:
+        came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < count else "more"
+        raise SceneError(f"{name} must be {expected}, got {came}: {shown(value)}")
+    return parts
+
+
 def vector(name: str, value: Any) -> Vector:
     """`value` as three finite floats."""
-    try:
-        if isinstance(value, (str, bytes)):
-            raise TypeError
-        # No more than is looked at: what has no end is refused as well.
-        parts = list(itertools.islice(value, 4))
-    except TypeError:
-        raise SceneError(f"{name} must be three numbers, got {shown(value)}") from None
-    if len(parts) != 3:
-        came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < 4 else "more"
-        raise SceneError(f"{name} must be three numbers, got {came}: {shown(value)}")
-    x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(parts))
+    if isinstance(value, (str, bytes)):
+        raise SceneError(f"{name} must be three numbers, got {shown(value)}")
+    x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(entries(name, value, 3, "three numbers")))
     return x, y, z
 
 
@@ -183,10 +213,7 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     except (TypeError, ValueError, OverflowError):
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
         raise SceneError(f"{name} must be an array of numbers, got {came}") from None
-    raise SceneError(
-        f"{name} must fit in memory, got shape {given.shape}, which takes {in_bytes(_DOUBLE * given.size)}; this "
-        f"machine has {in_bytes(memory())}"
-    )
+    raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)
 
 
 def no_radius(value: Any) -> None:

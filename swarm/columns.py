@@ -86,7 +86,7 @@ def read_columns(
 
 
 def _hint(header: list[str]) -> str:
-    """What a header without the columns may be."""
+    """A guess at what is wrong with a header."""
     if not header:
         return ": the file is empty"
     got = f" in the first row, {','.join(header)!r:.60}"

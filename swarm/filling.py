@@ -52,8 +52,7 @@ def fill(
     >>> swarm.fill(cavity, 10, speed=0.5, seed=1)
     Particles(10)
     """
-    if not isinstance(scene, Scene):
-        raise SceneError(f"scene must be a swarm.Scene, got {checks.shown(scene)}")
+    checks.of_class("scene", scene, Scene)
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
@@ -84,14 +83,20 @@ def fill(
     return particles
 
 
-def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
-    """Admissible points, and the volume from their share of the random points of the bounding box."""
+def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
+    """The lower and the upper corner (3, 1) of a box around the admissible volume; a SceneError if that is open."""
     low, high = (np.array(corner)[:, None] for corner in scene.bounds())
     if not np.isfinite(high - low).all():
         raise SceneError(
-            "fill needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or give "
-            "the particles as arrays or a CSV file"
+            f"{user} needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or "
+            f"give {instead}"
         )
+    return low, high
+
+
+def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
+    """Admissible points, and the volume from their share of the random points of the bounding box."""
+    low, high = bounding_box(scene, "fill", "the particles as arrays or a CSV file")
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
     box = float(np.prod(high - low))
     while found < n:

@@ -61,8 +61,7 @@ class FrameTimes:
         gap = end if self.every is None else checks.positive("every", self.every)
         if gap > end:
             raise SceneError(f"every must be at most until = {end:g}, got {gap:g}")
-        object.__setattr__(self, "until", end)
-        object.__setattr__(self, "every", gap)
+        checks.assign(self, until=end, every=gap)
 
     @property
     def count(self) -> int:

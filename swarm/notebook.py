@@ -1,4 +1,4 @@
-"""How objects show in notebooks: small tables in HTML, in the colours of the notebook, without scripts."""
+"""Objects in notebooks: small tables in HTML, in the colours of the notebook, without scripts."""
 
 import html
 import sys

@@ -5,15 +5,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import LARGEST, SMALLEST, array, in_bytes, memory
+from .checks import FEW, LARGEST, SMALLEST, array, require_memory
 from .errors import SceneError
 
 Floats = NDArray[np.float64]
 # What a ball and another body take at most while their table and the grid of cells are made [bytes]: of balls these are
 # arrays (260 measured), of others an object for each first (2000 capsules, 2750 cylinders).
 _BALL, _BODY = 300, 3000
-# So many fit on every machine.
-_FEW = 1_000_000
 
 
 def balls(name: str, value: ArrayLike) -> Floats:
@@ -25,11 +23,8 @@ def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:
     """`value` as points (n, 3), one a body, which takes so many bytes."""
     # With the grid they take more than the numbers themselves, which are looked at then.
     many = len(value) if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim) else 0
-    if many > _FEW and each * many > memory():
-        raise SceneError(
-            f"{name} must fit in memory with the grid of their cells, got {many:.6g} bodies, which take "
-            f"{in_bytes(each * many)}; this machine has {in_bytes(memory())}"
-        )
+    if many > FEW:
+        require_memory(name, f" with the grid of their cells, got {many:.6g} bodies, which take", each * many)
     rows = array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise SceneError(f"{name} must have shape (n, 3), one row a body, got {rows.shape}")

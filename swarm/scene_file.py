@@ -42,6 +42,20 @@ class ParticlesTable:
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 
+    def filled(self, scene: Scene) -> Particles:
+        """The particles of a table without a file."""
+        assert self.count is not None
+        particles_fit("count", self.count)
+        return fill(
+            scene,
+            self.count,
+            speed=self.speed,
+            temperature=self.temperature,
+            mass=1.0 if self.mass is None else self.mass,
+            seed=self.seed or 0,
+            exact=bool(self.exact),
+        )
+
 
 @dataclass(frozen=True)
 class BodiesFile:
@@ -53,7 +67,7 @@ class BodiesFile:
 
 @dataclass(frozen=True)
 class Job:
-    """What a scene file describes, checked; `text` is the file itself."""
+    """The run that a scene file describes, checked; `text` is the file itself."""
 
     scene: Scene
     method: Method
@@ -73,46 +87,32 @@ class Job:
         Raises:
             SceneError: a value of [particles] or [body] is out of its range, or the file it names cannot be used.
         """
-        source = self.source
+        source, file = self.source, self.start_file()
         try:
-            if isinstance(source, ParticlesTable):
-                return self._particles(source)
-            return self._bodies(source) if isinstance(source, BodiesFile) else source.start(self.scene)
+            if isinstance(source, ParticlesTable) and file is None:
+                return source.filled(self.scene)
+            if isinstance(source, ParticlesTable | BodiesFile):
+                assert file is not None
+                return _read(file, source)
+            return source.start(self.scene)
         except SceneError as error:
             table = "particles" if isinstance(source, ParticlesTable) else "body"
             raise SceneError(f"{self.path}, [{table}]: {error}") from None
 
-    def _bodies(self, table: BodiesFile) -> "Bodies":
-        from .output.trajectory import load
 
-        file = self.start_file()
-        assert file is not None
-        with load(file) as trajectory:
-            return trajectory.bodies(-1 if table.frame is None else table.frame)
+def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies":
+    """The particles or bodies that a file holds."""
+    if file.suffix.lower() == ".csv":
+        return Particles.from_csv(file)
+    from .output.trajectory import load  # h5py only where it is used
 
-    def _particles(self, table: ParticlesTable) -> Particles:
-        if table.source is None:
-            assert table.count is not None
-            particles_fit("count", table.count)
-            return fill(
-                self.scene,
-                table.count,
-                speed=table.speed,
-                temperature=table.temperature,
-                mass=1.0 if table.mass is None else table.mass,
-                seed=table.seed or 0,
-                exact=bool(table.exact),
-            )
-        file = self.start_file()
-        assert file is not None
-        if file.suffix.lower() == ".csv":
-            return Particles.from_csv(file)
-        from .output.trajectory import load  # h5py only where it is used
-
-        with load(file) as trajectory:
-            if trajectory.body is not None:
-                raise SceneError(f"from: {file} holds bodies, which are not particles; write [body] in place of it")
-            return trajectory.frame(-1 if table.frame is None else table.frame)
+    frame = -1 if table.frame is None else table.frame
+    with load(file) as trajectory:
+        if isinstance(table, BodiesFile):
+            return trajectory.bodies(frame)
+        if trajectory.body is not None:
+            raise SceneError(f"from: {file} holds bodies, which are not particles; write [body] in place of it")
+        return trajectory.frame(frame)
 
 
 def read(path: str | Path) -> Job:

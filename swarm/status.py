@@ -20,7 +20,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What happened, for the user."""
+        """The meaning, for the user."""
         return _SENTENCES[self]
 
 

@@ -40,30 +40,26 @@ def numbers(trajectory: Path) -> dict[str, Any]:
 
 
 def of_file(file: Path) -> dict[str, str]:
-    """What an HDF5 file holds."""
+    """The content of an HDF5 file, a trajectory or a log of impacts."""
+    from .output.impact_log import load_impacts
     from .output.stored import is_log
 
-    return of_impacts(file) if is_log(file) else of_trajectory(file)
+    if not is_log(file):
+        return of_trajectory(file)
+    with load_impacts(file) as log:
+        return facts.of_log(log)
 
 
 def of_trajectory(file: Path) -> dict[str, str]:
-    """What a trajectory holds, and whether the run went well."""
+    """The content of a trajectory, and whether the run went well."""
     from .output.trajectory import load
 
     with load(file) as trajectory:
         return facts.of_trajectory(trajectory)
 
 
-def of_impacts(file: Path) -> dict[str, str]:
-    """What a log of impacts holds."""
-    from .output.impact_log import load_impacts
-
-    with load_impacts(file) as log:
-        return facts.of_log(log)
-
-
 def of_recording(file: Path, repair: bool) -> dict[str, str]:
-    """What a recording holds; `repair` repairs it first."""
+    """The content of a recording; `repair` repairs it first."""
     from .extras import needed_by
 
     with needed_by("a recording", "record"):

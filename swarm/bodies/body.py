@@ -1,4 +1,4 @@
-"""What a body is: base points with masses, what ties them together, and the points that touch walls.
+"""Bodies: base points with masses, the ties between them, and the points that touch walls.
 
 A body is P base points r_p with a constant mass matrix M (P, P), times the identity of R^3. Pairs of them are tied by
     links      |r_i - r_j| stays as it is,
@@ -79,24 +79,23 @@ class Body:
     ) -> None:
         places = checked.points("points", points)
         count = len(places)
-        room.require(count)
         led = holding.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)
-        values = {
-            "points": places,
-            "mass_matrix": checked.mass_matrix(mass, mass_matrix, count),
-            "links": checked.links(links, places),
-            "springs": checked.springs(springs, places),
-            "contacts": touching,
-            "strain": _of_body(strain, count),
-            "anchors": led,
-            "guides": holding.guides(guides, places, led),
-            "cavities": holding.cavities(cavities, places),
-            "faces": checked.numbers("faces", faces, 3, len(touching)),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
-        room.require(count, len(self.bonds()) + len(self.guides) + len(self.cavities), len(touching), self._edges())
+        checks.assign(
+            self,
+            points=places,
+            mass_matrix=checked.mass_matrix(mass, mass_matrix, count),
+            links=checked.links(links, places),
+            springs=checked.springs(springs, places),
+            contacts=touching,
+            strain=_of_body(strain, count),
+            anchors=led,
+            guides=holding.guides(guides, places, led),
+            cavities=holding.cavities(cavities, places),
+            faces=checked.numbers("faces", faces, 3, len(touching)),
+        )
+        ties = len(self.bonds()) + len(self.guides) + len(self.cavities)
+        room.require(count, ties, len(touching), len(self.strained()))
         holding.uncoupled(self.anchors, self.mass_matrix)
         tied.require_reachable(self.points, self.links, self.anchors)
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
@@ -109,20 +108,27 @@ class Body:
         parts = {name: len(getattr(self, name)) for name in ("links", "springs", "anchors", "contacts", "faces")}
         return f"Body({', '.join([f'{len(self)} points', *(f'{n} {name}' for name, n in parts.items() if n)])})"
 
-    def _edges(self) -> int:
-        return 0 if self.strain is None else len(self.strain.edges)
+    def strained(self) -> Pairs:
+        """(E, 2) the edges of its strain."""
+        return np.zeros((0, 2), np.int64) if self.strain is None else self.strain.edges
 
     def bonds(self) -> Pairs:
-        """(B, 2) all pairs that are tied, for readers that draw them."""
+        """(B, 2) all pairs that are tied: links, springs, and edges of the strain."""
         springs = np.array([spring[:2] for spring in self.springs], dtype=np.int64).reshape(-1, 2)
-        strains = np.zeros((0, 2), np.int64) if self.strain is None else self.strain.edges
-        return np.concatenate([self.links, springs, strains])
+        return np.concatenate([self.links, springs, self.strained()])
+
+    def inverse_mass(self) -> Floats:
+        """(P, P) the inverse of the masses of the points that can move; 0 at anchored ones."""
+        free = np.setdiff1d(np.arange(len(self)), list(self.anchors))
+        inverse = np.zeros((len(self), len(self)))
+        inverse[np.ix_(free, free)] = np.linalg.inv(self.mass_matrix[np.ix_(free, free)])
+        return inverse
 
 
 def _of_body(strain: Strain | None, count: int) -> Strain | None:
-    if strain is None:
-        return None
-    if not isinstance(strain, Strain):
-        raise SceneError(f"strain must be a swarm.Strain or None, got {checks.shown(strain)}")
-    checked.numbers("strain.edges", strain.edges, 2, count)
+    """`strain` of a body of so many points, checked."""
+    if strain is not None:
+        if not isinstance(strain, Strain):
+            raise SceneError(f"strain must be a swarm.Strain or None, got {checks.shown(strain)}")
+        checked.numbers("strain.edges", strain.edges, 2, count)
     return strain

@@ -1,7 +1,6 @@
 """Checks of a body's arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
-import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,8 +57,7 @@ def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) ->
     rows = checks.array("mass_matrix", matrix)  # type: ignore[arg-type]
     if rows.shape != (count, count):
         raise SceneError(f"mass_matrix must have shape ({count}, {count}), got {rows.shape}")
-    rows = np.array(rows)
-    finite("mass_matrix", rows)
+    rows = finite("mass_matrix", np.array(rows))
     _masses("the diagonal of mass_matrix", np.diagonal(rows))
     return _positive_definite("mass_matrix", symmetric("mass_matrix", rows))
 
@@ -86,90 +84,85 @@ def symmetric(name: str, matrix: Floats) -> Floats:
     return 0.5 * (matrix + matrix.T)
 
 
+def modes_unless_above(bound: float, matrix: Floats) -> tuple[Floats, Floats] | None:
+    """Eigenvalues and eigenvectors of a symmetric matrix; None where all eigenvalues are above a bound."""
+    try:
+        # Far faster than eigenvalues, which say where it is wrong.
+        np.linalg.cholesky(matrix - bound * np.eye(len(matrix)))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(matrix)
+        return values, vectors
+    return None
+
+
 def _positive_definite(name: str, matrix: Floats) -> Floats:
     # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
     scale = np.sqrt(np.diagonal(matrix))
-    scaled = matrix / scale / scale[:, None]
-    try:
-        # Far faster than eigenvalues, which say where it is wrong.
-        least = _ROUND_OFF + 8.0 * len(matrix) * np.finfo(np.float64).eps
-        np.linalg.cholesky(scaled - least * np.eye(len(matrix)))
-        return matrix
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(scaled)
-    if values[0] < _ROUND_OFF:
-        mode = vectors[:, 0] / scale
-        first = int(np.abs(mode).argmax())
-        kind = "is singular" if values[0] > -_ROUND_OFF else "has a negative eigenvalue"
+    least = _ROUND_OFF + 8.0 * len(matrix) * np.finfo(np.float64).eps
+    modes = modes_unless_above(least, matrix / scale / scale[:, None])
+    if modes is not None and modes[0][0] < _ROUND_OFF:
+        first = int(np.abs(modes[1][:, 0] / scale).argmax())
+        is_singular = modes[0][0] > -_ROUND_OFF
         raise SceneError(
-            f"{name} must be positive definite, got one that {kind}: a motion, largest at point {first}, has "
-            f"{'no' if values[0] > -_ROUND_OFF else 'a negative'} kinetic energy"
+            f"{name} must be positive definite, got one that "
+            f"{'is singular' if is_singular else 'has a negative eigenvalue'}: a motion, largest at point {first}, has "
+            f"{'no' if is_singular else 'a negative'} kinetic energy"
         )
     return matrix
 
 
 def not_negative(name: str, matrix: Floats) -> None:
     """Raise if a symmetric matrix has a negative eigenvalue beyond round-off."""
-    try:
-        # Far faster than eigenvalues, which say where it is wrong.
-        np.linalg.cholesky(matrix + _ROUND_OFF * np.abs(matrix).max() * np.eye(len(matrix)))
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(matrix)
-        k = int(np.abs(vectors[:, 0]).argmax())
+    modes = modes_unless_above(-_ROUND_OFF * np.abs(matrix).max(), matrix)
+    if modes is not None:
         raise SceneError(
-            f"{name} must have no negative eigenvalue, got {values[0]:g}: a strain, largest at edge {k}, has a "
-            "negative energy, so the body would burst"
-        ) from None
+            f"{name} must have no negative eigenvalue, got {modes[0][0]:g}: a strain, largest at edge "
+            f"{int(np.abs(modes[1][:, 0]).argmax())}, has a negative energy, so the body would burst"
+        )
 
 
 def point(name: str, value: Any, count: int | None) -> int:
     """`value` as the number of one of `count` points."""
     number, below = checks.count(name, value, least=0), _ANY_POINT if count is None else count
     if number >= below:
-        raise SceneError(
-            f"{name} must be the number of a point, from 0 to {below - 1}, got {min(number, 10**300):.6g}"
-            if number >= _ANY_POINT
-            else f"{name} must be the number of a point, from 0 to {below - 1}, got {number}"
-        )
+        came = f"{number}" if number < _ANY_POINT else f"{min(number, 10**300):.6g}"
+        raise SceneError(f"{name} must be the number of a point, from 0 to {below - 1}, got {came}")
     return number
 
 
 def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pairs:
     """`rows` as (N, width) numbers of points, no point twice in a row and no row twice; count None: of any body."""
-    found: dict[frozenset[int], int] = {}
     result = []
-    for k, row in each(name, rows, f"rows of {width} numbers of points"):
-        parts = entries(f"{name}[{k}]", row, width, "numbers of points")
-        given = [point(f"{name}[{k}][{i}]", part, count) for i, part in enumerate(parts)]
+    for row, parts in each(name, rows, width, "numbers of points"):
+        given = tuple(point(f"{row}[{i}]", part, count) for i, part in enumerate(parts))
         if len(set(given)) < width:
-            raise SceneError(f"{name}[{k}] must name {width} different points, got {tuple(given)}")
-        first = found.setdefault(frozenset(given), k)
-        if first < k:
-            raise SceneError(f"{name}[{k}], {tuple(given)}, is there already as {name}[{first}]; leave one of them out")
+            raise SceneError(f"{row} must name {width} different points, got {given}")
         result.append(given)
+    _require_once(name, map(frozenset, result), [f", {given}," for given in result])
     return np.array(result, dtype=np.int64).reshape(-1, width)
 
 
-def entries(name: str, row: Any, width: int, what: str) -> tuple[Any, ...]:
-    """`row` as a tuple of `width` parts."""
-    try:
-        # One more than there should be: what has no end is refused as well.
-        parts = tuple(itertools.islice(row, width + 1))
-    except TypeError:
-        raise SceneError(f"{name} must be {width} {what}, got {checks.shown(row)}") from None
-    if len(parts) != width:
-        came = len(row) if isinstance(row, (list, tuple)) else len(parts) if len(parts) < width else "more"
-        raise SceneError(f"{name} must be {width} {what}, got {came}: {checks.shown(row)}")
-    return parts
+def _require_once(name: str, keys: Iterable[Hashable], said: Sequence[str]) -> None:
+    found: dict[Hashable, int] = {}
+    for k, key in enumerate(keys):
+        if found.setdefault(key, k) < k:
+            raise SceneError(f"{name}[{k}]{said[k]} is there already as {name}[{found[key]}]; leave one of them out")
 
 
-def each(name: str, rows: Iterable[Any], what: str) -> Iterator[tuple[int, Any]]:
-    """The rows of an argument with their numbers; an array's as lists."""
+def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """The name, as links[3], and the parts of each row of an argument.
+
+    The parts are of one kind, as "numbers of points", or each has a name, as "(i, j, stiffness, rest length)".
+    """
+    named = parts.startswith("(")
     try:
         for k, row in enumerate(rows):
-            yield k, row.tolist() if isinstance(row, np.ndarray) else row
+            given = row.tolist() if isinstance(row, np.ndarray) else row
+            where = f"{name}[{k}]"
+            yield where, checks.entries(where, given, width, f"{width} {'values ' * named}{parts}")
     except TypeError:
-        raise SceneError(f"{name} must be {what}, got {checks.shown(rows)}") from None
+        expected = f"rows {parts}" if named else f"rows of {width} {parts}"
+        raise SceneError(f"{name} must be {expected}, got {checks.shown(rows)}") from None
 
 
 def links(rows: Iterable[Any], places: Floats) -> Pairs:
@@ -191,17 +184,16 @@ def _at_one_place(first: Floats, second: Floats) -> bool:
 def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
     """`rows` as springs (i, j, stiffness, rest length)."""
     result = []
-    for k, row in each("springs", rows, "rows (i, j, stiffness, rest length)"):
-        given = entries(f"springs[{k}]", row, 4, "values (i, j, stiffness, rest length)")
-        i, j = (point(f"springs[{k}][{n}]", given[n], len(places)) for n in range(2))
+    for row, given in each("springs", rows, 4, "(i, j, stiffness, rest length)"):
+        i, j = (point(f"{row}[{n}]", given[n], len(places)) for n in range(2))
         if i == j:
-            raise SceneError(f"springs[{k}] must name 2 different points, got {(i, j)}")
-        stiffness = checks.positive(f"springs[{k}][2], its stiffness,", given[2])
-        rest = checks.magnitude(f"springs[{k}][3], its rest length,", given[3])
-        checks.magnitude(f"springs[{k}][2], its stiffness,", stiffness)
+            raise SceneError(f"{row} must name 2 different points, got {(i, j)}")
+        stiffness = checks.positive(f"{row}[2], its stiffness,", given[2])
+        rest = checks.magnitude(f"{row}[3], its rest length,", given[3])
+        checks.magnitude(f"{row}[2], its stiffness,", stiffness)
         if rest > 0.0 and _at_one_place(places[i], places[j]):
             raise SceneError(
-                f"springs[{k}] must tie points at different places, got {(i, j)}, both at {places[i].tolist()}, and a "
+                f"{row} must tie points at different places, got {(i, j)}, both at {places[i].tolist()}, and a "
                 f"rest length of {rest:g} m: its force has no direction there"
             )
         result.append((i, j, stiffness, rest))
@@ -220,7 +212,7 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
     if rows.ndim == 1:
         chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
         # Faster than rows that are compared.
-        _require_once(chosen)
+        _require_once("contacts", chosen, [""] * len(chosen))
         rows = np.eye(count)[chosen]
     if rows.ndim != 2 or rows.shape[1] != count:
         raise SceneError(f"contacts must be numbers of points or have shape (K, {count}), got shape {rows.shape}")
@@ -233,13 +225,5 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
     can_move = (np.delete(rows, sorted(held), axis=1) != 0.0).any(axis=1)
     for k in np.flatnonzero(~can_move)[:1]:
         raise SceneError(f"contacts[{k}] must be able to move, got one made of anchored points alone; leave it out")
-    _require_once([row.tobytes() for row in rows + 0.0])
+    _require_once("contacts", (row.tobytes() for row in rows + 0.0), [""] * len(rows))
     return rows
-
-
-def _require_once(given: list[Any]) -> None:
-    found: dict[Any, int] = {}
-    for k, one in enumerate(given):
-        first = found.setdefault(one, k)
-        if first < k:
-            raise SceneError(f"contacts[{k}] is there already as contacts[{first}]; leave one of them out")

@@ -88,7 +88,7 @@ def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs
     ((12, 3), (12, 4))
     """
     edges = [checks.length(f"lengths[{i}]", part) for i, part in enumerate(checks.vector("lengths", lengths))]
-    counts = [checks.count(f"cells[{i}]", n) for i, n in enumerate(checked.entries("cells", cells, 3, "numbers"))]
+    counts = [checks.count(f"cells[{i}]", n) for i, n in enumerate(checks.entries("cells", cells, 3, "3 numbers"))]
     room.require(math.prod(count + 1 for count in counts))
     axes = [edge * (np.arange(count + 1) / count - 0.5) for edge, count in zip(edges, counts, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -108,7 +108,6 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
     if not isinstance(mesh, (tuple, list)) or len(mesh) != 2:
         raise SceneError(f"mesh must be two arrays (nodes, elements), got {type(mesh).__name__}")
     nodes = checked.points("nodes", mesh[0])
-    room.require(len(nodes))
     elements = checked.numbers("elements", mesh[1], 4, len(nodes))  # type: ignore[arg-type]
     if not len(elements):
         raise SceneError("elements must hold at least one tetrahedron, got none")

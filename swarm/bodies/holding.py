@@ -11,7 +11,7 @@ from ..motion import Motion
 from ..particles import Floats
 from ..surfaces.fields.many import Many
 from ..surfaces.surface import SIDES, Surface
-from .checked import each, entries, point
+from .checked import each, point
 
 # How far from its surface a guided point may start, relative to the surface's size.
 _ON_SURFACE = 1e-9
@@ -51,15 +51,13 @@ def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tupl
     """`rows` as (point, surface), each point on its surface."""
     held = set(anchored)
     result = []
-    for k, row in each("guides", rows, "rows (point, surface)"):
-        given = entries(f"guides[{k}]", row, 2, "values (point, surface)")
-        number = point(f"guides[{k}][0]", given[0], len(places))
-        surface = _smooth(f"guides[{k}][1]", given[1])
+    for row, given in each("guides", rows, 2, "(point, surface)"):
+        number, surface = point(f"{row}[0]", given[0], len(places)), _smooth(f"{row}[1]", given[1])
         if surface.friction > 0.0:
-            raise SceneError(f"guides[{k}].friction must be 0, a guide has none, got {surface.friction:g}")
+            raise SceneError(f"{row}.friction must be 0, a guide has none, got {surface.friction:g}")
         if number in held:
-            raise SceneError(f"guides[{k}] must hold a point that can move, got {number}, which is anchored")
-        on_surface(f"guides[{k}]: point {number}", surface, places[number, :, None])
+            raise SceneError(f"{row} must hold a point that can move, got {number}, which is anchored")
+        on_surface(f"{row}: point {number}", surface, places[number, :, None])
         result.append((number, surface))
     return tuple(result)
 
@@ -81,16 +79,15 @@ def on_surface(name: str, surface: Surface, places: Floats) -> None:
 def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
     """`rows` as (surface, carrier, point), each point on the admissible side."""
     result = []
-    for k, row in each("cavities", rows, "rows (surface, carrier, point)"):
-        given = entries(f"cavities[{k}]", row, 3, "values (surface, carrier, point)")
-        surface = _smooth(f"cavities[{k}][0]", given[0])
-        carrier, held = (point(f"cavities[{k}][{n}]", given[n], len(places)) for n in (1, 2))
+    for row, given in each("cavities", rows, 3, "(surface, carrier, point)"):
+        surface = _smooth(f"{row}[0]", given[0])
+        carrier, held = (point(f"{row}[{n}]", given[n], len(places)) for n in (1, 2))
         if carrier == held:
-            raise SceneError(f"cavities[{k}] must name a carrier and another point, got {carrier} for both")
+            raise SceneError(f"{row} must name a carrier and another point, got {carrier} for both")
         gap = SIDES[getattr(surface, "side", "inside")] * surface.phi((places[held] - places[carrier])[:, None])[0]
         if not gap <= 0.0:
             raise SceneError(
-                f"cavities[{k}]: point {held} must start on the admissible side of its surface, got a gap of "
+                f"{row}: point {held} must start on the admissible side of its surface, got a gap of "
                 f"{gap:.3g}; the surface's origin is point {carrier}"
             )
         result.append((surface, carrier, held))

@@ -17,9 +17,9 @@ from .checked import Pairs
 
 
 def ties_of(body: Body, penalty: float | None = None) -> Ties:
-    """What ties its points; with a penalty its links are held by multipliers of Uzawa's loop."""
+    """The ties of its points; with a penalty its links are held by multipliers of Uzawa's loop."""
     ends = body.bonds()
-    links, springs, edges = len(body.links), len(body.springs), 0 if body.strain is None else len(body.strain.edges)
+    links, springs, edges = len(body.links), len(body.springs), len(body.strained())
     relaxed = 0 if penalty is None else links
     if penalty is not None:
         # After the springs: like them they have a stiffness of their own.
@@ -35,9 +35,7 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
         compliance = np.asarray(2.0 * np.linalg.inv(body.strain.stiffness), dtype=np.float64)
     is_free = np.ones(len(body), np.bool_)
     is_free[list(body.anchors)] = False
-    free = np.flatnonzero(is_free)
-    inverse = np.zeros((len(body), len(body)))
-    inverse[np.ix_(free, free)] = np.linalg.inv(body.mass_matrix[np.ix_(free, free)])
+    inverse = body.inverse_mass()
     is_diagonal = bool((inverse == np.diag(np.diag(inverse))).all())
     rows = np.concatenate([_differences(ends, len(body)), _combinations(body)])
     couplings = rows @ inverse @ rows.T
@@ -46,8 +44,8 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
     filled = couplings[np.ix_(held, held)] != 0.0
     filled[links + springs : ties, links + springs : ties] = True
     start = np.array([np.flatnonzero(row[: k + 1]).min(initial=k) for k, row in enumerate(filled)], np.int64)
-    led = np.full(len(body), -1)
-    led[led_points(body)] = np.arange(len(led_points(body)))
+    led, paths = np.full(len(body), -1), led_points(body)
+    led[paths] = np.arange(len(paths))
     return Ties(
         ends, links - relaxed, springs + relaxed, relaxed, rest, stiffness, give, compliance, start,
         inverse, body.mass_matrix, is_diagonal, is_free, led, couplings,
@@ -61,10 +59,8 @@ def led_points(body: Body) -> list[int]:
 
 def _differences(ends: Pairs, points: int) -> Floats:
     """(rows, P) +1 at the first point of each pair, -1 at the second."""
-    rows = np.zeros((len(ends), points))
-    every = np.arange(len(ends))
-    rows[every, ends[:, 0]], rows[every, ends[:, 1]] = 1.0, -1.0
-    return rows
+    unit = np.eye(points)
+    return np.asarray(unit[ends[:, 0]] - unit[ends[:, 1]])
 
 
 def _combinations(body: Body) -> Floats:
@@ -75,7 +71,7 @@ def _combinations(body: Body) -> Floats:
 
 
 def walls_of(method: Method) -> Soft | None:
-    """What the walls are: None for rigid ones."""
+    """The law of soft walls; None for rigid ones."""
     if method.is_rigid():
         return None
     law = method.law()
@@ -88,7 +84,7 @@ def walls_of(method: Method) -> Soft | None:
 
 
 def most_contacts_of(touching: Touching, walls: Soft | None) -> int:
-    """How many contacts of a body are solved at once: where walls are springs all that there can be."""
+    """Number of a body's contacts that are solved at once: where walls are springs, all that there can be."""
     if walls is None or walls.is_cut:
         return MOST_CONTACTS
     return max(1, touching.points * touching.walls + len(touching.plain) - touching.points - touching.guides)

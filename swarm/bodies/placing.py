@@ -4,6 +4,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import SceneError
+from ..filling import bounding_box
 from ..particles import Floats
 from ..scene import Scene
 from .body import Body
@@ -15,6 +16,7 @@ _BATCH = 1 << 19
 _TRIES = 20_000_000
 # How many points of each side and link are kept out of solids, which can be between corners.
 _SAMPLES = 8
+_INSTEAD = "swarm.Bodies(body, position, velocity)"
 
 
 def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float = 0.0, seed: int = 0) -> Bodies:
@@ -40,9 +42,13 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     >>> place(cavity, swarm.tetrahedron(edge=0.1, mass=1.0), 10, speed=0.5, spin=3.0, seed=1)
     Bodies(10 of 4 points)
     """
-    if not isinstance(scene, Scene):
-        raise SceneError(f"scene must be a swarm.Scene, got {checks.shown(scene)}")
-    _require_free(body)
+    checks.of_class("scene", scene, Scene)
+    checks.of_class("body", body, Body)
+    for name in ("anchors", "guides", "cavities"):
+        if getattr(body, name):
+            raise SceneError(
+                f"place needs a body that can be anywhere, got one with {name}; give its place: {_INSTEAD}"
+            )
     n = checks.count("n", n)
     checks.particles_fit("n", n * len(body))
     speed, spin = checks.magnitude("speed", speed), checks.magnitude("spin", spin)
@@ -56,17 +62,6 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     weights = body.mass_matrix.sum(axis=1)
     arms = _turned(turns, body.points - weights @ body.points / weights.sum())
     return Bodies(body, position, velocity + spin * np.cross(_directions(random, n)[:, None], arms, axis=0))
-
-
-def _require_free(body: Body) -> None:
-    if not isinstance(body, Body):
-        raise SceneError(f"body must be a swarm.Body, got {checks.shown(body)}")
-    for name in ("anchors", "guides", "cavities"):
-        if getattr(body, name):
-            raise SceneError(
-                f"place needs a body that can be anywhere, got one with {name}; give its place: swarm.Bodies(body, "
-                "position, velocity)"
-            )
 
 
 def _probes(scene: Scene, body: Body) -> Floats:
@@ -83,12 +78,7 @@ def _probes(scene: Scene, body: Body) -> Floats:
 
 def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Rotation matrices (3, 3, n), and where the middles (3, n) of the probes are, of n copies within the walls."""
-    low, high = (np.array(corner)[:, None] for corner in scene.bounds())
-    if not np.isfinite(high - low).all():
-        raise SceneError(
-            "place needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or give "
-            "the bodies as arrays: swarm.Bodies(body, position, velocity)"
-        )
+    low, high = bounding_box(scene, "place", f"the bodies as arrays: {_INSTEAD}")
     arms = probes - probes.mean(axis=0)
     count = len(arms)
     turns, middles, found, tried = np.empty((3, 3, n)), np.empty((3, n)), 0, 0
@@ -111,7 +101,7 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
             raise SceneError(
                 f"place found {found} places in {tried} tries for a body that is {extent:.3g} m wide, in a scene of "
                 f"{' x '.join(f'{edge:.3g}' for edge in (high - low).ravel())} m; make it smaller, or give its place: "
-                "swarm.Bodies(body, position, velocity)"
+                f"{_INSTEAD}"
             )
     return turns, middles
 

@@ -1,4 +1,4 @@
-"""How large a body may be: its matrices are full, so its size counts squared."""
+"""The largest size of a body: its matrices are full, so its number of points counts squared."""
 
 from .. import checks
 from ..errors import SceneError

@@ -55,8 +55,7 @@ class Bodies:
         velocities.require_agreed(body, self.position, self.velocity, project)
 
     def _take(self, body: Body, position: ArrayLike, velocity: ArrayLike) -> None:
-        if not isinstance(body, Body):
-            raise SceneError(f"body must be a swarm.Body, got {checks.shown(body)}")
+        checks.of_class("body", body, Body)
         self.body = body
         self.position = _rows("position", position, len(body))
         self.velocity = _rows("velocity", velocity, len(body))

@@ -42,8 +42,7 @@ class Strain:
             raise SceneError(f"strain.rest[{k}] must be above 0, got {rest[k]:g}")
         stiffness = checked.symmetric("strain.stiffness", _shaped("strain.stiffness", self.stiffness, (size, size)))
         checked.not_negative("strain.stiffness", stiffness)
-        for name, value in (("edges", edges), ("rest", rest), ("stiffness", stiffness)):
-            object.__setattr__(self, name, value)
+        checks.assign(self, edges=edges, rest=rest, stiffness=stiffness)
 
     def energy(self, points: Floats) -> Floats:
         """V [J] of points (3, P), or of n copies (3, P, n)."""

@@ -4,26 +4,29 @@ A table of the kind "points" has the arguments of `Body`, every number exactly; 
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from .. import checks, tables
 from ..checks import Vector
 from ..errors import SceneError
+from ..motion import Oscillation, Rotation, Translation
+from ..motion import table_of as motion_table
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
-from . import room
+from . import room, shapes
 from .body import Body
+from .elastic import block, elastic
+from .placing import place
+from .state import Bodies
 from .strain import Strain
 
-if TYPE_CHECKING:
-    from .state import Bodies
-
-_MOTIONS = ("translation", "oscillation", "rotation")
+T = TypeVar("T")
+_MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation}
 
 
 # --- Keys of [body] ---------------------------------------------------------------------------------------
@@ -33,6 +36,8 @@ _MOTIONS = ("translation", "oscillation", "rotation")
 class Made:
     """Keys of every kind of [body]: how many copies there are, and how they are placed."""
 
+    # The function that makes the body of the other keys.
+    maker: ClassVar[Callable[..., Body]]
     count: int | None = None
     speed: float | None = None
     spin: float | None = None
@@ -44,16 +49,15 @@ class Made:
 
     def body(self) -> Body:
         """The body that is described."""
-        raise NotImplementedError
+        own = [field.name for field in dataclasses.fields(self) if field.name not in Made.__dataclass_fields__]
+        return type(self).maker(**{name: getattr(self, name) for name in own})
 
-    def start(self, scene: Scene) -> "Bodies":
+    def start(self, scene: Scene) -> Bodies:
         """The copies at the start.
 
         Raises:
             SceneError: a value is out of its range, or the copies cannot be placed.
         """
-        from .placing import place
-
         if self.count is None:
             raise SceneError("count: expected a whole number, got nothing; add count = ...")
         body = self.body()
@@ -65,59 +69,39 @@ class Made:
 class Dumbbell(Made):
     """Arguments of `dumbbell`."""
 
+    maker = shapes.dumbbell
     length: float
     mass: float
-
-    def body(self) -> Body:
-        """Two points and a link."""
-        from .shapes import dumbbell
-
-        return dumbbell(self.length, self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tetrahedron(Made):
     """Arguments of `tetrahedron`."""
 
+    maker = shapes.tetrahedron
     edge: float
     mass: float
-
-    def body(self) -> Body:
-        """Four points and six links."""
-        from .shapes import tetrahedron
-
-        return tetrahedron(self.edge, self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chain(Made):
     """Arguments of `chain`."""
 
+    maker = shapes.chain
     n: int
     length: float
     mass: float
-
-    def body(self) -> Body:
-        """n points in a line, each linked to the next."""
-        from .shapes import chain
-
-        return chain(self.n, self.length, self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rigid(Made):
     """Arguments of `rigid`."""
 
+    maker = shapes.rigid
     vertices: tuple[Vector, ...]
     density: float
     faces: tuple[tuple[int, int, int], ...] | None = None
     contacts: float | tuple[Vector, ...] | None = None
-
-    def body(self) -> Body:
-        """A polyhedron."""
-        from .shapes import rigid
-
-        return rigid(self.vertices, self.density, self.faces, self.contacts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,8 +117,6 @@ class Elastic(Made):
 
     def body(self) -> Body:
         """A block of tetrahedra."""
-        from .elastic import block, elastic
-
         return elastic(block(self.lengths, self.cells), self.young, self.poisson, self.density, self.mass)
 
 
@@ -167,15 +149,16 @@ class Points(Made):
             mass_matrix=self.mass_matrix,
             strain=None if self.strain is None else tables.convert(self.strain, _Strain, "strain").strain(),
             anchors=_anchors(self.anchors),
-            guides=_each("guides", self.guides, _guide),
-            cavities=_each("cavities", self.cavities, _cavity),
+            guides=[(guide.point, guide.surface) for guide in _surfaces("guides", self.guides, _Guide)],
+            cavities=[
+                (cavity.surface, cavity.carrier, cavity.point)
+                for cavity in _surfaces("cavities", self.cavities, _Cavity)
+            ],
             faces=self.faces,
         )
 
-    def start(self, scene: Scene) -> "Bodies":
+    def start(self, scene: Scene) -> Bodies:
         """The copies at the start, or the one where its points are."""
-        from .state import Bodies
-
         if self.count is not None:
             for name in ("velocity", "project"):
                 if getattr(self, name):
@@ -230,41 +213,25 @@ class _Cavity:
     point: int
 
 
-def _each(name: str, given: tuple[Any, ...], read: Callable[[Any, str], Any]) -> list[Any]:
-    return [read(table, f"{name}[{k}]") for k, table in enumerate(given)]
-
-
 def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
-    found = _each("anchors", given, _anchor)
-    points = [point for point, _motion in found]
-    for k, point in enumerate(points):
-        if point in points[:k]:
-            raise SceneError(f"anchors[{k}] is of point {point}, as anchors[{points.index(point)}]; remove one of them")
-    return dict(found)
+    """The motions of points, or None where a table has no kind."""
+    found: dict[int, Any] = {}
+    for k, table in enumerate(given):
+        where = f"anchors[{k}]"
+        if not isinstance(table, dict) or type(table.get("point")) is not int:
+            raise SceneError(f"{where}: expected a table with the number of a point, got {checks.shown(table)}")
+        point, motion = table["point"], {key: value for key, value in table.items() if key != "point"}
+        if point in found:
+            raise SceneError(f"{where} is of point {point}, as anchors[{list(found).index(point)}]; remove one of them")
+        found[point] = tables.of_kind(motion, where, _MOTIONS) if motion else None
+    return found
 
 
-def _anchor(table: Any, where: str) -> tuple[int, Any]:
-    """A point, and the motion that leads it, if the table has a kind."""
-    if not isinstance(table, dict) or type(table.get("point")) is not int:
-        raise SceneError(f"{where}: expected a table with the number of a point, got {checks.shown(table)}")
-    motion = {key: value for key, value in table.items() if key != "point"}
-    return table["point"], tables.of_kind(motion, where, _motions()) if motion else None
-
-
-def _guide(table: Any, where: str) -> tuple[int, Any]:
-    found = tables.convert(table, _Guide, where)
-    return found.point, tables.of_kind(found.surface, f"{where}.surface", ALL_SURFACES)
-
-
-def _cavity(table: Any, where: str) -> tuple[Any, int, int]:
-    found = tables.convert(table, _Cavity, where)
-    return tables.of_kind(found.surface, f"{where}.surface", ALL_SURFACES), found.carrier, found.point
-
-
-def _motions() -> dict[str, type[Any]]:
-    from .. import motion
-
-    return {kind: getattr(motion, kind.capitalize()) for kind in _MOTIONS}
+def _surfaces(name: str, given: tuple[Any, ...], cls: type[T]) -> Iterator[T]:
+    """Tables as guides or cavities, each with its surface."""
+    for k, table in enumerate(given):
+        found: Any = tables.convert(table, cls, f"{name}[{k}]")
+        yield dataclasses.replace(found, surface=tables.of_kind(found.surface, f"{name}[{k}].surface", ALL_SURFACES))
 
 
 # --- To a table -------------------------------------------------------------------------------------------
@@ -294,7 +261,10 @@ def table_of(body: Body) -> dict[str, Any]:
         "links": body.links.tolist(),
         "springs": [list(spring) for spring in body.springs],
         "contacts": _contacts(body.contacts),
-        "anchors": [{"point": point, **_motion(motion)} for point, motion in body.anchors.items()],
+        "anchors": [
+            {"point": point, **({} if motion is None else motion_table(motion))}
+            for point, motion in body.anchors.items()
+        ],
         "guides": [{"point": point, "surface": tables.table_of(surface)} for point, surface in body.guides],
         "cavities": [
             {"surface": tables.table_of(surface), "carrier": carrier, "point": point}
@@ -318,7 +288,3 @@ def _contacts(rows: Floats) -> list[Any]:
     numbers = rows.argmax(axis=1)
     same = (rows == np.eye(rows.shape[1])[numbers]).all()
     return list(numbers.tolist() if same else rows.tolist())
-
-
-def _motion(motion: Any) -> dict[str, Any]:
-    return {} if motion is None else {"kind": type(motion).__name__.lower(), **dataclasses.asdict(motion)}

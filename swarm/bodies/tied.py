@@ -1,15 +1,16 @@
-"""Whether a body can move as its links and its led points ask: which links are redundant, which paths too long."""
+"""The ties of a body, links and guides: which of them are redundant, and which paths of led points are too long."""
 
 import heapq
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import SceneError
 from ..motion import Led, Motion, led
 from ..particles import Floats
-from .checked import Pairs
+from ..surfaces.surface import Surface
+from .checked import Pairs, modes_unless_above
 
 # Links depend on each other where their directions agree to the square root of this: their system of equations has
 # the inverse of it as condition, and multipliers have no digit then.
@@ -28,23 +29,60 @@ _INSTANTS, _PERIODS = 4001, 20.0
 _NAMED = 12
 
 
+class Tie(NamedTuple):
+    """A link or a guide: along its normal its point has no velocity, or its two points have the same.
+
+    Attributes:
+        name: "links[0]" or "guides[0]".
+        points: the two points of a link, or the one in a guide.
+        normal: (3, n) unit vectors of n copies; a link's is that of its first point, its second has the opposite.
+        surface: of the guide.
+    """
+
+    name: str
+    points: tuple[int, ...]
+    normal: Floats
+    surface: Surface | None = None
+
+    def ends(self) -> Iterator[tuple[int, float]]:
+        """Its points, each with the sign of its normal."""
+        return zip(self.points, (1.0, -1.0), strict=False)
+
+
+def ties(links: Pairs, guides: Sequence[tuple[int, Surface]], position: Floats) -> Iterator[Tie]:
+    """The links and guides of n copies whose points are at `position` (3, P, n)."""
+    # One at a time: of many copies each is large.
+    for k, (i, j) in enumerate(links.tolist()):
+        yield Tie(f"links[{k}]", (i, j), _unit(position[:, i] - position[:, j]))
+    for k, (point, surface) in enumerate(guides):
+        slope = surface.gradient(np.ascontiguousarray(position[:, point]))
+        yield Tie(f"guides[{k}]", (point,), _unit(slope), surface)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.maximum(np.sqrt((vectors**2).sum(axis=0)), np.finfo(np.float64).tiny))
+
+
 def require_independent(
-    points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]]
+    points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Surface]]
 ) -> None:
     """Raise unless the forces of links and guides are determined: their directions must be independent."""
-    left = _left(points, links, anchors, guides)
-    null = _dependences(points, links, anchors, guides, left)
-    if not null.shape[1]:
+    given = list(ties(links, guides, points.T[:, :, None]))
+    left = _left(given, anchors, len(points))
+    null = _dependences([given[k] for k in left], anchors)
+    excess = null.shape[1]
+    if not excess:
         return
-    names = [f"links[{k}] {tuple(pair)}" for k, pair in enumerate(links.tolist())]
-    names += [f"guides[{k}] (point {guide[0]})" for k, guide in enumerate(guides)]
+    names = [
+        f"{tie.name} {tie.points}" if tie.surface is None else f"{tie.name} (point {tie.points[0]})" for tie in given
+    ]
     involved = [names[k] for k, row in zip(left, np.abs(null), strict=True) if row.max() > _SHARE]
     said = ", ".join(involved[:_NAMED]) + (f" and {len(involved) - _NAMED} more" if len(involved) > _NAMED else "")
     # Somewhere else the same links may be independent: then it is the place of the points that is special.
     size = np.ptp(points, axis=0).max()
     elsewhere = points + 0.1 * size * np.random.default_rng(0).standard_normal(points.shape)
-    excess = null.shape[1]
-    if _dependences(elsewhere, links, anchors, guides, left).shape[1] < excess:
+    moved = list(ties(links, guides, elsewhere.T[:, :, None]))
+    if _dependences([moved[k] for k in left], anchors).shape[1] < excess:
         raise SceneError(
             f"links and guides must be independent, got {said}, whose directions depend on each other where the points "
             "are (in a line or in a plane, say): their forces are not determined; leave out "
@@ -56,69 +94,44 @@ def require_independent(
     )
 
 
-def _direction(
-    points: Floats, links: Pairs, guides: Sequence[tuple[int, Any]], number: int
-) -> tuple[tuple[int, ...], Floats]:
-    """The points of a link, or of a guide by numbers after those of links, and its direction, of the first."""
-    if number < len(links):
-        i, j = links[number].tolist()
-        return (i, j), points[i] - points[j]
-    point, surface = guides[number - len(links)]
-    return (point,), surface.gradient(points[point, :, None])[:, 0]
-
-
-def _left(points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]]) -> list[int]:
-    """The constraints whose independence is not seen point by point: of a chain or a tree none.
+def _left(given: Sequence[Tie], anchors: Mapping[int, Any], count: int) -> list[int]:
+    """The ties of one body whose independence is not seen point by point: of a chain or a tree none.
 
     Where those at a point, at most three, are clearly independent of each other, no others can be combined to cancel
     them there: they take part in no dependence, and are left out, with what that frees at their other ends.
     """
-    at: list[dict[int, Floats]] = [{} for _point in points]
-    ends = {}
-    for number in range(len(links) + len(guides)):
-        held, direction = _direction(points, links, guides, number)
-        length = np.sqrt((direction**2).sum())
-        ends[number] = held
-        for point in held:
-            if point not in anchors:
-                at[point][number] = direction / max(length, np.finfo(np.float64).tiny)
-    left, waiting = dict.fromkeys(range(len(ends))), list(range(len(points)))
+    at: list[dict[int, Floats]] = [{} for _point in range(count)]
+    for number, tie in enumerate(given):
+        for point in set(tie.points) - set(anchors):
+            at[point][number] = tie.normal[:, 0]
+    left, waiting = dict.fromkeys(range(len(given))), list(range(count))
     while waiting:
         point = waiting.pop()
         rows = np.array(list(at[point].values()))
         if 0 < len(rows) <= 3 and np.linalg.eigvalsh(rows @ rows.T)[0] > _CLEAR:
             for number in list(at[point]):
                 del left[number]
-                for end in ends[number]:
+                for end in given[number].points:
                     at[end].pop(number, None)
                     waiting.append(end)
     return list(left)
 
 
-def _dependences(
-    points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Any]], chosen: Sequence[int]
-) -> Floats:
-    """(chosen, D) combinations of the directions of these constraints that vanish."""
-    if not chosen:
-        return np.zeros((0, 0))
-    given = [_direction(points, links, guides, number) for number in chosen]
-    free = sorted({point for held, _direction in given for point in held} - set(anchors))
+def _dependences(given: Sequence[Tie], anchors: Mapping[int, Any]) -> Floats:
+    """(ties, D) combinations of the directions of ties of one body that vanish."""
+    free = sorted({point for tie in given for point in tie.points} - set(anchors))
     place = {point: k for k, point in enumerate(free)}
-    directions = np.zeros((len(chosen), len(free), 3))
-    for row, (held, direction) in zip(directions, given, strict=True):
-        for point, sign in zip(held, (1.0, -1.0), strict=False):
+    directions = np.zeros((len(given), len(free), 3))
+    for row, tie in zip(directions, given, strict=True):
+        for point, sign in tie.ends():
             if point in place:
-                row[place[point]] = sign * direction
-    rows = directions.reshape(len(directions), -1)
+                row[place[point]] = sign * tie.normal[:, 0]
+    rows = directions.reshape(len(given), 3 * len(free))
     rows /= np.maximum(np.sqrt((rows**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
-    products, size = rows @ rows.T, len(rows)
-    try:
-        # Far faster than eigenvalues: it ends well where all are above this, round-off and all.
-        np.linalg.cholesky(products - (10.0 * _DEPENDENT + 8.0 * size * np.finfo(np.float64).eps) * np.eye(size))
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(products)
-        return np.asarray(vectors[:, values < _DEPENDENT])
-    return np.zeros((size, 0))
+    # All clearly independent where no eigenvalue is below this, round-off and all.
+    bound = 10.0 * _DEPENDENT + 8.0 * len(given) * np.finfo(np.float64).eps
+    modes = modes_unless_above(bound, rows @ rows.T) if given else None
+    return np.zeros((len(given), 0)) if modes is None else modes[1][:, modes[0] < _DEPENDENT]
 
 
 def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion | None]) -> None:

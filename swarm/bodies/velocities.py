@@ -1,10 +1,7 @@
-"""Whether the velocities of bodies agree with what holds their points: links, guides, and paths of anchored points.
+"""Velocities of bodies that agree with links, guides, and the paths of anchored points.
 
 A stage keeps lengths by lambda, so velocities along a link that contradict it turn at each step and never vanish.
 """
-
-from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,32 +9,13 @@ from ..errors import SceneError
 from ..motion import led
 from ..particles import Floats
 from .body import Body
+from .tied import Tie, ties
 
 # How exactly velocities must agree with ties, relative to the fastest point of the copy: as exactly as lengths do, by
 # which the directions of ties are known. What turns at each step is then 1e-18 of the kinetic energy.
 _AGREED = 1e-9
 # Of a projection: corrections, each of which takes all but the round-off of the equations from what is left.
 _CORRECTIONS = 3
-
-
-class Tie(NamedTuple):
-    """What holds a point, or two: along its normal they have no velocity, or the same.
-
-    Attributes:
-        name: where it holds, for errors.
-        points: the point, or the two points of a link.
-        normal: (3, n) of each copy; a link's is that of the first point, its second has the opposite.
-    """
-
-    name: str
-    points: tuple[int, ...]
-    normal: Floats
-
-    def speed(self, velocity: Floats) -> Floats:
-        """(n,) along the normal [m/s], of velocities (3, P, n): what must be 0."""
-        first, *second = self.points
-        relative = velocity[:, first] - velocity[:, second[0]] if second else velocity[:, first]
-        return np.asarray((self.normal * relative).sum(axis=0))
 
 
 def led_along(body: Body, position: Floats, velocity: Floats) -> Floats:
@@ -70,8 +48,8 @@ def led_along(body: Body, position: Floats, velocity: Floats) -> Floats:
 def require_agreed(body: Body, position: Floats, velocity: Floats, projected: bool) -> None:
     """Raise a `SceneError` where a point has a velocity that its link or guide does not let it have."""
     fastest = _fastest(velocity)
-    for tie in _ties(body, position):
-        speeds = np.abs(tie.speed(velocity))
+    for tie in ties(body.links, body.guides, position):
+        speeds = np.abs(_speed(tie, velocity))
         off = speeds > _AGREED * fastest
         for copy in np.flatnonzero(off)[:1]:
             hint = (
@@ -79,9 +57,14 @@ def require_agreed(body: Body, position: Floats, velocity: Floats, projected: bo
                 if projected
                 else "give velocities that agree, or project=True, for the nearest that do"
             )
+            where = (
+                f"along {tie.name}, {tie.points}"
+                if tie.surface is None
+                else f"of point {tie.points[0]} across {tie.name}, {tie.surface!r:.80}"
+            )
             raise SceneError(
                 f"velocity must agree with links and guides to {_AGREED:g} of the fastest point, got "
-                f"{speeds[copy]:.6g} m/s {tie.name}, in copy {copy} ({off.sum()} such), whose fastest point has "
+                f"{speeds[copy]:.6g} m/s {where}, in copy {copy} ({off.sum()} such), whose fastest point has "
                 f"{fastest[copy]:.6g} m/s; {hint}"
             )
 
@@ -91,19 +74,16 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
 
     v - W J^T (J W J^T)^-1 J v, of the inverse W of the masses of points that can move, and the ties' J v = 0.
     """
-    ties, made = list(_ties(body, position)), velocity.copy()
-    if not ties:
+    held, made, inverse = list(ties(body.links, body.guides, position)), velocity.copy(), body.inverse_mass()
+    if not held:
         return made
-    free = np.setdiff1d(np.arange(len(body)), list(body.anchors))
-    inverse = np.zeros((len(body), len(body)))
-    inverse[np.ix_(free, free)] = np.linalg.inv(body.mass_matrix[np.ix_(free, free)])
     for copy in range(position.shape[2]):
-        rows = np.zeros((len(ties), len(body), 3))
-        for row, tie in zip(rows, ties, strict=True):
-            for point, sign in zip(tie.points, (1.0, -1.0), strict=False):
+        rows = np.zeros((len(held), len(body), 3))
+        for row, tie in zip(rows, held, strict=True):
+            for point, sign in tie.ends():
                 row[point] += sign * tie.normal[:, copy]
         pushed = np.einsum("pq,aqx->apx", inverse, rows)
-        flat = rows.reshape(len(ties), -1)
+        flat = rows.reshape(len(held), -1)
         # In units of each tie's own, so that a light point beside a heavy one is no singularity.
         unit = 1.0 / np.sqrt(np.maximum((flat * pushed.reshape(flat.shape)).sum(axis=1), np.finfo(np.float64).tiny))
         system = unit[:, None] * (flat @ pushed.reshape(flat.shape).T) * unit
@@ -114,16 +94,9 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
     return made
 
 
-def _ties(body: Body, position: Floats) -> Iterator[Tie]:
-    # One at a time: of many copies each is large.
-    for k, (i, j) in enumerate(body.links.tolist()):
-        apart = position[:, i] - position[:, j]
-        normal = apart / np.sqrt((apart**2).sum(axis=0))
-        yield Tie(f"along links[{k}], {(i, j)}", (i, j), normal)
-    for k, (point, surface) in enumerate(body.guides):
-        slope = surface.gradient(np.ascontiguousarray(position[:, point]))
-        normal = slope / np.sqrt((slope**2).sum(axis=0))
-        yield Tie(f"of point {point} across guides[{k}], {surface!r:.80}", (point,), normal)
+def _speed(tie: Tie, velocity: Floats) -> Floats:
+    """(n,) along the normal of a tie [m/s], of velocities (3, P, n): what must be 0."""
+    return np.asarray((tie.normal * sum(sign * velocity[:, point] for point, sign in tie.ends())).sum(axis=0))
 
 
 def _fastest(velocity: Floats) -> Floats:

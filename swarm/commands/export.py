@@ -7,10 +7,11 @@ from typing import Annotated
 import typer
 
 from ..errors import SceneError
+from .shown import TrajectoryFile, written
 
 
 def export(
-    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    file: TrajectoryFile,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf for ParaView, OUT.xyz or OUT.gsd.")
     ],
@@ -34,12 +35,12 @@ def export(
     hidden = not sys.stderr.isatty()
     with load(file) as trajectory, Progress(console=Console(stderr=True), transient=True, disable=hidden) as bar:
         task = bar.add_task("frames")
-        written = trajectory.export(
+        files = trajectory.export(
             output, chosen, particles, surfaces, overwrite,
             lambda done, total: bar.update(task, completed=done, total=total),
         )  # fmt: skip
-    for path in written:
-        print(f"written to {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    for path in files:
+        written(path)
 
 
 def _frames(text: str) -> slice | int:

@@ -6,10 +6,11 @@ from typing import Annotated
 import typer
 
 from ..errors import SceneError
+from .shown import Picture, TrajectoryFile, written
 
 
 def record(
-    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    file: TrajectoryFile,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
     ] = None,
@@ -30,14 +31,12 @@ def record(
     paths.check_distinct({"recording": target}, {"trajectory": file})
     with load(file) as trajectory:
         recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
-    print(f"written to {target} ({target.stat().st_size / 1e6:.1f} MB)")
+    written(target)
 
 
 def view(
     file: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="A recording.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
-    ] = None,
+    output: Picture = None,
     times: Annotated[
         str | None, typer.Option(help="Frames near these times [s], as 0,5,10 [default: first, middle, last].")
     ] = None,
@@ -62,12 +61,7 @@ def view(
     print(f"written to {target}; drawn by {by}")
 
 
-def plot(
-    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")
-    ] = None,
-) -> None:
+def plot(file: TrajectoryFile, output: Picture = None) -> None:
     """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
     from ..extras import needed_by
 
@@ -83,7 +77,7 @@ def plot(
 
 
 def animate(
-    file: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")],
+    file: TrajectoryFile,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.mp4", help="Film, .mp4 or .gif [default: FILE.mp4].")
     ] = None,
@@ -97,8 +91,8 @@ def animate(
 
     target = output or file.with_suffix(".mp4")
     with load(file) as trajectory:
-        written = trajectory.animate(target, frames=frames, fps=fps, particles=particles, overwrite=overwrite)
-    print(f"written to {written} ({written.stat().st_size / 1e6:.1f} MB)")
+        film = trajectory.animate(target, frames=frames, fps=fps, particles=particles, overwrite=overwrite)
+    written(film)
 
 
 def _check_picture(target: Path, source: Path) -> None:

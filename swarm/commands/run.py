@@ -1,9 +1,7 @@
 """`swarm run`: simulate a scene file."""
 
 import dataclasses
-import itertools
 import json
-import shlex
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,11 +10,7 @@ import typer
 
 from .. import interrupt
 from ..errors import CompleteError, SwarmError, WallTimeError
-from .shown import table
-
-# Exit codes of what is stopped: that of a shell for SIGINT; EX_TEMPFAIL of sysexits.h, "try again later", where the
-# wall time is over, by which a chain of jobs knows that another one is needed.
-INTERRUPTED, OUT_OF_TIME = 130, 75
+from .shown import EXIT_CODES, REASONS, Quiet, command_again, table
 
 
 def run(  # noqa: PLR0913  one argument an option
@@ -35,7 +29,7 @@ def run(  # noqa: PLR0913  one argument an option
     ] = None,
     live: Annotated[bool, typer.Option("--live", help="Show the run in a Rerun viewer.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+    quiet: Quiet = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
     ] = False,
@@ -94,11 +88,10 @@ def run(  # noqa: PLR0913  one argument an option
             # Before particles are made and kernels compiled.
             inputs = {"scene file": scene_file, "file of the start": job.start_file()}
             paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
-            paths.check_target(target, overwrite or resume)
-            if options.impacts is not None:
-                paths.check_target(options.impacts, overwrite or resume, "impacts")
-            if options.recording is not None:
-                paths.check_target(options.recording, overwrite, "recording")
+            replaces = {"trajectory": overwrite or resume, "impacts": overwrite or resume, "recording": overwrite}
+            for name, replaced in replaces.items():
+                if (file := getattr(options, name)) is not None:
+                    paths.check_target(file, replaced, name)
             before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
         result = carry_out(job.scene, start, job.method, options)
@@ -108,11 +101,8 @@ def run(  # noqa: PLR0913  one argument an option
         with interrupt.at_once():
             has_frames = target.exists() and (resumes or paths.identity(target) != before)
             again = _stopped(status, target, has_frames, cluster is not None)
-            if has_frames:
-                report(status, target, resume=again)
-            else:
-                report(status, frames=0, resume=again)
-        raise typer.Exit(OUT_OF_TIME if status == "walltime" else INTERRUPTED) from None
+            report(status, target if has_frames else None, **({} if has_frames else {"frames": 0}), resume=again)
+        raise typer.Exit(EXIT_CODES[status]) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
         report("complete", target)
@@ -129,7 +119,7 @@ def _stopped(status: str, target: Path, has_frames: bool, on_cluster: bool) -> s
     """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
     from ..output import paths
 
-    reason = "interrupted" if status == "interrupted" else "the wall time limit is reached"
+    reason = REASONS[status]
     if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):
         print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
         return None
@@ -137,16 +127,6 @@ def _stopped(status: str, target: Path, has_frames: bool, on_cluster: bool) -> s
     if not paths.checkpoint_of(target).exists():
         print(f"{held}; there was no time for a checkpoint to resume from", file=sys.stderr)
         return None
-    command = shlex.join(["swarm", *arguments_again(sys.argv[1:]), "--resume"])
+    command = command_again()
     print(f"{held}; resume with\n  {command}", file=sys.stderr)
     return command
-
-
-def arguments_again(words: list[str]) -> list[str]:
-    """The arguments of this command, without those that do not apply to a resumed run."""
-    again: list[str] = []
-    for before, word in itertools.pairwise(["", *words]):
-        name = word.partition("=")[0]
-        if name not in ("--overwrite", "--resume", "--live", "--record") and before != "--record":
-            again.append(word)
-    return again

@@ -1,4 +1,36 @@
-"""What commands print."""
+"""Parts of several commands: arguments, output, and the command that goes on with what was stopped."""
+
+import itertools
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+TrajectoryFile = Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")]
+Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
+
+# Exit codes of what is stopped: that of a shell for SIGINT; EX_TEMPFAIL of sysexits.h, "try again later", where the
+# wall time is over, by which a chain of jobs knows that another one is needed.
+EXIT_CODES = {"interrupted": 130, "walltime": 75}
+REASONS = {"interrupted": "interrupted", "walltime": "the wall time limit is reached"}
+
+
+def written(path: Path) -> None:
+    """Print where a file is, and its size."""
+    print(f"written to {path} ({path.stat().st_size / 1e6:.1f} MB)")
+
+
+def command_again() -> str:
+    """This command as it goes on with what it began, without the options that do not apply to that."""
+    again = [
+        word
+        for before, word in itertools.pairwise(["", *sys.argv[1:]])
+        if word.partition("=")[0] not in ("--overwrite", "--resume", "--live", "--record") and before != "--record"
+    ]
+    return shlex.join(["swarm", *again, "--resume"])
 
 
 def table(rows: dict[str, str]) -> None:

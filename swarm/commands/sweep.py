@@ -1,7 +1,6 @@
 """`swarm sweep`: carry out the runs of a sweep file."""
 
 import json
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,8 +9,7 @@ import typer
 
 from .. import interrupt
 from ..errors import SwarmError
-from .run import INTERRUPTED, OUT_OF_TIME, arguments_again
-from .shown import table
+from .shown import EXIT_CODES, REASONS, Quiet, command_again, table
 
 if TYPE_CHECKING:
     from ..ensemble.sweeping import Outcome
@@ -34,7 +32,7 @@ def sweep(  # noqa: PLR0913  one argument an option
         str, typer.Option("--table", metavar="KIND", help="Table of the results: csv or parquet.")
     ] = "csv",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the runs that the folder holds.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")] = False,
+    quiet: Quiet = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
     ] = False,
@@ -59,7 +57,7 @@ def sweep(  # noqa: PLR0913  one argument an option
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
             print(json.dumps({"status": "interrupted"}))
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(EXIT_CODES["interrupted"]) from None
     except SwarmError as error:
         if as_json:
             print(json.dumps({"status": "failed", "error": str(error)}))
@@ -67,7 +65,7 @@ def sweep(  # noqa: PLR0913  one argument an option
     with interrupt.at_once():
         _report(outcome, quiet, as_json)
     if outcome.stopped:
-        raise typer.Exit(OUT_OF_TIME if outcome.stopped == "walltime" else INTERRUPTED)
+        raise typer.Exit(EXIT_CODES[outcome.stopped])
     if outcome.results.of_state("failed"):
         raise typer.Exit(_FAILED)
 
@@ -81,11 +79,10 @@ def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
         (results.trajectory(variant).name, variant.parameters, (status or {})["error"])
         for variant, status in results.of_state("failed")
     ]
-    again = None
-    if outcome.stopped:
-        again = shlex.join(["swarm", *arguments_again(sys.argv[1:]), "--resume"])
-        reason = "interrupted" if outcome.stopped == "interrupted" else "the wall time limit is reached"
-        print(f"{reason}: {numbers['waiting']} runs are left; resume with\n  {again}", file=sys.stderr)
+    again = command_again() if outcome.stopped else None
+    if again is not None:
+        said = f"{REASONS[outcome.stopped]}: {numbers['waiting']} runs are left; resume with\n  {again}"
+        print(said, file=sys.stderr)
     if others := results.others():
         print(
             f"{results.folder} also holds {len(others)} run{'s' * (len(others) > 1)} that {results.plan.path} does not "

@@ -37,6 +37,9 @@ class Hand:
         except OSError as error:
             self._printed.close()
             raise RunError(f"a worker process cannot be started: {error}") from error
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._orders, self._messages = self._process.stdin, self._process.stdout
 
     def is_alive(self) -> bool:
         """Whether the process runs."""
@@ -69,29 +72,26 @@ class Hand:
 
     def close(self) -> None:
         """Let the process end, which has no run."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
+        for pipe in (self._orders, self._messages):
             with contextlib.suppress(OSError):
                 pipe.close()
         self._process.wait()
         self._printed.close()
 
     def _write(self, message: Any) -> None:
-        assert self._process.stdin is not None
         with self._writing:
-            self._process.stdin.write(json.dumps(message) + "\n")
-            self._process.stdin.flush()
+            self._orders.write(json.dumps(message) + "\n")
+            self._orders.flush()
 
     def _read(self) -> dict[str, Any] | None:
         """The next message; None when the process has ended."""
-        assert self._process.stdout is not None
         try:
-            return dict(json.loads(self._process.stdout.readline()))
+            return dict(json.loads(self._messages.readline()))
         except (OSError, ValueError):  # the end, or half of a line
             return None
 
     def _death(self) -> str:
-        """How the process ended, in a sentence."""
+        """The end of the process, in a sentence."""
         code = self._process.wait()
         size = self._printed.seek(0, os.SEEK_END)
         self._printed.seek(max(0, size - _LAST))

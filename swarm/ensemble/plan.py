@@ -122,17 +122,15 @@ def _flat(table: Document, before: str = "") -> Iterator[tuple[str, Any]]:
 
 def _values(where: str, given: Any) -> list[Any]:
     """The values of a list, or of a table such as {range = 20}."""
-    values: list[Any]
+    if not isinstance(given, (dict, list)):
+        raise SceneError(f"{where}: expected a list of values, or one of {listed(_MAKERS)} in a table, got {given!r}")
+    values: Any = given
     if isinstance(given, dict):
         ((name, numbers),) = given.items()
         values = _MAKERS[name](f"{where}.{name}", numbers)
-    elif isinstance(given, list):
-        values = given
-    else:
-        raise SceneError(f"{where}: expected a list of values, or one of {listed(_MAKERS)} in a table, got {given!r}")
     if not values:
         raise SceneError(f"{where}: expected at least one value, got none")
-    return values
+    return list(values)
 
 
 def _range(where: str, given: Any) -> list[Any]:
@@ -147,15 +145,11 @@ def _range(where: str, given: Any) -> list[Any]:
     return list(made)
 
 
-def _spaced(where: str, given: Any) -> list[Any]:
-    return [float(value) for value in np.linspace(*_ends(where, given))]
-
-
 def _geometric(where: str, given: Any) -> list[Any]:
     first, last, n = _ends(where, given)
     if first * last <= 0.0:
         raise SceneError(f"{where}: expected a first and a last number of one sign, neither of them 0, got {given!r}")
-    return [float(value) for value in np.geomspace(first, last, n)]
+    return list(map(float, np.geomspace(first, last, n)))
 
 
 def _ends(where: str, given: Any) -> tuple[float, float, int]:
@@ -167,15 +161,19 @@ def _ends(where: str, given: Any) -> tuple[float, float, int]:
     return number(f"{where}[0]", given[0]), number(f"{where}[1]", given[1]), n
 
 
-_MAKERS: dict[str, Callable[[str, Any], list[Any]]] = {"range": _range, "linspace": _spaced, "geomspace": _geometric}
+_MAKERS: dict[str, Callable[[str, Any], list[Any]]] = {
+    "range": _range,
+    "linspace": lambda where, given: list(map(float, np.linspace(*_ends(where, given)))),
+    "geomspace": _geometric,
+}
 
 
 def _combined(lists: dict[str, list[Any]], way: str) -> Iterator[dict[str, Any]]:
     """The parameters of every run: of a product the last key changes first."""
     lengths = {key: len(values) for key, values in lists.items()}
     if way == "zip":
-        (first, n), *others = lengths.items()
-        for key, length in others:
+        first, n = next(iter(lengths.items()))
+        for key, length in lengths.items():
             if length != n:
                 raise SceneError(
                     f'sweep: combine = "zip" needs lists of the same length, got {n} values of "{first}" and {length} '
@@ -197,8 +195,7 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list
     # stands for those that are known to be right.
     right: set[str] = set()
     last: Scene | None = None
-    variants: list[Variant] = []
-    known: dict[str, Variant] = {}
+    variants: dict[str, Variant] = {}
     for parameters in rows:
         own = _with(document, parameters)
         try:
@@ -219,16 +216,15 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list
                     + ("; swarm record makes a recording of a trajectory" if name == "recording" else "")
                 )
         stem = _digest(own, path, contents)
-        run = job.run
-        made = Variant(len(variants), parameters, stem, _kind(own), run.compile, run.impacts is not None)
-        if stem in known:
+        kind = _digest_of(_unnumbered(own))
+        made = Variant(len(variants), parameters, stem, kind, job.run.compile, job.run.impacts is not None)
+        if stem in variants:
             raise SceneError(
-                f"sweep: the runs with {told(known[stem].parameters)} and with {told(parameters)} are the same; remove "
-                "the value that comes twice or makes no difference"
+                f"sweep: the runs with {told(variants[stem].parameters)} and with {told(parameters)} are the same; "
+                "remove the value that comes twice or makes no difference"
             )
-        variants.append(made)
-        known[stem] = made
-    return variants
+        variants[stem] = made
+    return list(variants.values())
 
 
 def _with(document: Document, parameters: Mapping[str, Any]) -> Document:
@@ -271,7 +267,7 @@ def _attributed(sentence: str, parameters: Mapping[str, Any], k: int, n: int) ->
 
 
 def _digest(document: Document, path: Path, contents: dict[Path, str]) -> str:
-    """What identifies a run: its tables, and the contents of the files that they name."""
+    """The digest of a run: of its tables, and of the contents of the files that they name."""
     what = {**document, "run": {key: value for key, value in document["run"].items() if key not in _WITHOUT_EFFECT}}
     files = []
     for name in _named_files(document):
@@ -294,12 +290,8 @@ def _named_files(place: Any) -> Iterator[str]:
             yield value
 
 
-def _kind(document: Document) -> str:
-    """The tables without their numbers."""
-    return _digest_of(_unnumbered(document))
-
-
 def _unnumbered(value: Any) -> Any:
+    """A table, or what is in it, without numbers."""
     if isinstance(value, dict):
         return {key: _unnumbered(one) for key, one in value.items()}
     if isinstance(value, list):

@@ -18,7 +18,7 @@ _WORTH = 20.0
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is: numbers of runs, and the sum of the shares that the running ones have done."""
+    """The progress of a sweep: numbers of runs, and the sum of the shares that the running ones have done."""
 
     all: int
     done: int
@@ -66,7 +66,7 @@ class Pool:
             hand.kill()
 
     def progress(self) -> Progress:
-        """How far the runs are."""
+        """The progress of the runs."""
         with self._lock:
             sentence, self._sentence = self._sentence, ""
             return Progress(
@@ -129,7 +129,9 @@ class Pool:
         with self._lock:
             self._shares[variant.number] = 0.0
             choice = variant.compile
-            if choice == "auto" and self._runs and self._remaining() > _WORTH:
+            # Seconds until the end, at the pace of the runs that have ended.
+            left = self._seconds / max(self._runs, 1) * len(self._left) / self._processes
+            if choice == "auto" and left > _WORTH:
                 choice = "always"
         order = {
             "text": self._results.plan.text(variant),
@@ -145,10 +147,8 @@ class Pool:
         else:
             status = hand.carry_out(order, lambda message: self._tell(variant, message))
         if status["state"] == "stopped" and not self._stops:
-            status |= {
-                "state": "failed",
-                "error": "its process was told to end (SIGTERM); a resumed sweep goes on with it",
-            }
+            error = "its process was told to end (SIGTERM); a resumed sweep goes on with it"
+            status |= {"state": "failed", "error": error}
         has_ended = status["state"] == "done" or (status["state"] == "failed" and not self._stops)
         if has_ended:
             self._results.add(variant, status)
@@ -158,10 +158,6 @@ class Pool:
                 self._ended[status["state"]] += 1
                 self._runs += 1
                 self._seconds += status["wall_time"] or 0.0
-
-    def _remaining(self) -> float:
-        """Seconds until the end at the pace of the runs that have ended."""
-        return self._seconds / self._runs * len(self._left) / self._processes
 
     def _tell(self, variant: Variant, message: dict[str, Any]) -> None:
         with self._lock:

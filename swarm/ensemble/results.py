@@ -37,7 +37,7 @@ def of_trajectory(path: Path, until: float) -> dict[str, int | float] | None:
 
 
 class Results:
-    """What is known of the runs of a plan, in memory and in the folder.
+    """The outcomes of the runs of a plan, in memory and in the folder.
 
     Args:
         plan: the runs.
@@ -61,7 +61,7 @@ class Results:
         return self.folder / f"{variant.stem}.impacts.h5" if variant.has_impacts else None
 
     def status_file(self, variant: Variant) -> Path:
-        """Where its end is noted."""
+        """The file that notes its end."""
         return self.folder / f"{variant.stem}.json"
 
     def find(self) -> None:
@@ -93,7 +93,7 @@ class Results:
     def of_state(self, state: str) -> list[tuple[Variant, Status | None]]:
         """The runs that are "done", "failed", or "waiting" (have not ended), and what is known of them."""
         every = [(variant, self._statuses.get(variant.stem)) for variant in self.plan.variants]
-        return [(variant, status) for variant, status in every if (status or {"state": "waiting"})["state"] == state]
+        return [(variant, status) for variant, status in every if (status["state"] if status else "waiting") == state]
 
     def others(self) -> list[str]:
         """The runs in the folder that the plan does not have."""
@@ -107,12 +107,9 @@ class Results:
         for variant in self.plan.variants:
             status = self._statuses.get(variant.stem, {})
             parameters = {key: self._written[key](value) for key, value in variant.parameters.items()}
-            about = {
-                "state": status.get("state", "waiting"),
-                "error": status.get("error"),
-                "wall_time": status.get("wall_time"),
-            }
-            made.append({"file": self.trajectory(variant).name, **parameters, **about, **status.get("observables", {})})
+            about: Status = {"state": "waiting", "error": None, "wall_time": None, "observables": {}} | status
+            observables = about.pop("observables")
+            made.append({"file": self.trajectory(variant).name, **parameters, **about, **observables})
         return made
 
     def frame(self) -> Any:
@@ -127,12 +124,11 @@ class Results:
         rows = self.rows()
         with replaced(self.path, "table") as file:
             if self.path.suffix == ".csv":
-                text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+                text = io.StringIO(newline="")
                 writer = csv.DictWriter(text, _columns(rows), lineterminator="\n")
                 writer.writeheader()
                 writer.writerows(rows)
-                text.flush()
-                text.detach()
+                file.write(text.getvalue().encode())
             else:
                 self.frame().to_parquet(file, engine="pyarrow", index=False)
 
@@ -151,7 +147,7 @@ def _columns(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _written_as(values: list[Any]) -> Callable[[Any], Any]:
-    """What makes values of one type of the values of a column; of those that no column holds their JSON."""
+    """The function that makes values of one type of those of a column; JSON where no column holds them."""
     kinds = {_type_of(value) for value in values}
     if kinds == {"whole", "number"}:
         return float
@@ -164,6 +160,6 @@ def _written_as(values: list[Any]) -> Callable[[Any], Any]:
 
 
 def _type_of(value: Any) -> str | None:
-    """What values of one type are; None for lists and tables."""
+    """The name of the type of a value; None for lists and tables."""
     kinds = {bool: "truth", int: "whole", float: "number", str: "text"}
     return next((name for kind, name in kinds.items() if isinstance(value, kind)), None)

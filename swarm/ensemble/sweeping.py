@@ -29,7 +29,7 @@ _TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """How a sweep is carried out; `sweep` describes each, `walltime` as of `simulate`."""
+    """The options of a sweep; `sweep` describes each, `walltime` as of `simulate`."""
 
     folder: str | os.PathLike[str] | None = None
     processes: int | None = None
@@ -146,14 +146,8 @@ def _require_free(results: Results, options: SweepOptions) -> None:
         raise SceneError(f"folder: expected the name of a folder, got the file {folder}")
     if options.resume or options.overwrite or not folder.exists():
         return
-    plan = results.plan
-    there = [
-        path
-        for variant in plan.variants
-        for path in (results.trajectory(variant), results.status_file(variant))
-        if path.exists()
-    ]
-    if there or results.others() or results.path.exists():
+    files = (file(run) for run in results.plan.variants for file in (results.trajectory, results.status_file))
+    if results.path.exists() or results.others() or any(file.exists() for file in files):
         raise SceneError(
             f"folder: {folder} holds the runs of a sweep; go on with them (--resume, resume=True), replace them "
             "(--overwrite, overwrite=True), or choose another folder"

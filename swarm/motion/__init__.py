@@ -1,4 +1,4 @@
-"""How points that are led, and walls, move in time: the motions that a user gives, and where a wall then is."""
+"""Motions of led points and of walls: those that a user gives, and the poses of walls that follow."""
 
 from .given import Led, Motion, Oscillation, Rotation, Sum, Translation, led, parts_of, unit_axis
 from .poses import Pose, displacement, pose

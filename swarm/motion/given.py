@@ -83,7 +83,7 @@ class Translation(Given):
     velocity: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "velocity", vector_of("velocity", self.velocity))
+        checks.assign(self, velocity=vector_of("velocity", self.velocity))
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -111,17 +111,15 @@ class Oscillation(Given):
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", vector_of("amplitude", self.amplitude))
-        frequency = checks.positive("frequency", self.frequency)
+        amplitude, frequency = vector_of("amplitude", self.amplitude), checks.positive("frequency", self.frequency)
         checks.magnitude("frequency", frequency)
-        object.__setattr__(self, "frequency", frequency)
         phase = checks.number("phase", self.phase)
         if abs(phase) > LARGEST_ANGLE:
             raise SceneError(
                 f"phase must be from {-LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad, got {phase:g}, next to which float64 "
                 f"numbers are {math.ulp(phase):.1g} rad apart; take it modulo 2 pi"
             )
-        object.__setattr__(self, "phase", phase)
+        checks.assign(self, amplitude=amplitude, frequency=frequency, phase=phase)
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -156,11 +154,8 @@ class Rotation(Given):
     instead: ClassVar[str] = "about one axis their rates add up to that of a single one"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", axis_of(self.axis))
-        rate = checks.number("rate", self.rate)
-        checks.magnitude("|rate|", abs(rate))
-        object.__setattr__(self, "rate", rate)
-        object.__setattr__(self, "center", vector_of("center", self.center))
+        axis, rate = axis_of(self.axis), checks.bounded("rate", self.rate)
+        checks.assign(self, axis=axis, rate=rate, center=vector_of("center", self.center))
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -192,7 +187,7 @@ class Sum(Given):
         parts = tuple(part for one in self.parts for part in parts_of(one))
         if not parts or not all(isinstance(one, Given) for one in parts):
             raise SceneError(f"a sum must have motions as its parts, at least one, got {self.parts!r:.200}")
-        object.__setattr__(self, "parts", parts)
+        checks.assign(self, parts=parts)
         for kind in dict.fromkeys(type(one) for one in parts):
             count = sum(isinstance(one, kind) for one in parts)
             if count > kind.most:
@@ -202,7 +197,7 @@ class Sum(Given):
 
 
 def parts_of(motion: Any) -> tuple[Any, ...]:
-    """What a motion is the sum of; nothing of None."""
+    """The parts of a sum, or the motion itself; nothing of None."""
     if motion is None:
         return ()
     return motion.parts if isinstance(motion, Sum) else (motion,)
@@ -248,11 +243,9 @@ def axis_of(value: Vector) -> Vector:
 
 
 def vector_of(name: str, value: Vector) -> Vector:
-    """`value` as three numbers of an admissible size."""
-    parts = checks.vector(name, value)
-    for i, part in enumerate(parts):
-        checks.magnitude(f"|{name}[{i}]|", abs(part))
-    return parts
+    """`value` as three numbers whose squares are finite."""
+    x, y, z = (checks.bounded(f"{name}[{i}]", part) for i, part in enumerate(checks.vector(name, value)))
+    return x, y, z
 
 
 def point_of(start: ArrayLike) -> Floats:

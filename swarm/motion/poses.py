@@ -1,4 +1,4 @@
-"""Where a wall is that moves.
+"""Poses of walls that move.
 
 A wall that is given at rest as the points xi is at time t where
     x(t) = c + d(t) + A(t) (xi - c),
@@ -15,7 +15,7 @@ from .wall import Guide, Path, Placed, WallMotion
 
 
 class Pose(NamedTuple):
-    """Where a wall is: x = center + shift + turn (xi - center)."""
+    """The place and orientation of a wall: x = center + shift + turn (xi - center)."""
 
     shift: Floats  # (3,) [m]
     turn: Floats  # (3, 3)
@@ -23,7 +23,7 @@ class Pose(NamedTuple):
     quaternion: tuple[float, float, float, float]  # of the turn, (w, x, y, z)
 
     def position(self) -> Floats:
-        """Where the origin of the frame in which the wall is given is now, (3,)."""
+        """The place (3,) of the origin of the frame in which the wall is given."""
         return np.asarray(self.center + self.shift - _product(self.turn, self.center))
 
     def placed(self, points: Floats) -> Floats:
@@ -42,7 +42,7 @@ class Pose(NamedTuple):
 
 
 def pose(motion: "WallMotion | None", time: float) -> Pose:
-    """Where a wall with this motion is at a time [s]."""
+    """The pose of a wall with this motion at a time [s]."""
     found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
     for one in parts_of(motion):
         if isinstance(one, Placed):

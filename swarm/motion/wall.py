@@ -39,13 +39,12 @@ class Path(Given):
 
     def __post_init__(self) -> None:
         times = _times(self.times)
-        object.__setattr__(self, "times", times)
         if isinstance(self.positions, (str, bytes)) or not isinstance(self.positions, Iterable):
             raise SceneError(f"positions must be three numbers for each of the times, got {self.positions!r:.200}")
         places = tuple(vector_of(f"positions[{k}]", place) for k, place in enumerate(self.positions))
         if len(places) != len(times):
             raise SceneError(f"positions must be one for each of the {len(times)} times, got {len(places)}")
-        object.__setattr__(self, "positions", places)
+        checks.assign(self, times=times, positions=places)
         with np.errstate(all="ignore"):
             large = ~(np.abs(self.cubics()) <= checks.LARGEST).all(axis=(0, 1))
         if large.any():
@@ -109,14 +108,11 @@ class Guide(Given):
     instead: ClassVar[str] = "impacts move the wall along it and nothing else does; give it alone"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", axis_of(self.axis))
-        speed = checks.number("speed", self.speed)
-        checks.magnitude("|speed|", abs(speed))
-        object.__setattr__(self, "speed", speed)
-        object.__setattr__(self, "stiffness", checks.magnitude("stiffness", self.stiffness))
+        axis, speed = axis_of(self.axis), checks.bounded("speed", self.speed)
+        checks.assign(self, axis=axis, speed=speed, stiffness=checks.magnitude("stiffness", self.stiffness))
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """Where a point of the wall is before anything moves it."""
+        """The path of a point of the wall before anything moves it: none."""
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
@@ -190,11 +186,9 @@ def _times(value: ArrayLike) -> tuple[float, ...]:
     """`value` as the times of a path."""
     times = checks.array("times", value)
     if times.ndim != 1 or times.size < 2:
-        came = f"{times.size}" if times.ndim == 1 else f"an array of shape {times.shape}"
+        came = times.size if times.ndim == 1 else f"an array of shape {times.shape}"
         raise SceneError(f"times must be a list of at least two numbers, got {came}")
-    parts = [checks.number(f"times[{k}]", part) for k, part in enumerate(times.tolist())]
-    for k, part in enumerate(parts):
-        checks.magnitude(f"|times[{k}]|", abs(part))
+    parts = [checks.bounded(f"times[{k}]", part) for k, part in enumerate(times.tolist())]
     for k, (one, other) in enumerate(itertools.pairwise(parts)):
         if not one < other:
             raise SceneError(f"times must ascend, got times[{k}] = {one:g} before times[{k + 1}] = {other:g}")

@@ -88,9 +88,10 @@ def test_points_alone_say_the_same_as_all_together(seed):
     anchors = dict.fromkeys(random.permutation(count)[: int(random.integers(0, 3))].tolist())
     links = np.array([pair for pair in links.tolist() if not set(pair) <= set(anchors)]).reshape(-1, 2)
     guides = [(int(p), swarm.Plane(random.standard_normal(3), 0.0)) for p in range(count) if p not in anchors][:2]
-    whole = tied._dependences(points, links, anchors, guides, range(len(links) + len(guides)))
-    left = tied._left(points, links, anchors, guides)
-    null = tied._dependences(points, links, anchors, guides, left)
+    given = list(tied.ties(links, guides, points.T[:, :, None]))
+    whole = tied._dependences(given, anchors)
+    left = tied._left(given, anchors, count)
+    null = tied._dependences([given[k] for k in left], anchors)
     assert null.shape[1] == whole.shape[1]
     # The same space: what is left out has no share, and projections agree.
     spread = np.zeros((len(whole), null.shape[1]))

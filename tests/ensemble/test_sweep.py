@@ -1,5 +1,6 @@
 """Sweeps as a whole, with real worker processes and real kills. In plain Python: nothing here depends on the tier."""
 
+import itertools
 import json
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 from sweep_sessions import RUNNING, assert_the_same_table, until_there_is, write
 
 import swarm
-from swarm.ensemble import results
+from swarm.ensemble import results, sweeping
 from swarm.ensemble.sweeping import SweepOptions, carry_out
 from swarm.output import paths
 
@@ -115,15 +116,15 @@ def test_a_worker_that_dies_fails_its_run_alone(tmp_path):
     path = write(tmp_path / "sweep.toml", '"run.until" = [1.0, 1e8, 1.5]', run="frames = 1")
     path.write_text(path.read_text().replace("every = 0.5\n", ""))
     frames = []
-    sweeping = threading.Thread(target=lambda: frames.append(swarm.sweep(path, tmp_path / "out", processes=1)))
-    sweeping.start()
+    running = threading.Thread(target=lambda: frames.append(swarm.sweep(path, tmp_path / "out", processes=1)))
+    running.start()
     # The first has ended, and the second has begun.
     until_there_is(lambda: list((tmp_path / "out").glob("[!.]*.json")))
     until_there_is(lambda: len(list((tmp_path / "out").glob("[!.]*.h5"))) == 2)
     for worker in psutil.Process().children():
         if "swarm.ensemble.worker" in " ".join(worker.cmdline()):
             worker.kill()
-    sweeping.join(RUNNING)
+    running.join(RUNNING)
     (frame,) = frames
     assert frame["state"].tolist() == ["done", "failed", "done"]
     assert "SIGKILL" in frame["error"][1]
@@ -135,11 +136,13 @@ def test_killed_and_resumed_the_table_is_the_same(tmp_path):
     assert_the_same_table(tmp_path, kinds, np.random.default_rng(1), longest=0.3)
 
 
-def test_the_wall_time_ends_a_sweep(tmp_path):
-    """Also while its workers start."""
+def test_the_wall_time_ends_a_sweep(tmp_path, monkeypatch):
+    """Also while its workers start: an hour is over when it is asked for the time again."""
+    clock = itertools.chain([0.0], itertools.repeat(3600.0))
+    monkeypatch.setattr(sweeping, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
     path.write_text(path.read_text().replace("every = 0.5\n", ""))
-    outcome = carry_out(path, SweepOptions(tmp_path / "out", walltime=0.5))
+    outcome = carry_out(path, SweepOptions(tmp_path / "out", walltime=3600.0))
     assert outcome.stopped == "walltime"
     assert [row["state"] for row in outcome.results.rows()] == ["waiting", "waiting"]
     assert (tmp_path / "out" / "results.csv").exists()

@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm import rows, scene_file, tables
+from swarm import checks, scene_file, tables
 from swarm.errors import SceneError
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
@@ -197,7 +197,7 @@ def test_bad_bodies_are_told(build, parts):
 
 def test_a_hundred_million_bodies_are_told_what_memory_they_take(monkeypatch):
     """Before it is tried: of those that are turned ten times as much as of balls."""
-    monkeypatch.setattr(rows, "memory", lambda: 16_000_000_000)
+    monkeypatch.setattr(checks, "memory", lambda: 16_000_000_000)
     places = np.broadcast_to(0.0, (10**8, 3))
     for build, said in ((swarm.Spheres, "30 GB"), (swarm.Cylinders, "300 GB")):
         with pytest.raises(SceneError, match=rf"got 1e\+08 bodies, which take {said}; this machine has 16 GB"):

@@ -31,19 +31,21 @@ class _Writer:
 
     # --- Expressions ---
 
-    def f(self, depth=0):
-        if depth >= _DEEPEST:
-            return self.pick(lambda: self.one("f"), lambda: self.random.choice(_FLOATS))
+    def number(self, kind, depth, signs, *ways):
+        """A name, a literal, or, unless it is deep already, two numbers with a sign between them or another way."""
+        number, literals = {"f": (self.f, _FLOATS), "i": (self.i, _INTS)}[kind]
+        short = (lambda: self.one(kind), lambda: self.random.choice(literals))
 
         def two(sign):
-            return lambda: f"({self.f(depth + 1)} {sign} {self.f(depth + 1)})"
+            return lambda: f"({number(depth + 1)} {sign} {number(depth + 1)})"
 
-        return self.pick(
-            lambda: self.one("f"),
-            lambda: self.random.choice(_FLOATS),
-            *map(two, ("+", "-", "*", "/")),
-            two("+"),
-            two("*"),
+        return self.pick(*short) if depth >= _DEEPEST else self.pick(*short, *map(two, signs), *ways)
+
+    def f(self, depth=0):
+        return self.number(
+            "f",
+            depth,
+            ("+", "-", "*", "/", "+", "*"),
             lambda: f"({self.f(depth + 1)} {self.random.choice('+-*/')} {self.i(depth + 1)})",
             lambda: f"(-{self.f(depth + 1)})",
             lambda: f"abs({self.f(depth + 1)})",
@@ -60,16 +62,10 @@ class _Writer:
         )
 
     def i(self, depth=0):
-        if depth >= _DEEPEST:
-            return self.pick(lambda: self.one("i"), lambda: self.random.choice(_INTS))
-
-        def two(sign):
-            return lambda: f"({self.i(depth + 1)} {sign} {self.i(depth + 1)})"
-
-        return self.pick(
-            lambda: self.one("i"),
-            lambda: self.random.choice(_INTS),
-            *map(two, ("+", "-", "*", "&", "|", "^")),
+        return self.number(
+            "i",
+            depth,
+            ("+", "-", "*", "&", "|", "^"),
             lambda: f"({self.i(depth + 1)} // {self.random.choice((2, 3, -2))})",
             lambda: f"({self.i(depth + 1)} % {self.random.choice((2, 3, -5))})",
             lambda: f"(-{self.i(depth + 1)})",

@@ -16,6 +16,7 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.registry import default_manager
 from numba.core.typing.templates import Signature
+from test_helpers import loop_with_else
 
 import swarm
 from swarm.kernel import cache, jit, parts
@@ -229,15 +230,6 @@ def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
     assert min(asked) > 0
 
 
-def untraceable(x):
-    for k in range(3):
-        if k > x:
-            break
-    else:
-        return -1.0
-    return x + k
-
-
 def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_path):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     made = []
@@ -246,11 +238,11 @@ def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_pat
         monkeypatch.setattr(
             parts._Part, step, lambda self, *given, ours=ours, step=step: made.append(step) or ours(self, *given)
         )
-    helper = jit.inlined(untraceable)
+    helper = jit.inlined(loop_with_else)
     assert jit.kernel(calls_it)(1.0) == 3.0
-    assert helper is untraceable
+    assert helper is loop_with_else
     assert set(made) == {"_optimize_final_module", "_finalize_final_module", "get_pointer_to_function"}
 
 
 def calls_it(x):
-    return untraceable(x)
+    return loop_with_else(x)
