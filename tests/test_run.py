@@ -123,7 +123,7 @@ def test_at_its_end_a_run_is_halted_for_good():
     run.halt(1000)
     status, _particle, left = run._share(10.0)
     assert status == Status.INTERRUPTED
-    assert (left.rows[lanes.LEFT] == 10.0).all()
+    assert (left.time_left() == 10.0).all()
 
 
 def test_a_frame_whose_time_is_over_is_halted():

@@ -15,8 +15,8 @@ from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
-from ..lanes import compose, meet, slide
 from ..lanes import log as impact_log
+from ..lanes import meet, slide, sliding, table
 from ..lanes.arrays import booked
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles
@@ -214,7 +214,7 @@ class Run:
     def _empty_lanes(self) -> lanes.Lanes:
         made = lanes.empty(len(self._owners), self._booked, self.state.period)
         watched = self._impacts is not None or self._tally is not None
-        return made._replace(before=lanes.table(impact_log.ROWS)) if watched else made
+        return made._replace(before=table.table(impact_log.ROWS)) if watched else made
 
     def observe(self) -> None:
         """Observe the start: every particle is there."""
@@ -251,7 +251,7 @@ class Run:
 
     def share_done(self, span: float) -> float:
         """How much of a frame that was cut short is done, on average over the particles."""
-        left = self._halted.rows[lanes.LEFT]
+        left = self._halted.time_left()
         if self.state.contacts is not None:
             left = np.append(left, self.state.contacts.left[self.state.contacts.left > 0.0])
         return float((self._phase == ARRIVED).sum() + (1.0 - left / span).sum()) / len(self._phase)
@@ -292,7 +292,7 @@ class Run:
                 self._gravity,
                 share,
             )
-        mine = compose.empty(self.state.period, self.state.openings)
+        mine = sliding.empty(self.state.period, self.state.openings)
         return slide.slide_block, (_KINDS[phase], self._numbers, self._chain, self._gravity, share, mine)
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
