@@ -1,4 +1,4 @@
-"""The accounts of a particle's energy: the share of walls that move in a change of it, and the loss."""
+"""The accounts of a particle's energy: the shares of walls that move or are hot, and the loss."""
 
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
@@ -42,3 +42,11 @@ def book_step(chain, state, i, wall, change, given, loses):
     else:
         # What is left is round-off.
         book_work(chain, state, i, wall, after - before - given)
+
+
+def book_heat(state, i, wall, before, after):
+    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
+    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
+    pending = state.energy[i] - 0.5 * before
+    state.energy[i] = 0.5 * after + pending
+    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]

@@ -287,14 +287,6 @@ def move(chain, lanes, source, target):
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-def heat(state, i, wall, before, after):
-    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
-    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
-    pending = state.energy[i] - 0.5 * before
-    state.energy[i] = 0.5 * after + pending
-    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]
-
-
 def speed2_scale(state, i):
     """The square of the speed that a particle's energy scale is that of."""
     scale = state.inverse_scale[i]

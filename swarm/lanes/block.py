@@ -18,8 +18,8 @@ from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from . import log as impact_log
+from .accounts import book_heat
 from .arrays import following_particle, goes_on_by, leave, load, move, retire
-from .arrays import heat as book_heat
 from .escape import let_out_lanes
 from .fly import go
 from .picked import of_lane, pick, picks

@@ -17,9 +17,8 @@ from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from ..surfaces.near import count_near, list_near
 from . import log as impact_log
-from .accounts import book, book_step, book_work, lose
+from .accounts import book, book_heat, book_step, book_work, lose
 from .arrays import booked, following_particle, speed2_scale
-from .arrays import heat as book_heat
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of, met_wall
 from .table import LANES
@@ -29,6 +28,7 @@ from .wrap import return_particle
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
+_GOES_ON = -1
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -39,16 +39,24 @@ def meet_block(method, chain, gravity, share):
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
-        if following == stop:
-            return Status.DONE.value, 0, drawn
-        if done // LANES >= share.halt[0]:
-            return Status.INTERRUPTED.value, 0, drawn
-        if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-            return Status.LOG_FULL.value, 0, drawn
+        status = _ends(share, following, stop, drawn, done)
+        if status != _GOES_ON:
+            return status, 0, drawn
         if not _decide(method, chain, gravity, share, following):
             return Status.STALLED.value, following, drawn
         following, done = following + 1, done + 1
+
+
+def _ends(share, following, stop, drawn, done):
+    """The status with which a call ends before its next particle, or that it goes on."""
+    if following == stop:
+        return Status.DONE.value
+    if done // LANES >= share.halt[0]:
+        return Status.INTERRUPTED.value
+    if impact_log.is_full(share.log):
+        impact_log.keep_going(share.log, following, stop, drawn, 0, done)
+        return Status.LOG_FULL.value
+    return _GOES_ON
 
 
 @outlined
@@ -175,13 +183,9 @@ def careful_block(method, chain, gravity, share):
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
-        if following == stop:
-            return Status.DONE.value, 0, drawn
-        if done // LANES >= share.halt[0]:
-            return Status.INTERRUPTED.value, 0, drawn
-        if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-            return Status.LOG_FULL.value, 0, drawn
+        status = _ends(share, following, stop, drawn, done)
+        if status != _GOES_ON:
+            return status, 0, drawn
         _step(method, chain, gravity, share, following)
         if share.state.period is not None:
             return_particle(share.state.period, chain, share.state, following)
