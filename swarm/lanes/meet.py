@@ -28,6 +28,7 @@ from .wrap import return_particle
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
+# A call goes on with its next particle: no status.
 _GOES_ON = -1
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
