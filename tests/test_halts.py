@@ -14,7 +14,7 @@ import pytest
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
 from swarm.lanes import block, meet, slide
-from swarm.lanes.arrays import LANES
+from swarm.lanes.table import LANES
 from swarm.reacting import queue
 from swarm.run import reacting, turns
 from swarm.run.admission import task_of
@@ -81,7 +81,7 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
 
     def creep(kind, method, chain, gravity, lanes, live):
         passes.append(1)
-        lanes.rows[slide.LEFT, 0] -= 1e-15
+        lanes.lane(0).left -= 1e-15
         lanes.event[0] = 0
 
     for name, instead in (("compose", creep), ("end_steps", lambda *about: None), ("account", lambda *about: None)):

@@ -11,6 +11,7 @@ from swarm import observables
 from swarm.contact import events
 from swarm.kernel.jit import kernel, next_of
 from swarm.lanes import arrays as lanes
+from swarm.lanes.table import LANES
 from swarm.run.engine import Run
 from swarm.status import Status
 
@@ -105,7 +106,7 @@ def along_diameters(n):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_halts_at_the_pass_requested(threads, halts, share):
     """At the soonest one, each thread by its own count, and that frame only: a pass is a flight to the wall."""
-    n = threads * lanes.LANES
+    n = threads * LANES
     with Run(SPHERE, along_diameters(n), swarm.Impact(), threads, None) as run:
         for passes in halts:
             run.halt(passes)
@@ -118,12 +119,12 @@ def test_a_run_halts_at_the_pass_requested(threads, halts, share):
 
 def test_at_its_end_a_run_is_halted_for_good():
     """A share that runs then, or begins, is interrupted immediately; no thread waits for it."""
-    with Run(SPHERE, along_diameters(lanes.LANES), swarm.Impact(), 1, None) as run:
+    with Run(SPHERE, along_diameters(LANES), swarm.Impact(), 1, None) as run:
         pass
     run.halt(1000)
     status, _particle, left = run._share(10.0)
     assert status == Status.INTERRUPTED
-    assert (left.rows[lanes.LEFT] == 10.0).all()
+    assert (left.time_left() == 10.0).all()
 
 
 def test_a_frame_whose_time_is_over_is_halted():

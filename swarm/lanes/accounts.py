@@ -1,11 +1,9 @@
-"""What impacts and short steps change of a particle's energy: what walls that move give of it, and what is lost."""
+"""The accounts of a particle's energy: the shares of walls that move or are hot, and the loss."""
 
-from ..kernel.jit import by_type, inlined
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
 
 
-@inlined
 def lose(state, i, before, after):
     """Book what is left of twice the energy per mass."""
     if before != after:
@@ -13,14 +11,12 @@ def lose(state, i, before, after):
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
 
 
-@by_type
-def book(chain, state, i, wall, before, after, given, loses):
-    """Book the change of twice the energy per mass at a wall; `given` is what it gives by its motion, if it moves."""
-    lose(state, i, before, after)
-
-
-@book.register(Carried)
-def _(chain, state, i, wall, before, after, given, loses):
+def book(chain, state, i, wall, change, given, loses):
+    """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion."""
+    before, after = change
+    if not isinstance(chain, Carried):
+        lose(state, i, before, after)
+        return
     # Where nothing is lost all of it is work, to the last digit.
     given = given if loses else after - before
     state.energy[i] = 0.5 * after
@@ -28,27 +24,29 @@ def _(chain, state, i, wall, before, after, given, loses):
     book_work(chain, state, i, wall, given)
 
 
-@by_type
 def book_work(chain, state, i, wall, given):
-    """Book twice the work per mass of a wall that moves."""
+    """Book twice the work per mass of a wall, if it moves."""
+    if isinstance(chain, Carried):
+        state.impulse[walls.length(chain) + walls.row(chain, wall), i] += 0.5 * given * state.mass[i]
 
 
-@book_work.register(Carried)
-def _(chain, state, i, wall, given):
-    state.impulse[walls.length(chain) + walls.row(chain, wall), i] += 0.5 * given * state.mass[i]
-
-
-@by_type
-def book_step(chain, state, i, wall, before, after, given, loses):
-    """Book the change of twice the energy per mass in a short step; what the walls give of it is booked."""
-    lose(state, i, before, after)
-
-
-@book_step.register(Carried)
-def _(chain, state, i, wall, before, after, given, loses):
+def book_step(chain, state, i, wall, change, given, loses):
+    """Book a change (before, after) of twice the energy per mass in a short step, of which `given` is booked."""
+    before, after = change
+    if not isinstance(chain, Carried):
+        lose(state, i, before, after)
+        return
     state.energy[i] = 0.5 * after
     if loses:
         state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
     else:
         # What is left is round-off.
         book_work(chain, state, i, wall, after - before - given)
+
+
+def book_heat(state, i, wall, before, after):
+    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
+    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
+    pending = state.energy[i] - 0.5 * before
+    state.energy[i] = 0.5 * after + pending
+    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]

@@ -3,40 +3,48 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, EVENT
 from ..contact.laws import loses
-from ..contact.uzawa import RECORDS, STORED, SWEEPS, UNCONVERGED
-from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined, next_of, outlined, select, spaced
-from ..kernel.vector import column, put
+from ..contact.uzawa import RECORDS
+from ..kernel.jit import Array, index, next_of, outlined, select
+from ..kernel.record import Record
+from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
-from ..particles import Contacts, Multipliers
 from ..surfaces import flights
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
+from .table import EIGHT, MOVED, STRIDE, Number, Rows, copy_lane, table
 
-# Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
-LANES = 256
-# The row stride is not a power of two, so that the rows of a lane do not share a cache set.
-STRIDE = 264
-# Bytes of a line of the cache, and of a number of eight flags.
-_LINE, EIGHT = 64, 8
-# After so many passes lanes are looked at: who has moved on since by less than this part of the time left would need
-# 1e9 passes, and is given up if it got nowhere.
-LOOK, _MOVED = 1024, 1e-6
-R, V, LEFT, OWN, HITS, ROWS = 0, 3, 6, 7, 10, 11
-# After them there is room for 6 rows of `seek`, and for what a lane was when all were looked at: particle, time left
-# and impacts. As an array of its own that made the impacts in an ellipsoid twice as dear.
-LOOKED = ROWS + 6
+_named = Rows()
 
-with_distances = spaced(STRIDE)
+
+class Flying(Record):
+    """A particle that flies, in its lane."""
+
+    rows: Array
+    i: int
+
+    r, v, left, own, hits = _named.vector(), _named.vector(), _named.number(), _named.vector(), _named.number()
+    # The first of what its method keeps of it, where contacts change the energy: twice that, per mass.
+    twice = Number(own.row)
+
+    # The rows of a particle. After them is the flight of a lane that `seek` closes up, and what a lane was when all
+    # were looked at: as an array of its own that made the impacts in an ellipsoid twice as dear.
+    ROWS = _named.count
+    CLOSED_UP = _named.take(6)
+    looked_particle, looked_left, looked_hits = _named.number(), _named.number(), _named.number()
+    ALL = _named.count
+
+    def put_end(self, end):
+        """Where it is at the end of a flight or a contact, and how much of its frame is left."""
+        self.r, self.v, self.left = end.r, end.v, end.left
 
 
 class Lanes(NamedTuple):
     """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
 
-    rows: Array  # (LOOKED + 3, stride) position, velocity, time left, constants, impacts; what follows is no part of it
+    rows: Array  # (Flying.ALL, stride)
     impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
     wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
@@ -46,7 +54,7 @@ class Lanes(NamedTuple):
     course: Array  # (walls COURSE, stride) the safe steps of a fall
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     particle: Array  # int64, the particle in the lane
-    marked: Array  # bool, what one loop says to the next: of a fall that it needs more steps, then that it has arrived
+    marked: Array  # bool, from one loop to the next: of a fall that it needs more steps, then that it has arrived
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
     some: Array  # int64, those `eights` of which one is marked
     order: Array  # int64, the lanes that are marked
@@ -54,8 +62,18 @@ class Lanes(NamedTuple):
     period: Any = None  # the cell where it repeats
     before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
 
+    def lane(self, i):
+        """The rows of a lane."""
+        return Flying(self.rows, i)
 
-class Halted(NamedTuple):
+    def given(self, method, i):
+        """A lane as methods are given it."""
+        lane = self.lane(i)
+        kept = methods.own(method, *lane.own)
+        return methods.Lane(lane.r, lane.v, lane.left, lane.hits, kept)
+
+
+class Halted(Record):
     """Particles that a halt caught on their way: what their lanes held between two passes, one a column.
 
     Their way cannot be cut in two: a flight that ends at the halt and one that goes on from there are rounded twice.
@@ -63,6 +81,10 @@ class Halted(NamedTuple):
 
     particle: Array  # int64, in order
     rows: Array  # (ROWS + booked, particles) the lane's rows, then its impulses
+
+    def time_left(self):
+        """What is left of the frame of each."""
+        return self.rows[Flying.left.row]
 
 
 class Draws(NamedTuple):
@@ -80,7 +102,7 @@ class Draws(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What one thread advances of a frame, and by how much."""
+    """The part of a frame that one thread advances."""
 
     state: Any  # `particles.State`
     phase: Array  # (N,) int8, who flies, slides on one wall or on two, or has arrived
@@ -95,12 +117,21 @@ class Share(NamedTuple):
     log: Any = None  # `log.Log` of impacts
     counts: Any = None  # `log.Counts` of them
 
+    def watches(self):
+        """The log and the counts of impacts, if the run has any."""
+        return tuple(one for one in (self.log, self.counts) if one is not None)
+
+    def hand_over(self, i, phase):
+        """Leave particle i to the kernel of a phase."""
+        self.phase[i] = phase
+        self.pending[phase] += 1
+
 
 def empty(walls: int, rows: int, period: Any = None) -> Lanes:
     """Lanes for one block, with so many rows of what walls give."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
-        rows=table(LOOKED + 3),
+        rows=table(Flying.ALL),
         impulse=table(rows),
         wall=table(1)[0],
         kappa=table(1)[0],
@@ -114,29 +145,14 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
-        left_behind=table(ROWS + rows),
+        left_behind=table(Flying.ROWS + rows),
         period=period,
     )
 
 
-def table(rows: int) -> NDArray[np.float64]:
-    """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
-    size = 8 * rows * STRIDE
-    memory = np.zeros(size + _LINE, np.uint8)
-    first = -memory.ctypes.data % _LINE
-    return memory[first : first + size].view(np.float64).reshape(rows, STRIDE)
-
-
 def none_halted(rows: int) -> Halted:
     """No particle was halted; with so many rows of what walls give."""
-    return Halted(np.empty(0, np.int64), np.empty((ROWS + rows, 0)))
-
-
-@inlined
-def lane_of(method, rows, i):
-    """What is in a lane."""
-    kept = methods.own(method, rows[OWN, i], rows[OWN + 1, i], rows[OWN + 2, i])
-    return methods.Lane(column(rows, R, i), column(rows, V, i), rows[LEFT, i], rows[HITS, i], kept)
+    return Halted(np.empty(0, np.int64), np.empty((Flying.ROWS + rows, 0)))
 
 
 def take(draws: Draws, some: int) -> Array:
@@ -145,7 +161,6 @@ def take(draws: Draws, some: int) -> Array:
     return draws.order[first : first + some]
 
 
-@inlined
 def following_particle(share, phase, i, stop, drawn):
     """(particle, stop, draws so far): the first from i on that is in this phase, of another draw if need be; or stop.
 
@@ -168,28 +183,36 @@ def following_particle(share, phase, i, stop, drawn):
         drawn += 1
 
 
-@inlined
-def load(method, chain, lanes, lane, share, i):
-    """Particle i into a lane, as it starts the frame, or as a halt left it."""
-    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
-    particle[lane] = i
-    state, halted = share.state, share.halted
-    left = rest_of_frame(state.contacts, i)
-    if halted.particle.size > 0 and not left > 0.0 and _pick_up(lanes, lane, halted, i):
+# --- Into lanes and out of them --------------------------------------------------------------------------
+
+
+def load(method, chain, lanes, k, share, i):
+    """Particle i into lane k, as it starts the frame, or as a halt left it."""
+    lanes.particle[k] = i
+    state, halted, lane = share.state, share.halted, lanes.lane(k)
+    left = 0.0 if state.contacts is None else rest_of_frame(state.contacts, i)
+    if halted.particle.size > 0 and not left > 0.0 and _pick_up(lanes, k, halted, i):
         return
     i = index(i)
-    put(rows, R, lane, column(state.position, 0, i))
-    put(rows, V, lane, column(state.velocity, 0, i))
-    own = methods.constants(method, state.mass[i], state.energy[i], speed2_scale(state, i))
-    rows[OWN, lane], rows[OWN + 1, lane], rows[OWN + 2, lane] = own
-    rows[LEFT, lane], rows[HITS, lane] = select(left > 0.0, left, share.span), 0.0
+    lane.r, lane.v = column(state.position, 0, i), column(state.velocity, 0, i)
+    lane.own = Vec(*methods.constants(method, state.mass[i], state.energy[i], speed2_scale(state, i)))
+    lane.left, lane.hits = select(left > 0.0, left, share.span), 0.0
     for s in range(booked(chain)):
-        impulse[s, lane] = 0.0
+        lanes.impulse[s, k] = 0.0
+
+
+def rest_of_frame(contacts, i):
+    """What is left of the frame of a particle that comes from a wall; 0 at its start."""
+    left = contacts.left[i]
+    # Where nothing lasts none of these arrays is written: their memory is not even there.
+    if left > 0.0:
+        contacts.left[i] = 0.0
+    return left
 
 
 @outlined
-def _pick_up(lanes, lane, halted, i):
-    """What a halt left of particle i into a lane; whether there is any."""
+def _pick_up(lanes, k, halted, i):
+    """What a halt left of particle i into lane k; whether there is any."""
     first, last = 0, halted.particle.size
     while first < last:
         middle = (first + last) // 2
@@ -199,128 +222,41 @@ def _pick_up(lanes, lane, halted, i):
             last = middle
     if first == halted.particle.size or halted.particle[first] != i:
         return False
-    for row in range(ROWS):
-        lanes.rows[row, lane] = halted.rows[row, first]
+    copy_lane(halted.rows, first, lanes.rows, k, Flying.ROWS)
     for s in range(lanes.impulse.shape[0]):
-        lanes.impulse[s, lane] = halted.rows[ROWS + s, first]
+        lanes.impulse[s, k] = halted.rows[Flying.ROWS + s, first]
     return True
 
 
 @outlined
 def leave(lanes, live):
     """The live lanes, between two passes: what one pass leaves for the next."""
-    left_behind = lanes.left_behind
-    for lane in range(live):
-        for row in range(ROWS):
-            left_behind[row, lane] = lanes.rows[row, lane]
+    for k in range(live):
+        copy_lane(lanes.rows, k, lanes.left_behind, k, Flying.ROWS)
         for s in range(lanes.impulse.shape[0]):
-            left_behind[ROWS + s, lane] = lanes.impulse[s, lane]
+            lanes.left_behind[Flying.ROWS + s, k] = lanes.impulse[s, k]
 
 
-@inlined
-def retire(method, chain, lanes, lane, share):
-    """A lane back into its particle, which has arrived or goes on along a wall."""
-    state = share.state
-    rows, impulse, impacts, total = lanes.rows, lanes.impulse, state.impacts, state.impulse
-    i = index(lanes.particle[lane])
-    put(state.position, 0, i, column(rows, R, lane))
-    put(state.velocity, 0, i, column(rows, V, lane))
-    impacts[i] += np.int64(rows[HITS, lane])
+def retire(method, chain, lanes, k, share):
+    """Lane k back into its particle, which has arrived or goes on along a wall."""
+    state, lane, i = share.state, lanes.lane(k), index(lanes.particle[k])
+    put(state.position, 0, i, lane.r)
+    put(state.velocity, 0, i, lane.v)
+    state.impacts[i] += np.int64(lane.hits)
     for s in range(booked(chain)):
-        total[s, i] += impulse[s, lane] * state.mass[i]
+        state.impulse[s, i] += lanes.impulse[s, k] * state.mass[i]
     if methods.dissipates(method):
         # Each particle knows its energy: what it has lost is accounted for with it.
-        now = 0.5 * rows[OWN, lane]
+        now = 0.5 * lane.twice
         if loses(methods.laws(method)):
-            state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, impulse, lane))
+            state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, lanes.impulse, k))
         state.energy[i] = now
-    phase = hand_over(state.contacts, i, rows[LEFT, lane], lanes.wall[lane])
-    share.phase[i] = phase
-    share.pending[phase] += 1
+    phase = ARRIVED if state.contacts is None else _phase_after(state.contacts, i, lane.left, lanes.wall[k])
+    share.hand_over(i, phase)
 
 
-@by_type
-def booked(chain):
-    """How many rows book what the walls give: their impulses, then the work of those that move."""
-    return walls.length(chain)
-
-
-@by_type
-def _work(chain, impulse, lane):
-    """What walls that move have given a lane, per mass."""
-    return 0.0
-
-
-booked.register(Carried, lambda chain: 2 * walls.length(chain))
-
-
-@_work.register(Carried)
-def _(chain, impulse, lane):
-    total = 0.0
-    for s in range(walls.length(chain), 2 * walls.length(chain)):
-        total += impulse[s, lane]
-    return total
-
-
-@inlined
-def move(chain, lanes, source, target):
-    """The last live lane into the free slot. What flight and contact leave for each other need not move."""
-    rows, impulse, particle = lanes.rows, lanes.impulse, lanes.particle
-    for row in range(ROWS):
-        rows[row, target] = rows[row, source]
-    for s in range(booked(chain)):
-        impulse[s, target] = impulse[s, source]
-    particle[target] = particle[source]
-
-
-@inlined
-def heat(state, i, wall, before, after):
-    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
-    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
-    pending = state.energy[i] - 0.5 * before
-    state.energy[i] = 0.5 * after + pending
-    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]
-
-
-# --- Between the kernels of a frame ----------------------------------------------------------------------
-
-
-@by_type
-def rest_of_frame(contacts, i):
-    """What is left of the frame of a particle that comes from a wall; 0 at its start."""
-    return 0.0
-
-
-@rest_of_frame.register(Contacts)
-def _(contacts, i):
-    left = contacts.left[i]
-    # Where nothing lasts none of these arrays is written: their memory is not even there.
-    if left > 0.0:
-        contacts.left[i] = 0.0
-    return left
-
-
-@inlined
-def speed2_scale(state, i):
-    """The square of the speed that a particle's energy scale is that of."""
-    scale = state.inverse_scale[i]
-    return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)
-
-
-@inlined
-def goes_on_by(method, v, left):
-    """The time from one look to the next by which a particle must go on that has so much left of its frame [s]."""
-    return min(methods.instant(method, v), _MOVED * left)
-
-
-@by_type
-def hand_over(contacts, i, left, wall):
-    """Leave a particle that has arrived, or whose contact lasts, to what comes next: its phase."""
-    return ARRIVED
-
-
-@hand_over.register(Contacts)
-def _(contacts, i, left, wall):
+def _phase_after(contacts, i, left, wall):
+    """The phase of a particle that has arrived, or whose contact lasts."""
     if not left > 0.0:
         return ARRIVED
     contacts.left[i], contacts.met[i] = left, wall
@@ -328,35 +264,35 @@ def _(contacts, i, left, wall):
     return EVENT
 
 
-# --- What the loop of the multiplier took ----------------------------------------------------------------
+def booked(chain):
+    """How many rows book what the walls give: their impulses, then the work of those that move."""
+    return 2 * walls.length(chain) if isinstance(chain, Carried) else walls.length(chain)
 
 
-@by_type_outlined
-def count_sweeps(multipliers, lanes, live):
-    """Add the records of the lanes that had a contact to their particles; nothing where there are no multipliers."""
+def _work(chain, impulse, k):
+    """The energy per mass that walls that move have given a lane."""
+    total = 0.0
+    for s in range(walls.length(chain), booked(chain)):
+        total += impulse[s, k]
+    return total
 
 
-@count_sweeps.register(Multipliers)
-def _(multipliers, lanes, live):
-    record = lanes.record
-    for i in range(live):
-        if record[SWEEPS, i] > 0.0:
-            particle = lanes.particle[i]
-            multipliers.sweeps[particle] += np.int64(record[SWEEPS, i])
-            multipliers.contacts[particle] += 1
-            multipliers.unconverged[particle] += np.int64(record[UNCONVERGED, i])
-            multipliers.stored_energy[particle] = max(multipliers.stored_energy[particle], record[STORED, i])
-            record[SWEEPS, i] = 0.0
+def move(chain, lanes, source, target):
+    """The last live lane into the free slot. What flight and contact leave for each other need not move."""
+    copy_lane(lanes.rows, source, lanes.rows, target, Flying.ROWS)
+    copy_lane(lanes.impulse, source, lanes.impulse, target, booked(chain))
+    lanes.particle[target] = lanes.particle[source]
 
 
-@by_type_outlined
-def keep_failure(multipliers, lanes, lane):
-    """Keep the record of the lane that failed, for the error."""
+# --- Of one particle -------------------------------------------------------------------------------------
 
 
-@keep_failure.register(Multipliers)
-def _(multipliers, lanes, lane):
-    particle = lanes.particle[lane]
-    multipliers.sweeps[particle] = np.int64(lanes.record[SWEEPS, lane])
-    multipliers.stored_energy[particle] = lanes.record[STORED, lane]
-    multipliers.left[particle] = lanes.rows[LEFT, lane]
+def speed2_scale(state, i):
+    """The square of the speed that a particle's energy scale is that of."""
+    scale = state.inverse_scale[i]
+    return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)
+
+
+def goes_on_by(method, v, left):
+    """The time from one look to the next by which a particle must go on that has so much left of its frame [s]."""
+    return min(methods.instant(method, v), MOVED * left)

@@ -5,50 +5,26 @@ that reached the frame time retire, and the next particle, or the last live lane
 depend on which lane or block a particle is in.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..contact import laws as wall_laws
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
-from ..kernel.gravity import Nothing, potential
-from ..kernel.jit import by_type, by_type_outlined, index, inlined, kernel, outlined, select
-from ..kernel.vector import column, put, square
+from ..kernel.gravity import potential
+from ..kernel.jit import index, kernel, outlined, select
+from ..kernel.record import Record
+from ..kernel.vector import put, square
 from ..methods import contract as methods
-from ..particles import Contacts
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from . import log as impact_log
-from .arrays import (
-    HITS,
-    LANES,
-    LEFT,
-    LOOK,
-    LOOKED,
-    OWN,
-    R,
-    V,
-    count_sweeps,
-    following_particle,
-    goes_on_by,
-    keep_failure,
-    lane_of,
-    leave,
-    load,
-    move,
-    retire,
-    with_distances,
-)
-from .arrays import (
-    heat as book_heat,
-)
+from .accounts import book_heat
+from .arrays import following_particle, goes_on_by, leave, load, move, retire
 from .escape import let_out_lanes
-from .fly import go, put_end
-from .marks import marked_lanes
+from .fly import go
 from .picked import of_lane, pick, picks
-from .solve import solution, solve
+from .solve import count_sweeps, keep_failure, solution, solve
+from .table import LANES, LOOK, marked_lanes, with_distances
 from .wrap import return_lanes
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
@@ -57,7 +33,7 @@ MOST_HITS = 1e8
 NEVER = 2**63 - 1
 
 
-class Hard(NamedTuple):
+class Hard(Record):
     """With it a kernel can do hard contacts: half of what there is to compile, and seldom met in a smooth cavity."""
 
     most_hits: float
@@ -80,7 +56,7 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if following == stop:
             break
         load(method, chain, lanes, index(live), share, following)
-        lanes.rows[LOOKED, live] = -1.0
+        lanes.lane(live).looked_particle = -1.0
         following += 1
         live += 1
     while live > 0:
@@ -111,7 +87,6 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     return Status.DONE.value, 0, drawn
 
 
-@inlined
 def _halts(share, lanes, following, stop, drawn, live, passes):
     """Whether the call ends before the next pass."""
     if passes >= share.halt[0]:
@@ -125,9 +100,11 @@ def _halts(share, lanes, following, stop, drawn, live, passes):
 
 @outlined
 def _rare(hard, method, chain, gravity, state, lanes, live, some_hard):
-    """What a pass rarely needs: (worst status, its lane)."""
+    """The rare part of a pass: (worst status, its lane)."""
     if not some_hard:
         return _look(method, chain, state, lanes, live)
+    if hard is None:
+        return Status.HARD_CONTACT.value, 0
     return _hard_passes(hard, method, chain, gravity, lanes, live)
 
 
@@ -137,216 +114,142 @@ def _look(method, chain, state, lanes, live):
 
     The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
     """
-    rows = lanes.rows
+    # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
+    most_hits = 0.1 * MOST_HITS if isinstance(chain, Carried) else MOST_HITS
     for i in range(live):
-        status, p, left = Status.DONE.value, float(lanes.particle[i]), rows[LEFT, i]
-        still = goes_on_by(method, column(rows, V, i), left) >= rows[LOOKED + 1, i] - left
-        if methods.holds(method) and rows[HITS, i] > _most_hits(chain):
+        lane = lanes.lane(i)
+        status, p, left = Status.DONE.value, float(lanes.particle[i]), lane.left
+        still = goes_on_by(method, lane.v, left) >= lane.looked_left - left
+        if methods.holds(method) and lane.hits > most_hits:
             status = Status.STALLED.value
-        elif rows[LOOKED, i] == p and still and rows[LOOKED + 2, i] == rows[HITS, i]:
+        elif lane.looked_particle == p and still and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
         if status != Status.DONE.value:
-            put(state.position, 0, lanes.particle[i], column(rows, R, i))
-            _keep_left(state.contacts, lanes, i)
+            put(state.position, 0, lanes.particle[i], lane.r)
+            if state.contacts is not None:
+                state.contacts.left[lanes.particle[i]] = lane.left
             return status, i
-        rows[LOOKED, i], rows[LOOKED + 1, i], rows[LOOKED + 2, i] = p, left, rows[HITS, i]
+        lane.looked_particle, lane.looked_left, lane.looked_hits = p, left, lane.hits
     return Status.DONE.value, 0
 
 
-@by_type
-def _most_hits(chain):
-    return MOST_HITS
+@outlined
+def _hard_passes(hard, method, chain, gravity, lanes, live):
+    """The hard lanes, one by one: (worst status, its lane)."""
+    worst, where = 0, 0
+    for i in range(live):
+        if lanes.wall[i] <= methods.HARD:
+            lane = lanes.given(method, i)
+            contact, status = methods.hard_pass(method, chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
+            _put_contact(method, lanes, i, contact)
+            if lanes.lane(i).hits > hard.most_hits:
+                status = Status.STALLED.value
+            if status > worst:
+                worst, where = status, i
+    return worst, where
 
 
-# Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
-_most_hits.register(Carried, lambda chain: 0.1 * MOST_HITS)
-
-
-@by_type
-def _keep_left(contacts, lanes, i):
-    """Keep when a particle is given up."""
-
-
-@_keep_left.register(Contacts)
-def _(contacts, lanes, i):
-    contacts.left[lanes.particle[i]] = lanes.rows[LEFT, i]
-
-
-@inlined
 def _pass(method, chain, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    go(methods.landed_on(method, chain), gravity, method, chain, lanes, live)
-    return_lanes(lanes.period, share.state, lanes, live)
-    let_out_lanes(share.state.openings, method, chain, share, lanes, live)
-    unknown = methods.solves(method)
-    solve(unknown, method, chain, gravity, share.state.multipliers, lanes, live)
-    impact_log.keep_before(share.log, lanes, live)
-    impact_log.keep_before(share.counts, lanes, live)
-    _exchange_heat(methods.thermal(method), method, chain, gravity, share, lanes, live)
-    pick(chain, 0.0, lanes, picked, live)
+    state, watches = share.state, share.watches()
+    go(method, chain, gravity, lanes, live)
+    if lanes.period is not None:
+        return_lanes(lanes.period, state, lanes, live)
+    if state.openings is not None:
+        let_out_lanes(state.openings, method, chain, share, lanes, live)
+    if methods.solves(method) is not None:
+        solve(method, chain, gravity, state.multipliers, lanes, live)
+    for watch in watches:
+        watch.keep_before(lanes, live)
+    if methods.thermal(method) is not None:
+        _exchange_heat(method, chain, gravity, share, lanes, live)
+    pick(chain, lanes, picked, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
-        lane, found = lane_of(method, lanes.rows, i), solution(unknown, method, lanes, i)
+        lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = methods.walls_of(method, of_lane(chain, picked, i), lane.left)
         contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
-        impact_log.note(share.log, lanes, i, contact.impulse)
+        for watch in watches:
+            watch.note(lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
-    impact_log.add_rows(share.log, method, chain, share.state, lanes, live)
-    impact_log.add_rows(share.counts, method, chain, share.state, lanes, live)
+    for watch in watches:
+        watch.add_rows(method, chain, state, lanes, live)
     return some_arrived, some_hard
 
 
-@by_type
-def _exchange_heat(thermal, method, chain, gravity, share, lanes, live):
+def _exchange_heat(method, chain, gravity, share, lanes, live):
     """The impacts on thermal walls that accommodate their particles."""
-
-
-@_exchange_heat.register(wall_laws.Given)
-def _(thermal, method, chain, gravity, share, lanes, live):
-    rows, state = lanes.rows, share.state
+    state = share.state
     for i in range(index(live)):
-        wall, p = lanes.wall[i], index(lanes.particle[i])
+        lane, wall, p = lanes.lane(i), lanes.wall[i], index(lanes.particle[i])
         if wall >= 0.0:
-            r, v = column(rows, R, i), column(rows, V, i)
-            draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(rows[HITS, i]))
-            now, laws = at(chain, rows[LEFT, i]), methods.laws(method)
+            r, v = lane.r, lane.v
+            draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
+            now, laws = at(chain, lane.left), methods.laws(method)
             left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:
-                before, after = rows[OWN, i], square(left.v) + 2.0 * potential(gravity, r)
+                before, after = lane.twice, square(left.v) + 2.0 * potential(gravity, r)
                 book_heat(state, p, walls.row(chain, wall), before, after - left.work)
-                add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
-                put(rows, V, i, left.v)
-                rows[OWN, i] = after
-                rows[HITS, i] += 1.0
+                _add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
+                lane.v, lane.twice = left.v, after
+                lane.hits += 1.0
                 lanes.impulse[walls.row(chain, wall), i] += left.impulse
-                impact_log.note(share.log, lanes, i, left.impulse)
+                for watch in share.watches():
+                    watch.note(lanes, i, left.impulse)
                 # The contact is done, unless a wall at 0 K holds the particle.
                 lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 
 
-@inlined
 def _end(method, chain, lanes, i, contact):
-    """What the contact made of a lane: (whether it reached the end of the frame, whether it is hard)."""
-    put_end(lanes, i, contact)
-    _count(method, lanes, i, contact)
+    """The end of a lane's contact: (whether it reached the end of the frame, whether it is hard)."""
+    _put_contact(method, lanes, i, contact)
     _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-    add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
+    _add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
     lanes.wall[i] = contact.wall
     hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
     return contact.lasts | (not (contact.left > 0.0)), hard
 
 
-@inlined
-def _count(method, lanes, i, contact):
-    """What a contact counts, whether the lane has arrived, and the energy where contacts may lose some."""
-    rows = lanes.rows
-    rows[HITS, i] += contact.hits
+def _put_contact(method, lanes, i, contact):
+    """A lane after its contact, its impacts and its energy where contacts change that, and whether it has arrived."""
+    lane = lanes.lane(i)
+    lane.put_end(contact)
+    lane.hits += contact.hits
     if methods.dissipates(method):
-        rows[OWN, i] = contact.twice_energy
+        lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
 
 
-@by_type
-def _add_impulse(chain, impulse, lane, wall, given):
-    """impulse[wall, lane] += given, without a branch; a loop over rows here would not vectorise."""
+def _add_impulse(chain, impulse, i, wall, given):
+    """impulse[wall, i] += given, without a branch; a loop over rows here would not vectorise."""
+    chain = chain.walls if isinstance(chain, Carried) else chain
+    if isinstance(chain, walls.Chain) and chain.rest is None:
+        # One wall: what is given is 0, or it is given by that.
+        impulse[0, i] += given
+    else:
+        _add_to(chain, impulse, 0, i, wall, given)
 
 
-@_add_impulse.register(walls.Chain)
-def _(chain, impulse, lane, wall, given):
-    _add_of(chain.rest, chain, impulse, lane, wall, given)
-
-
-@_add_impulse.register(walls.Field)
-def _(chain, impulse, lane, wall, given):
-    _add_to(chain, impulse, 0, lane, wall, given)
-
-
-@_add_impulse.register(Carried)
-def _(chain, impulse, lane, wall, given):
-    _add_of(chain.walls.rest, chain.walls, impulse, lane, wall, given)
-
-
-@by_type
-def add_work(chain, impulse, lane, wall, given):
+def _add_work(chain, impulse, i, wall, given):
     """The work of walls that move is in the rows after those of the impulses."""
+    if isinstance(chain, Carried):
+        _add_to(chain.walls, impulse, walls.length(chain), i, wall, given)
 
 
-@add_work.register(Carried)
-def _(chain, impulse, lane, wall, given):
-    _add_to(chain.walls, impulse, walls.length(chain), lane, wall, given)
-
-
-@by_type
-def _add_of(rest, chain, impulse, lane, wall, given):
-    """The same, by how many walls there are."""
-
-
-@_add_of.register(Nothing)
-def _(rest, chain, impulse, lane, wall, given):
-    # One wall: what is given is 0, or it is given by that.
-    impulse[0, lane] += given
-
-
-@_add_of.register(walls.Chain)
-@_add_of.register(walls.Field)
-def _(rest, chain, impulse, lane, wall, given):
-    _add_to(chain, impulse, 0, lane, wall, given)
-
-
-@by_type
-def _add_to(chain, impulse, row, lane, wall, given):
-    """The same for the walls from `row` on."""
-
-
-@_add_to.register(walls.Chain)
-def _(chain, impulse, row, lane, wall, given):
-    impulse[row, lane] += select(wall == 0.0, given, 0.0)
-    _add_to(chain.rest, impulse, row + 1, lane, wall - 1.0, given)
-
-
-@_add_to.register(walls.Field)
-def _(chain, impulse, row, lane, wall, given):
-    count = walls.count(chain.first)
-    impulse[row, lane] += select((wall >= 0.0) & (wall < count), given, 0.0)
-    _add_to(chain.rest, impulse, row + 1, lane, select(wall < count, -1.0, wall - count), given)
-
-
-@_add_to.register(walls.Listed)
-def _(chain, impulse, row, lane, wall, given):
-    count = walls.count(chain.first)
-    here = (wall >= 0.0) & (wall < count)
-    impulse[index(row + int(select(here, wall, 0.0))), lane] += select(here, given, 0.0)
-    _add_to(chain.rest, impulse, row + int(count), lane, select(wall < count, -1.0, wall - count), given)
-
-
-@_add_to.register(Nothing)
-def _(chain, impulse, row, lane, wall, given):
-    pass
-
-
-@by_type_outlined
-def _hard_passes(hard, method, chain, gravity, lanes, live):
-    """The hard lanes, one by one: (worst status, its lane)."""
-    raise NotImplementedError
-
-
-@_hard_passes.register(Nothing)
-def _(hard, method, chain, gravity, lanes, live):
-    return Status.HARD_CONTACT.value, 0
-
-
-@_hard_passes.register(Hard)
-def _(hard, method, chain, gravity, lanes, live):
-    worst, where = 0, 0
-    for i in range(live):
-        if lanes.wall[i] <= methods.HARD:
-            lane = lane_of(method, lanes.rows, i)
-            contact, status = methods.hard_pass(method, chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
-            put_end(lanes, i, contact)
-            _count(method, lanes, i, contact)
-            if lanes.rows[HITS, i] > hard.most_hits:
-                status = Status.STALLED.value
-            if status > worst:
-                worst, where = status, i
-    return worst, where
+def _add_to(chain, impulse, row, i, wall, given):
+    """The same for the walls of a chain, from `row` on."""
+    for link in walls.each(chain):
+        if isinstance(link, walls.Field):
+            count = walls.count(link.first)
+            here = (wall >= 0.0) & (wall < count)
+            if isinstance(link, walls.Listed):
+                impulse[index(row + int(select(here, wall, 0.0))), i] += select(here, given, 0.0)
+                row += int(count)
+            else:
+                impulse[row, i] += select(here, given, 0.0)
+                row += 1
+            wall = select(wall < count, -1.0, wall - count)
+        else:
+            impulse[row, i] += select(wall == 0.0, given, 0.0)
+            row, wall = row + 1, wall - 1.0

@@ -5,7 +5,6 @@ little; the forces follow from its acceleration. Until one lets go another wall 
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +13,12 @@ from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, scratch, select
+from ..kernel.jit import outlined, scratch, select
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near
-from ..surfaces.openings import Openings
-from ..surfaces.period import Period
 
 # The phase of a particle that these walls do not carry.
 NOT_CARRIED = -1
@@ -36,8 +33,8 @@ _EPSILON = 2.220446049250313e-16
 _RETRY, _MOST_TRIES = 0.25, 100
 
 
-class Corner(NamedTuple):
-    """What three walls do to a particle that goes with them, at one instant."""
+class Corner(Record):
+    """The effect of three walls on a particle that goes with them, at one instant."""
 
     holds: bool  # whether all press
     u: Vec  # its velocity
@@ -53,14 +50,12 @@ _NOBODY = Three(-1.0, -1.0, -1.0)
 # --- One corner ------------------------------------------------------------------------------------------
 
 
-@inlined
 def _solved(a, b, c, x, y, z):
     """The vector whose products with a, b and c are x, y and z; infinite or no number where they are in a plane."""
     bc = cross(b, c)
     return (x * bc + y * cross(c, a) + z * cross(a, b)) / dot(a, bc)
 
 
-@inlined
 def _parts(a, b, c, w):
     """The numbers with w = x a + y b + z c."""
     bc = cross(b, c)
@@ -69,28 +64,15 @@ def _parts(a, b, c, w):
 
 @outlined
 def _normals(chain, held, r):
-    return (
-        walls.unit_normal(chain, held.first, r),
-        walls.unit_normal(chain, held.second, r),
-        walls.unit_normal(chain, held.third, r),
-    )
+    return tuple(walls.unit_normal(chain, wall, r) for wall in held)
 
 
-@outlined
-def _rubbed(friction, wall, n, slip):
+def _force(friction, wall, n, slip):
     """The direction of the force of a wall, -(n + mu s/|s|), without its sign."""
+    if friction is None:
+        return n
     speed = norm(slip)
     return n + (wall_laws.of_wall(friction, wall) / select(speed > 0.0, speed, 1.0)) * slip
-
-
-@by_type
-def _force(friction, wall, n, slip):
-    return n
-
-
-@_force.register(wall_laws.Given)
-def _(friction, wall, n, slip):
-    return _rubbed(friction, wall, n, slip)
 
 
 @outlined
@@ -99,25 +81,12 @@ def _corner(laws, chain, gravity, held, r, least):
     a, b, c = _normals(chain, held, r)
     if not abs(dot(a, cross(b, c))) > _FLATTEST:
         return _NONE
-    v, w, x = (
-        walls.velocity(chain, held.first, r),
-        walls.velocity(chain, held.second, r),
-        walls.velocity(chain, held.third, r),
-    )
+    v, w, x = tuple(walls.velocity(chain, wall, r) for wall in held)
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
     # What is left of the pull in the frame of the particle
-    rest = _solved(
-        a, b, c,
-        walls.outward_acceleration(chain, held.first, r, u, pull),
-        walls.outward_acceleration(chain, held.second, r, u, pull),
-        walls.outward_acceleration(chain, held.third, r, u, pull),
-    )  # fmt: skip
+    rest = _solved(a, b, c, *(walls.outward_acceleration(chain, wall, r, u, pull) for wall in held))
     friction = wall_laws.friction(laws)
-    p, q, s = (
-        _force(friction, held.first, a, u - v),
-        _force(friction, held.second, b, u - w),
-        _force(friction, held.third, c, u - x),
-    )
+    p, q, s = tuple(_force(friction, *one) for one in zip(held, (a, b, c), (u - v, u - w, u - x), strict=True))
     load = _parts(p, q, s, rest)
     holds = (load.x > least) & (load.y > least) & (load.z > least)
     power = Vec(-load.x * dot(p, v), -load.y * dot(q, w), -load.z * dot(s, x))
@@ -150,11 +119,7 @@ def _settled(chain, held, r):
     """A point near three walls, moved onto them; whether it is there."""
     least = 4.0 * _EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
-        d, e, f = (
-            walls.distance(chain, held.first, r),
-            walls.distance(chain, held.second, r),
-            walls.distance(chain, held.third, r),
-        )
+        d, e, f = tuple(walls.distance(chain, wall, r) for wall in held)
         if max(abs(d), abs(e), abs(f)) <= least:
             return r, True
         a, b, c = _normals(chain, held, r)
@@ -165,14 +130,9 @@ def _settled(chain, held, r):
 # --- While it is carried ---------------------------------------------------------------------------------
 
 
-@by_type_outlined
-def is_carried(moving, method, chain, gravity, p):
+@outlined
+def is_carried(method, chain, gravity, p):
     """Whether three walls, some of which move, carry a particle that is slow in their corner."""
-    return False
-
-
-@is_carried.register(wall_laws.Moves)
-def _(moving, method, chain, gravity, p):
     now = at(chain, p.left)
     held = _find(method.laws, now, gravity, p.r, events.TOUCH * method.size, events.weightless(method, gravity, p))
     if held.first < 0.0:
@@ -182,32 +142,10 @@ def _(moving, method, chain, gravity, p):
     return square(p.v - u) <= part * part * events.own_speed2(p)
 
 
-@by_type
-def carry(openings, method, chain, gravity, state, i, p):
-    """Carry a particle: what it does next, or `NOT_CARRIED`."""
-    return _carry_in(state.period, method, chain, gravity, state, i, p)
-
-
-# Step by step, where places on its way are looked at.
-carry.register(Openings, lambda openings, method, chain, gravity, state, i, p: NOT_CARRIED)
-
-
-@by_type
-def _carry_in(period, method, chain, gravity, state, i, p):
-    return _carry(wall_laws.moving(methods.laws(method)), method, chain, gravity, state, i, p)
-
-
-_carry_in.register(Period, lambda period, method, chain, gravity, state, i, p: NOT_CARRIED)
-
-
-@by_type_outlined
-def _carry(moving, method, chain, gravity, state, i, p):
-    return NOT_CARRIED
-
-
-@_carry.register(wall_laws.Moves)
-def _(moving, method, chain, gravity, state, i, p):
-    if not is_carried(moving, method, chain, gravity, p):
+@outlined
+def carry(method, chain, gravity, state, i, p):
+    """Carry a particle: its next phase, or `NOT_CARRIED`."""
+    if not is_carried(method, chain, gravity, p):
         return NOT_CARRIED
     laws, near, least = method.laws, events.TOUCH * method.size, events.weightless(method, gravity, p)
     shortest = 2.0 * events.GRAZING * method.size / math.sqrt(events.own_speed2(p))
@@ -290,9 +228,8 @@ def _book(chain, gravity, state, i, held, corners, end):
 def _push(chain, state, i, held, load, work):
     """Book impulses and works per mass of three walls; the sum of the works."""
     behind, mass = walls.length(chain), state.mass[i]
-    for k in range(3):
-        wall = held.first if k == 0 else (held.second if k == 1 else held.third)
+    for wall, given, done in zip(held, load, work, strict=True):
         row = walls.row(chain, wall)
-        state.impulse[row, i] += (load.x if k == 0 else (load.y if k == 1 else load.z)) * mass
-        state.impulse[behind + row, i] += (work.x if k == 0 else (work.y if k == 1 else work.z)) * mass
+        state.impulse[row, i] += given * mass
+        state.impulse[behind + row, i] += done * mass
     return work.x + work.y + work.z

@@ -9,18 +9,42 @@ import numpy as np
 
 from ..contact import laws as wall_laws
 from ..contact.reflection import relative, wall_velocity
-from ..kernel.gravity import Nothing
-from ..kernel.jit import Array, by_type, by_type_outlined, index, inlined
-from ..kernel.vector import ZERO, Vec, column, dot, put
+from ..kernel.jit import Array, index, outlined
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, dot
 from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
-from .arrays import HITS, LANES, LEFT, R, V
+from .table import LANES, Rows
 
-# Rows of what a lane was before a contact: position, velocity, time left, impacts, then the wall and its impulse.
-_R, _V, _LEFT, _HITS, _WALL, _IMPULSE, ROWS = 0, 3, 6, 7, 8, 9, 10
 # What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.
 GOING = 5
+
+_named = Rows()
+
+
+class Before(Record):
+    """A lane before its contact: its flight, the wall, and the impulse that this has given it since."""
+
+    rows: Array
+    i: int
+
+    r, v, left = _named.vector(), _named.vector(), _named.number()
+    hits, wall, impulse = _named.number(), _named.number(), _named.number()
+
+
+ROWS = _named.count
+
+
+class Struck(Record):
+    """An impact: where, with the velocities before and after, on which wall, and the impulse per mass."""
+
+    r: Vec
+    before: Vec
+    after: Vec
+    wall: float
+    left: float  # of the frame [s]
+    impulse: float
 
 
 class Log(NamedTuple):
@@ -42,170 +66,122 @@ class Log(NamedTuple):
     begin: float  # of the frame [s]
     end: float
 
+    def keep_before(self, lanes, live):
+        """Keep every lane as it is before its contact."""
+        for i in range(index(live)):
+            lane, before = lanes.lane(i), Before(lanes.before, i)
+            before.r, before.v, before.left, before.hits = lane.r, lane.v, lane.left, lane.hits
+            before.wall, before.impulse = lanes.wall[i], 0.0
 
-class Counts(NamedTuple):
+    def note(self, lanes, i, impulse):
+        """Note the impulse per mass that the wall of a lane gives."""
+        Before(lanes.before, i).impulse += impulse
+
+    def add_rows(self, method, chain, state, lanes, live):
+        """A row for each lane with one more impact than before its contact."""
+        _add_rows(self, method, chain, state, lanes, live)
+
+    def add_row(self, method, chain, state, particle, struck):
+        """A row for an impact of a particle."""
+        if self.has(particle):
+            _add_row(self, method, chain, state, particle, struck)
+
+    def has(self, particle):
+        """Whether a particle has rows."""
+        return True if self.chosen is None else self.chosen[index(particle)]
+
+
+class Counts(Record):
     """Impacts on each wall of the chain that one thread has computed."""
 
     impacts: Array  # (walls,) int64
 
+    def keep_before(self, lanes, live):
+        """Keep of every lane what says whether its contact is an impact."""
+        for i in range(index(live)):
+            before = Before(lanes.before, i)
+            before.hits, before.wall = lanes.lane(i).hits, lanes.wall[i]
 
-class Struck(NamedTuple):
-    """An impact: where, with the velocities before and after, on which wall, and the impulse per mass."""
+    def note(self, lanes, i, impulse):
+        """Nothing: impulses are not counted."""
 
-    r: Vec
-    before: Vec
-    after: Vec
-    wall: float
-    left: float  # of the frame [s]
-    impulse: float
+    def add_rows(self, method, chain, state, lanes, live):
+        """Count the impacts of a pass."""
+        for i in range(index(live)):
+            before = Before(lanes.before, i)
+            # A lane without an impact may be at no wall.
+            self.impacts[index(int(max(before.wall, 0.0)))] += np.int64(lanes.lane(i).hits - before.hits)
+
+    def add_row(self, method, chain, state, particle, struck):
+        """Count an impact of a particle."""
+        self.impacts[index(int(struck.wall))] += 1
 
 
 # --- A log that is full ----------------------------------------------------------------------------------
 
 
-@by_type
 def is_full(log):
     """Whether a pass may have more rows than there is room for."""
-    return False
+    return False if log is None else log.filled[0] + LANES > log.time.size
 
 
-is_full.register(Log, lambda log: log.filled[0] + LANES > log.time.size)
+def keep_going(log, *places):
+    """Keep where a kernel is that ends since its log is full: (particle, stop, draws, live lanes, passes)."""
+    for k, place in enumerate(places):
+        log.going[k] = place
 
 
-@by_type
-def keep_going(log, following, stop, drawn, live, passes):
-    """Keep where a kernel is that ends since its log is full."""
-
-
-@keep_going.register(Log)
-def _(log, following, stop, drawn, live, passes):
-    going = log.going
-    going[0], going[1], going[2], going[3], going[4] = following, stop, drawn, live, passes
-
-
-@by_type
 def gone_on(log):
     """Where a kernel goes on: (particle, stop, draws, live lanes, passes)."""
-    return 0, 0, 0, 0, 0
-
-
-@gone_on.register(Log)
-def _(log):
-    going = log.going
-    following, stop, drawn, live, passes = going[0], going[1], going[2], going[3], going[4]
+    if log is None:
+        return 0, 0, 0, 0, 0
+    places = tuple(log.going[k] for k in range(GOING))
     for k in range(GOING):
-        going[k] = 0
-    return following, stop, drawn, live, passes
+        log.going[k] = 0
+    return places
 
 
-# --- Of the lanes of a pass ------------------------------------------------------------------------------
+# --- Rows ------------------------------------------------------------------------------------------------
 
 
-@by_type
-def keep_before(log, lanes, live):
-    """Keep what every lane is before its contact."""
-
-
-@keep_before.register(Log)
-def _(log, lanes, live):
-    rows, before = lanes.rows, lanes.before
-    for i in range(index(live)):
-        put(before, _R, i, column(rows, R, i))
-        put(before, _V, i, column(rows, V, i))
-        before[_LEFT, i], before[_HITS, i] = rows[LEFT, i], rows[HITS, i]
-        before[_WALL, i], before[_IMPULSE, i] = lanes.wall[i], 0.0
-
-
-@keep_before.register(Counts)
-def _(log, lanes, live):
-    for i in range(index(live)):
-        lanes.before[_HITS, i], lanes.before[_WALL, i] = lanes.rows[HITS, i], lanes.wall[i]
-
-
-@by_type
-def note(log, lanes, i, impulse):
-    """Note the impulse per mass that the wall of a lane gives."""
-
-
-@note.register(Log)
-def _(log, lanes, i, impulse):
-    lanes.before[_IMPULSE, i] += impulse
-
-
-@by_type_outlined
-def add_rows(log, method, chain, state, lanes, live):
-    """A row for each lane with one more impact than before its contact, or a count."""
-
-
-@add_rows.register(Log)
-def _(log, method, chain, state, lanes, live):
-    rows, before, order, n = lanes.rows, lanes.before, log.order, index(0)
+@outlined
+def _add_rows(log, method, chain, state, lanes, live):
+    order, n = log.order, index(0)
     for i in range(index(live)):
         order[n] = i
-        n += index((rows[HITS, i] > before[_HITS, i]) & _is_chosen(log.chosen, lanes.particle[i]))
+        n += index((lanes.lane(i).hits > Before(lanes.before, i).hits) & log.has(lanes.particle[i]))
     for k in range(n):
         i = index(order[k])
-        struck = Struck(
-            column(before, _R, i), column(before, _V, i), column(rows, V, i), before[_WALL, i], before[_LEFT, i],
-            before[_IMPULSE, i],
-        )  # fmt: skip
+        before = Before(lanes.before, i)
+        struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.left, before.impulse)
         _add(log, method, chain, state, lanes.particle[i], struck)
 
 
-@add_rows.register(Counts)
-def _(log, method, chain, state, lanes, live):
-    before = lanes.before
-    for i in range(index(live)):
-        # A lane without an impact may be at no wall.
-        log.impacts[index(int(max(before[_WALL, i], 0.0)))] += np.int64(lanes.rows[HITS, i] - before[_HITS, i])
+@outlined
+def _add_row(log, method, chain, state, particle, struck):
+    _add(log, method, chain, state, particle, struck)
 
 
-@by_type
-def _is_chosen(chosen, particle):
-    return chosen[index(particle)]
-
-
-_is_chosen.register(Nothing, lambda chosen, particle: True)
-
-
-# --- Of one particle -------------------------------------------------------------------------------------
-
-
-@by_type_outlined
-def add_row(log, method, chain, state, particle, struck):
-    """A row for an impact of a particle, or a count."""
-
-
-@add_row.register(Log)
-def _(log, method, chain, state, particle, struck):
-    if _is_chosen(log.chosen, particle):
-        _add(log, method, chain, state, particle, struck)
-
-
-@add_row.register(Counts)
-def _(log, method, chain, state, particle, struck):
-    log.impacts[index(int(struck.wall))] += 1
-
-
-@by_type_outlined
+@outlined
 def add_escape(log, state, particle, struck):
-    """A row, without an impulse, for a particle that passes an opening."""
+    """A row, without an impulse or a slip, for a particle that passes an opening."""
+    if log.has(particle):
+        k = _add_struck(log, state, particle, struck)
+        if log.slip is not None:
+            _put(log.slip, k, ZERO)
 
 
-@add_escape.register(Log)
-def _(log, state, particle, struck):
-    if _is_chosen(log.chosen, particle):
-        _no_slip(log.slip, _add_struck(log, state, particle, struck))
-
-
-@inlined
 def _add(log, method, chain, state, particle, struck):
-    _add_slip(log.slip, _add_struck(log, state, particle, struck), method, chain, struck)
+    k = _add_struck(log, state, particle, struck)
+    if log.slip is not None:
+        now = at(chain, struck.left)
+        u = wall_velocity(wall_laws.moving(methods.laws(method)), now, struck.wall, struck.r)
+        n, before = walls.unit_normal(now, struck.wall, struck.r), relative(u, struck.before)
+        _put(log.slip, k, before - dot(before, n) * n)
 
 
-@inlined
 def _add_struck(log, state, particle, struck):
-    """What every row has; its number."""
+    """The columns of every row; its number."""
     k, p = index(log.filled[0]), index(particle)
     log.filled[0] += 1
     log.time[k] = max(log.begin, log.end - struck.left)
@@ -214,37 +190,11 @@ def _add_struck(log, state, particle, struck):
     _put(log.velocity_before, k, struck.before)
     _put(log.velocity_after, k, struck.after)
     log.impulse[k] = struck.impulse * state.mass[p]
-    _add_image(log.image, k, state.image, p)
+    if log.image is not None:
+        for axis in range(3):
+            log.image[k, axis] = np.int32(state.image[axis, p])
     return k
 
 
-@inlined
 def _put(rows, k, vector):
     rows[k, 0], rows[k, 1], rows[k, 2] = vector.x, vector.y, vector.z
-
-
-@by_type
-def _add_slip(slip, k, method, chain, struck):
-    now = at(chain, struck.left)
-    u = wall_velocity(wall_laws.moving(methods.laws(method)), now, struck.wall, struck.r)
-    n, before = walls.unit_normal(now, struck.wall, struck.r), relative(u, struck.before)
-    _put(slip, k, before - dot(before, n) * n)
-
-
-_add_slip.register(Nothing, lambda slip, k, method, chain, struck: None)
-
-
-@by_type
-def _no_slip(slip, k):
-    _put(slip, k, ZERO)
-
-
-_no_slip.register(Nothing, lambda slip, k: None)
-
-
-@by_type
-def _add_image(rows, k, image, p):
-    rows[k, 0], rows[k, 1], rows[k, 2] = np.int32(image[0, p]), np.int32(image[1, p]), np.int32(image[2, p])
-
-
-_add_image.register(Nothing, lambda rows, k, image, p: None)

@@ -9,26 +9,27 @@ from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
 from ..contact.reflection import given, wall_velocity
 from ..kernel.gravity import potential
-from ..kernel.jit import by_type, by_type_outlined, long_kernel, outlined, scratch
+from ..kernel.jit import long_kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from ..surfaces.near import count_near, list_near
-from ..surfaces.openings import Openings
 from . import log as impact_log
-from .accounts import book, book_step, book_work, lose
-from .arrays import LANES, booked, following_particle, speed2_scale
-from .arrays import heat as book_heat
+from .accounts import book, book_heat, book_step, book_work, lose
+from .arrays import booked, following_particle, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of, met_wall
+from .table import LANES
 from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
+# A call goes on with its next particle: no status.
+_GOES_ON = -1
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -39,16 +40,24 @@ def meet_block(method, chain, gravity, share):
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
-        if following == stop:
-            return Status.DONE.value, 0, drawn
-        if done // LANES >= share.halt[0]:
-            return Status.INTERRUPTED.value, 0, drawn
-        if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-            return Status.LOG_FULL.value, 0, drawn
+        status = _ends(share, following, stop, drawn, done)
+        if status != _GOES_ON:
+            return status, 0, drawn
         if not _decide(method, chain, gravity, share, following):
             return Status.STALLED.value, following, drawn
         following, done = following + 1, done + 1
+
+
+def _ends(share, following, stop, drawn, done):
+    """The status with which a call ends before its next particle, or that it goes on."""
+    if following == stop:
+        return Status.DONE.value
+    if done // LANES >= share.halt[0]:
+        return Status.INTERRUPTED.value
+    if impact_log.is_full(share.log):
+        impact_log.keep_going(share.log, following, stop, drawn, 0, done)
+        return Status.LOG_FULL.value
+    return _GOES_ON
 
 
 @outlined
@@ -57,24 +66,19 @@ def _decide(method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     carried, chain = chain, at(chain, left)
-    contacts.met[i] = met_wall(state.openings, method, chain, contacts.met[i], r, v)
-    if let_out_of(state.openings, method, share, i, contacts.met[i], r, left):
-        _leave(share, i)
+    if state.openings is not None and _let_out(method, chain, share, i, r, v, left):
         return True
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - left
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    if first >= 0.0 and _exchange_heat(methods.thermal(method), method, carried, gravity, share, i):
+    is_hot = methods.thermal(method) is not None
+    if is_hot and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
-    held = scratch((2, walls.length(chain)), np.float64)
-    if wall_laws.moving(method.laws) is not None:
-        settles = is_carried(wall_laws.moving(method.laws), method, carried, gravity, p)
-    else:
-        settles = events.settles(method, chain, gravity, p, held)
+    settles = _settles(method, carried, gravity, p)
     if again > _OFTEN or settles:
-        found = events.Next(CAREFUL, v, 0.0, p.twice, wall)
+        found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
         found = events.enter(method, chain, gravity, wall, p)
     elif second < 0.0:
@@ -85,12 +89,12 @@ def _decide(method, chain, gravity, share, i):
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
         struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
-        impact_log.add_row(share.log, method, carried, state, i, struck)
-        impact_log.add_row(share.counts, method, carried, state, i, struck)
+        for watch in share.watches():
+            watch.add_row(method, carried, state, i, struck)
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
     u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
-    book(carried, state, i, wall, p.twice, found.twice, given(u, found.v - v), wall_laws.loses(method.laws))
+    book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), wall_laws.loses(method.laws))
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
     if phase == FLYING:
@@ -104,9 +108,25 @@ def _decide(method, chain, gravity, share, i):
     contacts.walls[0, i] = found.wall if slides else -1.0
     contacts.walls[1, i] = found.other if slides else -1.0
     contacts.phase[i] = phase if phase in (HELD, EDGE) else FLYING
-    share.phase[i] = phase
-    share.pending[phase] += 1
+    share.hand_over(i, phase)
     return again < _MOST
+
+
+def _settles(method, chain, gravity, p):
+    """Whether the walls around a particle hold it."""
+    if wall_laws.moving(method.laws) is not None:
+        return is_carried(method, chain, gravity, p)
+    return events.settles(method, chain, gravity, p, scratch((2, walls.length(chain)), np.float64))
+
+
+def _let_out(method, chain, share, i, r, v, left):
+    """Whether particle i has escaped, since the wall that it has met is open there."""
+    openings, met = share.state.openings, share.state.contacts.met
+    met[i] = met_wall(openings, method, chain, met[i], r, v)
+    if not let_out_of(openings, method, share, i, met[i], r, left):
+        return False
+    _leave(share, i)
+    return True
 
 
 @outlined
@@ -116,18 +136,12 @@ def _leave(share, i):
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
     contacts.phase[i] = FLYING
-    share.phase[i] = ARRIVED
-    share.pending[ARRIVED] += 1
+    share.hand_over(i, ARRIVED)
 
 
-@by_type_outlined
-def _exchange_heat(thermal, method, chain, gravity, share, i):
+@outlined
+def _exchange_heat(method, chain, gravity, share, i):
     """Whether a thermal wall accommodates a sliding particle: then it flies."""
-    return False
-
-
-@_exchange_heat.register(wall_laws.Given)
-def _(thermal, method, chain, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     now = at(chain, contacts.left[i])
@@ -141,18 +155,17 @@ def _(thermal, method, chain, gravity, share, i):
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
-    impact_log.add_row(share.log, method, chain, state, i, struck)
-    impact_log.add_row(share.counts, method, chain, state, i, struck)
+    for watch in share.watches():
+        watch.add_row(method, chain, state, i, struck)
     state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
-    share.phase[i] = FLYING
-    share.pending[FLYING] += 1
+    share.hand_over(i, FLYING)
     return True
 
 
 @outlined
 def _spare(moving, chain, state, i, found, wall):
-    """What its walls give less to particle i, which chatters, than to one that has no speed across them."""
+    """Book how much less its walls give particle i, which chatters, than one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
     turned = v - found.impulse * walls.unit_normal(chain, wall, r)
     if found.phase == HELD:
@@ -171,17 +184,16 @@ def careful_block(method, chain, gravity, share):
     following, stop, drawn, _live, done = impact_log.gone_on(share.log)
     while True:
         following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
-        if following == stop:
-            return Status.DONE.value, 0, drawn
-        if done // LANES >= share.halt[0]:
-            return Status.INTERRUPTED.value, 0, drawn
-        if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-            return Status.LOG_FULL.value, 0, drawn
+        status = _ends(share, following, stop, drawn, done)
+        if status != _GOES_ON:
+            return status, 0, drawn
         _step(method, chain, gravity, share, following)
-        return_particle(share.state.period, chain, share.state, following)
+        if share.state.period is not None:
+            return_particle(share.state.period, chain, share.state, following)
         contacts = share.state.contacts
-        closed = _have_closed(chain, method, column(share.state.position, 0, following), contacts.left[following])
+        closed = isinstance(chain, Carried) and _have_closed(
+            chain, method, column(share.state.position, 0, following), contacts.left[following]
+        )
         if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:
             return Status.STALLED.value, following, drawn
         following, done = following + 1, done + 1
@@ -205,8 +217,7 @@ def _rest(method, chain, gravity, share, i, p, held):
     contacts.sliding[i] += p.left
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
     contacts.phase[i] = ARRIVED
-    share.phase[i] = ARRIVED
-    share.pending[ARRIVED] += 1
+    share.hand_over(i, ARRIVED)
 
 
 @outlined
@@ -217,7 +228,7 @@ def _step(method, chain, gravity, share, i):
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
     now = at(chain, left)
-    if let_out_at(state.openings, method, now, share, i, r, left):
+    if state.openings is not None and let_out_at(state.openings, method, now, share, i, r, left):
         _leave(share, i)
         return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
@@ -225,16 +236,19 @@ def _step(method, chain, gravity, share, i):
     if wall_laws.moving(method.laws) is None and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
         return
-    phase = carry(state.openings, method, chain, gravity, state, i, p)
-    if phase != NOT_CARRIED:
-        contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
-        contacts.step[i], contacts.keep[i] = 0.0, 0.0
-        contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
-        share.phase[i] = phase
-        share.pending[phase] += 1
-        return
+    # Step by step, where places on its way are looked at.
+    if wall_laws.moving(method.laws) is not None and state.openings is None and state.period is None:
+        phase = carry(method, chain, gravity, state, i, p)
+        if phase != NOT_CARRIED:
+            contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
+            contacts.step[i], contacts.keep[i] = 0.0, 0.0
+            contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+            share.hand_over(i, phase)
+            return
     contacts.short_steps[i] += 1.0
-    p = _looked_at(state.openings, method, p)
+    if state.openings is not None and square(v) > 0.0:
+        # A short step, where the places on its way are looked at.
+        p = p._replace(left=min(left, 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))))
     end = events.careful(method, chain, gravity, contacts.met[i], p, impulses)
     for s in range(impulses.shape[0]):
         state.impulse[s, i] += impulses[s, 0] * state.mass[i]
@@ -243,36 +257,18 @@ def _step(method, chain, gravity, share, i):
     given_work = 0.0
     for s in range(walls.length(chain), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
-    book_step(chain, state, i, contacts.met[i], p.twice, end.twice_energy, given_work, wall_laws.loses(method.laws))
+    change = p.twice, end.twice_energy
+    book_step(chain, state, i, contacts.met[i], change, given_work, wall_laws.loses(method.laws))
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED
     contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
-    share.phase[i] = phase
-    share.pending[phase] += 1
+    share.hand_over(i, phase)
 
 
-@by_type
-def _looked_at(openings, method, p):
-    """A particle whose step may have any length, or a short one where the places on its way are looked at."""
-    return p
-
-
-@_looked_at.register(Openings)
-def _(openings, method, p):
-    most = 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))
-    moves_on = square(p.v) > 0.0
-    return events.Particle(p.r, p.v, min(p.left, most) if moves_on else p.left, p.twice, p.scale2)
-
-
-@by_type_outlined
+@outlined
 def _have_closed(chain, method, r, left):
     """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
-    return False
-
-
-@_have_closed.register(Carried)
-def _(chain, method, r, left):
     now, deepest = at(chain, left), 0.0
     number = scratch(count_near(now, r), np.float64)
     list_near(now, 0, 0.0, r, number)

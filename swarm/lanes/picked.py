@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import by_type, copy_row, index, scratch, select
+from ..kernel.jit import copy_row, index, scratch, select
 from ..kernel.record import Record
 from ..surfaces.fields.members import gathered, width
-from ..surfaces.fold import Field, count
-from .arrays import STRIDE
+from ..surfaces.fold import Field, count, each
+from ..surfaces.moving import Carried
+from .table import STRIDE
 
 
 class Picked(Record):
@@ -30,41 +31,32 @@ class Picked(Record):
         return self.body
 
 
-@by_type
+def _fields(chain):
+    """The fields of a chain. Of walls that move each contact looks at all."""
+    return () if isinstance(chain, Carried) else tuple(link for link in each(chain) if isinstance(link, Field))
+
+
 def picks(chain):
     """Room for the numbers of a body in each lane, of every field of a chain."""
-    return
+    return tuple(scratch((STRIDE, width(link.first.like)), np.float64) for link in _fields(chain))
 
 
-@picks.register(Field)
-def _(chain):
-    return scratch((STRIDE, width(chain.first.like)), np.float64), picks(chain.rest)
-
-
-@by_type
-def pick(chain, before, lanes, picked, live):
+def pick(chain, lanes, picked, live):
     """The numbers of the body that each lane has met; of any where it has met none of this field."""
+    before = 0.0
+    for link, rows in zip(_fields(chain), picked, strict=True):
+        members = link.first
+        last = count(members) - 1.0
+        for i in range(index(live)):
+            wall = lanes.wall[i] - before
+            m = index(int(select(wall < 0.0, 0.0, select(wall > last, last, wall))))
+            copy_row(rows, i, members.table, m, width(members.like))
+        before = before + count(members)
 
 
-@pick.register(Field)
-def _(chain, before, lanes, picked, live):
-    members, (rows, others) = chain.first, picked
-    last = count(members) - 1.0
-    for i in range(index(live)):
-        wall = lanes.wall[i] - before
-        m = index(int(select(wall < 0.0, 0.0, select(wall > last, last, wall))))
-        copy_row(rows, i, members.table, m, width(members.like))
-    pick(chain.rest, before + count(members), lanes, others, live)
-
-
-@by_type
 def of_lane(chain, picked, i):
     """The walls of a scene for the contact of one lane."""
-    return chain
-
-
-@of_lane.register(Field)
-def _(chain, picked, i):
-    rows, others = picked
-    body = gathered(chain.first.like, rows, i, 0)
-    return Field(Picked(body, count(chain.first)), of_lane(chain.rest, others, i))
+    if not picked:
+        return chain
+    body = gathered(chain.first.like, picked[0], i, 0)
+    return Field(Picked(body, count(chain.first)), of_lane(chain.rest, picked[1:], i))

@@ -4,31 +4,27 @@ What the loops write is on the stack: of an array that comes from elsewhere the 
 the tables, whose rows are looked up, and vectorises nothing.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..kernel.gravity import Gravity, Nothing
-from ..kernel.jit import Array, by_type, by_type_outlined, copy_row, index, inlined, outlined, select, unwritten
+from ..kernel.jit import Array, copy_row, index, outlined, select, unwritten
+from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import contract, flights, fold
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
-from ..surfaces.fields.members import Few, Members, gathered, member, width
+from ..surfaces.fields.members import Few, gathered, member, width
 from ..surfaces.period import on_time
-from .arrays import LEFT, ROWS, STRIDE, R, V
-from .marks import marked_lanes
+from .arrays import Flying
+from .table import STRIDE, marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.
 _MANY = 8
-# What a lane knows of its flight, in rows of `course`: when it ends, and at which wall, or -1.
+# The flight of a lane, in rows of `course`: when it ends, and at which wall, or -1.
 _TIME, _WALL = 0, 1
-# From this row on `lanes.rows` has the flights of lanes that are closed up.
-_CLOSED_UP = ROWS
 
 
-class Seen(NamedTuple):
-    """What lanes know of their flights so far, and of the bodies near them."""
+class Seen(Record):
+    """The flights of lanes as far as they are known, and the bodies near them."""
 
     owner: Array  # int64, whose they are
     time: Array  # when the flight ends
@@ -39,60 +35,49 @@ class Seen(NamedTuple):
     body: Array  # (stride, width), its numbers
 
 
-class Near(NamedTuple):
-    """Which of the bodies of their cells lanes look at, and from which row on `lanes.rows` has their flights."""
+class Near(Record):
+    """Which of the bodies of their cells lanes look at, and from which row on their flights are in `lanes.rows`."""
 
     k: int
     row: int
 
 
-@inlined
 def keep_hit(lanes, i, hit, before):
     """Keep the `Hit` that was found for a lane, with a wall that has so many walls before it."""
     lanes.course[_TIME, i], lanes.course[_WALL, i] = hit.time, select(hit.wall < 0.0, -1.0, hit.wall + before)
 
 
-@inlined
 def hit_of_lane(lanes, i):
     """The `Hit` that was found for a lane."""
     return flights.Hit(lanes.course[_TIME, i], lanes.course[_WALL, i])
 
 
-@by_type_outlined
+@outlined
 def seek(chain, before, gravity, lanes, live):
     """The first hit of every live lane with the fields of a chain that has so many walls before it, or one found."""
+    if not isinstance(chain, fold.Field):
+        return
+    members = chain.first
+    seek(chain.rest, before + fold.count(members), gravity, lanes, live)
+    if isinstance(members, Few):
+        _look_at_all(members, before, lanes, live)
+    else:
+        _look_at_near(gravity, members, before, lanes, live)
 
 
-@seek.register(fold.Field)
-def _(chain, before, gravity, lanes, live):
-    seek(chain.rest, before + fold.count(chain.first), gravity, lanes, live)
-    _seek_among(chain.first, before, gravity, lanes, live)
-
-
-@by_type
-def _seek_among(members, before, gravity, lanes, live):
-    """The first hits with the bodies of a field, where they are sooner than what is found already."""
-
-
-@_seek_among.register(Few)
-def _(members, before, gravity, lanes, live):
-    # Flights are straight.
-    rows, course = lanes.rows, lanes.course
+def _look_at_all(members, before, lanes, live):
+    """Every lane, whose flight is straight, at all bodies of a field."""
+    course = lanes.course
     for m in range(members.table.shape[0]):
         body, number = member(members, index(m)), before + m
         for i in range(index(live)):
-            time, hits = contract.first_hit(body, column(rows, R, i), column(rows, V, i))
+            lane = lanes.lane(i)
+            time, hits = contract.first_hit(body, lane.r, lane.v)
             sooner = time < course[_TIME, i]
             course[_TIME, i] = select(sooner, time, course[_TIME, i])
             course[_WALL, i] = select(sooner, select(hits, number, -1.0), course[_WALL, i])
 
 
-@_seek_among.register(Members)
-def _(members, before, gravity, lanes, live):
-    _look_at_near(gravity, members, before, lanes, live)
-
-
-@inlined
 def _look_at_near(gravity, members, before, lanes, live):
     """Every lane at the bodies near it: those in its cell, or all."""
     course, grid, columns = lanes.course, members.grid, width(members.like)
@@ -109,7 +94,7 @@ def _look_at_near(gravity, members, before, lanes, live):
         most = max(most, seen.number[i])
     for k in range(most):
         some = _close_up(seen, k, lanes, n, row)
-        n, row = some, select(some < n, _CLOSED_UP, row)
+        n, row = some, select(some < n, Flying.CLOSED_UP, row)
         for i in range(index(n)):
             seen.which[i] = grid.entries[index(select(k < seen.number[i], seen.first[i] + k, 0))]
             copy_row(seen.body, i, members.table, index(int(seen.which[i])), columns)
@@ -122,17 +107,16 @@ def _look_at_near(gravity, members, before, lanes, live):
             _give_back(seen, lanes, i)
 
 
-@inlined
 def _find_near(members, gravity, lanes, live, seen):
     """Which bodies are near each lane, and until when it knows that."""
     grid = members.grid
     for i in range(index(live)):
-        r = column(lanes.rows, R, i)
+        lane = lanes.lane(i)
+        r, v = lane.r, lane.v
         cell = cell_of(grid, r)
-        v = column(lanes.rows, V, i)
         until = until_next(gravity, grid, cell, r, v)
         # Bodies are known twice the margin beyond the cell's wall, and a flight ends one beyond it.
-        until = on_time(lanes.period, gravity, (r, v), lanes.rows[LEFT, i], until, 0.5 * grid.margin)
+        until = on_time(lanes.period, gravity, (r, v), lane.left, until, 0.5 * grid.margin)
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])
@@ -144,7 +128,6 @@ def _find_near(members, gravity, lanes, live, seen):
         seen.number[i] = grid.first[cell + index(1)] - seen.first[i]
 
 
-@inlined
 def _close_up(seen, k, lanes, n, row):
     """Give back the lanes that have no body k, where these are most, and close up the others: how many there are.
 
@@ -159,53 +142,32 @@ def _close_up(seen, k, lanes, n, row):
     for i in range(index(n)):
         _give_back(seen, lanes, i)
         number = seen.number[i]
-        put(lanes.rows, _CLOSED_UP + R, j, column(lanes.rows, row + R, i))
-        put(lanes.rows, _CLOSED_UP + V, j, column(lanes.rows, row + V, i))
+        put(lanes.rows, Flying.CLOSED_UP, j, column(lanes.rows, row, i))
+        put(lanes.rows, Flying.CLOSED_UP + 3, j, column(lanes.rows, row + 3, i))
         seen.owner[j], seen.time[j], seen.wall[j] = seen.owner[i], seen.time[i], seen.wall[i]
         seen.number[j], seen.first[j] = number, seen.first[i]
         j += index(k < number)
     return some
 
 
-@inlined
 def _give_back(seen, lanes, i):
-    """What a lane has found."""
+    """Keep the hit that a lane has found."""
     owner = index(seen.owner[i])
     lanes.course[_TIME, owner], lanes.course[_WALL, owner] = seen.time[i], seen.wall[i]
 
 
-@by_type
 def _look(gravity, like, before, lanes, live, seen, near):
-    """Every lane at the next of these bodies."""
+    """Every lane at the next of these bodies: in closed form where flights are straight and none is met by steps."""
+    if gravity is None and flights.in_steps(like) is None:
+        for i in range(index(live)):
+            time, hits = contract.first_hit(gathered(like, seen.body, i, 0), *_flight(lanes.rows, near, i))
+            _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
+    else:
+        _look_by_steps(gravity, like, before, lanes, live, seen, near)
 
 
-@_look.register(Nothing)
-def _(gravity, like, before, lanes, live, seen, near):
-    _look_straight(flights.in_steps(like), like, before, lanes, live, seen, near)
-
-
-@_look.register(Gravity)
-def _(gravity, like, before, lanes, live, seen, near):
-    _look_by_steps(gravity, like, before, lanes, live, seen, near)
-
-
-@by_type
-def _look_straight(steps, like, before, lanes, live, seen, near):
-    """The same without gravity, where a body is met by steps or in closed form."""
-    _look_by_steps(None, like, before, lanes, live, seen, near)
-
-
-@_look_straight.register(Nothing)
-def _(steps, like, before, lanes, live, seen, near):
-    rows = lanes.rows
-    for i in range(index(live)):
-        body = gathered(like, seen.body, i, 0)
-        time, hits = contract.first_hit(body, *_flight(rows, near, i))
-        _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
-
-
-@inlined
 def _look_by_steps(gravity, like, before, lanes, live, seen, near):
+    """The same by safe steps."""
     rows, marked, order, course = lanes.rows, lanes.marked, lanes.order, unwritten((flights.COURSE, STRIDE), np.float64)
     for i in range(index(live)):
         flights.begin(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
@@ -227,19 +189,16 @@ def _look_by_steps(gravity, like, before, lanes, live, seen, near):
         _take(seen, i, near, hit.time, select(hit.wall < 0.0, -1.0, seen.which[i] + before))
 
 
-@inlined
 def _flight(rows, near, i):
     """The position and the velocity of a lane."""
-    return column(rows, index(near.row + R), i), column(rows, index(near.row + V), i)
+    return column(rows, index(near.row), i), column(rows, index(near.row + 3), i)
 
 
-@inlined
 def _one(like, seen, i):
     """The body of a lane, as a chain."""
     return fold.Chain(gathered(like, seen.body, i, 0), None)
 
 
-@inlined
 def _goes_on(like, course, seen, i, near):
     """Whether more safe steps may find a hit that is the first so far."""
     hit = flights.end(_one(like, seen, i), course, 0, i)
@@ -255,7 +214,6 @@ def _go_on(like, gravity, rows, course, seen, i, near, steps):
             break
 
 
-@inlined
 def _take(seen, i, near, time, wall):
     """A hit with that body, if there is one and it is the first so far."""
     sooner = (near.k < seen.number[i]) & (time < seen.time[i])

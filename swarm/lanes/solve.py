@@ -8,85 +8,78 @@ import numpy as np
 from ..contact.impulse import LoopRecord
 from ..contact.reflection import Turned
 from ..contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, inlined, kept, select
+from ..kernel.jit import kept, outlined, select
 from ..kernel.vector import column, put
 from ..methods import contract as methods
-from ..particles import Multipliers
-from .arrays import LEFT, lane_of
 
 
-@by_type
-def solve(unknown, method, chain, gravity, multipliers, lanes, live):
+def solve(method, chain, gravity, multipliers, lanes, live):
     """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
-
-
-@solve.register(object)
-def _(unknown, method, chain, gravity, multipliers, lanes, live):
     if methods.most_sweeps(method, chain) > 0:
         for i in range(live):
             lanes.kappa[i], lanes.unsolved[i] = methods.guess(
-                method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i]
+                method, chain, gravity, lanes.given(method, i), lanes.wall[i]
             )
-    _begin_multipliers(multipliers, method, chain, gravity, lanes, live)
+    if multipliers is not None:
+        _begin_multipliers(method, chain, gravity, lanes, live)
     _newton(method, chain, gravity, multipliers, lanes, live)
-    _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
+    if multipliers is not None:
+        _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if methods.turns(method):
         for i in range(live):
-            turned = methods.turn(method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], lanes.kappa[i])
+            turned = methods.turn(method, chain, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
             put(lanes.turned, 0, i, turned.v)
             lanes.turned[3, i] = turned.impulse
 
 
-@solve.register(Nothing)
-def _(unknown, method, chain, gravity, multipliers, lanes, live):
-    pass
-
-
-@by_type
-def solution(unknown, method, lanes, i):
-    """What `solve` left of a lane."""
-    raise NotImplementedError
-
-
-@solution.register(object)
-def _(unknown, method, lanes, i):
+def solution(method, lanes, i):
+    """The `Solution` of a lane: nothing where contacts have a closed form."""
+    if methods.solves(method) is None:
+        return methods.Solution(0.0, False, methods.NOT_TURNED)
     turned = methods.NOT_TURNED
     if methods.turns(method):
         turned = Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
     return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
 
-@solution.register(Nothing)
-def _(unknown, method, lanes, i):
-    return methods.Solution(0.0, False, methods.NOT_TURNED)
+def _newton(method, chain, gravity, multipliers, lanes, live):
+    """Sweeps of the inner solve, until the last lane is solved."""
+    kappa, unsolved, record = lanes.kappa, lanes.unsolved, lanes.record
+    for _sweep in range(methods.most_sweeps(method, chain)):
+        remaining = 0
+        for i in range(live):
+            going = unsolved[i]
+            kappa[i], unsolved[i], found = methods.improve(
+                method, chain, gravity, lanes.given(method, i), lanes.wall[i],
+                methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), record[MULTIPLIER, i],
+            )  # fmt: skip
+            if multipliers is not None:
+                record[MEAN, i] = select(going, found.mean, kept(record[MEAN, i]))
+                record[STORED, i] = select(going, found.stored, kept(record[STORED, i]))
+                record[GAIN, i] = select(going, found.gain, kept(record[GAIN, i]))
+            remaining += unsolved[i]
+        if remaining == 0:
+            break
 
 
-@by_type
-def _begin_multipliers(multipliers, method, chain, gravity, lanes, live):
+# --- Multipliers -----------------------------------------------------------------------------------------
+
+
+def _begin_multipliers(method, chain, gravity, lanes, live):
     """The start of the loop (8) of every lane that has a contact."""
-
-
-@_begin_multipliers.register(Multipliers)
-def _(multipliers, method, chain, gravity, lanes, live):
     kappa, record = lanes.kappa, lanes.record
     for i in range(live):
         record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
-            method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i], kappa[i]
+            method, chain, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
         )
         lanes.sweeping[i] = lanes.unsolved[i]
         record[BEFORE, i], record[MISS, i] = np.nan, np.nan
         record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
 
 
-@by_type
 def _sweep_multipliers(multipliers, method, chain, gravity, lanes, live):
     """Sweeps of the loop (8), until the last lane has converged."""
-
-
-@_sweep_multipliers.register(Multipliers)
-def _(multipliers, method, chain, gravity, lanes, live):
     for _sweep in range(methods.multiplier_sweeps(method)):
         if _update_multipliers(method, lanes, live) == 0:
             break
@@ -95,7 +88,6 @@ def _(multipliers, method, chain, gravity, lanes, live):
         lanes.unsolved[i] = lanes.unsolved[i] | lanes.sweeping[i]
 
 
-@inlined
 def _update_multipliers(method, lanes, live):
     """The end of a sweep of the loop (8): how many lanes need another."""
     record, kappa, unsolved, sweeping = lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
@@ -103,7 +95,7 @@ def _update_multipliers(method, lanes, live):
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
         new, miss, more = methods.next_multiplier(
-            method, lanes.rows[LEFT, i], record[ACCELERATION, i], old,
+            method, lanes.lane(i).left, record[ACCELERATION, i], old,
             LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
             methods.Sweep(record[BEFORE, i], record[MISS, i]),
         )  # fmt: skip
@@ -122,31 +114,28 @@ def _update_multipliers(method, lanes, live):
     return remaining
 
 
-@inlined
-def _newton(method, chain, gravity, multipliers, lanes, live):
-    """Sweeps of the inner solve, until the last lane is solved."""
-    kappa, unsolved = lanes.kappa, lanes.unsolved
-    for _sweep in range(methods.most_sweeps(method, chain)):
-        remaining = 0
-        for i in range(live):
-            going = unsolved[i]
-            kappa[i], unsolved[i], found = methods.improve(
-                method, chain, gravity, lane_of(method, lanes.rows, i), lanes.wall[i],
-                methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), lanes.record[MULTIPLIER, i],
-            )  # fmt: skip
-            _record(multipliers, lanes.record, i, going, found)
-            remaining += unsolved[i]
-        if remaining == 0:
-            break
+@outlined
+def count_sweeps(multipliers, lanes, live):
+    """Add the records of the lanes that had a contact to their particles; nothing where there are no multipliers."""
+    if multipliers is None:
+        return
+    record = lanes.record
+    for i in range(live):
+        if record[SWEEPS, i] > 0.0:
+            particle = lanes.particle[i]
+            multipliers.sweeps[particle] += np.int64(record[SWEEPS, i])
+            multipliers.contacts[particle] += 1
+            multipliers.unconverged[particle] += np.int64(record[UNCONVERGED, i])
+            multipliers.stored_energy[particle] = max(multipliers.stored_energy[particle], record[STORED, i])
+            record[SWEEPS, i] = 0.0
 
 
-@by_type
-def _record(multipliers, record, lane, going, found):
-    """What the loop (8) asks of a sweep of the inner solve."""
-
-
-@_record.register(Multipliers)
-def _(multipliers, record, lane, going, found):
-    record[MEAN, lane] = select(going, found.mean, kept(record[MEAN, lane]))
-    record[STORED, lane] = select(going, found.stored, kept(record[STORED, lane]))
-    record[GAIN, lane] = select(going, found.gain, kept(record[GAIN, lane]))
+@outlined
+def keep_failure(multipliers, lanes, i):
+    """Keep the record of the lane that failed, for the error."""
+    if multipliers is None:
+        return
+    particle = lanes.particle[i]
+    multipliers.sweeps[particle] = np.int64(lanes.record[SWEEPS, i])
+    multipliers.stored_energy[particle] = lanes.record[STORED, i]
+    multipliers.left[particle] = lanes.lane(i).left

@@ -3,80 +3,64 @@
 Until then another wall may come, and strike it.
 """
 
-from typing import NamedTuple
-
 from ..contact import crossing, hold
 from ..contact import laws as wall_laws
 from ..contact import sliding as slides
-from ..contact.events import ARRIVED, EDGE, EVENT, HELD
+from ..contact.events import ARRIVED, EVENT
 from ..contact.projection import ALLOWED
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import by_type, by_type_outlined, outlined
-from ..kernel.vector import ZERO, column, norm, put, square
+from ..kernel.jit import outlined
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, norm, square
 from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at, during
-from .compose import KEEP, LEFT, PRESS, SCALE2, SLOWEST, TWICE, WALL, A, R, V, push, work
+from .compose import SLOWEST
+from .sliding import AGAIN, phase_of, push, work
 
 # Halvings of the interval in which a wall lets a particle go that rests on it.
 _HALVINGS = 60
 # So many paces it stays at a time, and is asked again: a frame may have millions of them, and between them halts count.
 # (Rejected: a halt in any of them. What is carried in two parts is rounded twice.)
 _MOST_PACES = 128.0
-# A lane goes on to stay.
-AGAIN = -1
 # Steps in the search for another wall that comes: where none is met after so many, it is too near to be told.
 _MOST_STEPS = 10_000
 
 
-class Clear(NamedTuple):
+class Clear(Record):
     """Until when no other wall is met, and the wall that is met then, or -1."""
 
     time: float
     wall: float
 
 
-@by_type
-def phase_of(kind):
-    """The phase of particles that one wall holds, or two."""
-    return HELD
-
-
-phase_of.register(hold.Two, lambda kind: EDGE)
-
-
-@by_type_outlined
-def stay(moving, kind, method, chain, gravity, state, lanes, i):
-    """What a lane does that moves with its walls as long as friction, or a balance of forces, holds it there."""
-    return phase_of(kind)
-
-
-@stay.register(wall_laws.Moves)
-def _(moving, kind, method, chain, gravity, state, lanes, i):
-    rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
-    r, v = column(rows, R, i), column(rows, V, i)
+@outlined
+def stay(kind, method, chain, gravity, state, lanes, i):
+    """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
+    lane = lanes.lane(i)
+    left, first, r = lane.left, lane.first, lane.r
     now = at(chain, left)
-    u, slowest = walls.velocity(now, first, r), SLOWEST * rows[SCALE2, i]
-    moves_on = square(v - u) > slowest or _rubs(kind, methods.laws(method), now, lanes, i, r, slowest)
-    if moves_on or not _rests(kind, method, now, gravity, lanes, i, r):
+    u, slowest = walls.velocity(now, first, r), SLOWEST * lane.scale2
+    moves_on = square(lane.v - u) > slowest or _rubs(kind, methods.laws(method), now, lane, r, slowest)
+    if moves_on or not _rests(kind, method, now, gravity, lane, r):
         return phase_of(kind)
     pace, low, high, met, paces = walls.shortest_pace(now), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
-        clear = _clear(kind, method, chain, lanes, i, low, left if low + step >= left else low + step)
+        clear = _clear(kind, method, chain, lane, low, left if low + step >= left else low + step)
         high = clear.time
         middle = 0.5 * (low + high)
         if not (
-            _rests_later(kind, method, chain, gravity, lanes, i, middle)
-            and _rests_later(kind, method, chain, gravity, lanes, i, high)
+            _rests_later(kind, method, chain, gravity, lane, middle)
+            and _rests_later(kind, method, chain, gravity, lane, high)
         ):
             break
         # Simpson's rule for what presses
         one, two, three = (
-            _press_later(kind, method, chain, gravity, lanes, i, low),
-            _press_later(kind, method, chain, gravity, lanes, i, middle),
-            _press_later(kind, method, chain, gravity, lanes, i, high),
+            _press_later(kind, method, chain, gravity, lane, low),
+            _press_later(kind, method, chain, gravity, lane, middle),
+            _press_later(kind, method, chain, gravity, lane, high),
         )
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
@@ -85,65 +69,51 @@ def _(moving, kind, method, chain, gravity, state, lanes, i):
     if low < left and met < 0.0 and not goes_on:
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if _rests_later(kind, method, chain, gravity, lanes, i, middle):
+            if _rests_later(kind, method, chain, gravity, lane, middle):
                 low = middle
             else:
                 high = middle
         end = high
-        one, two = (
-            _press_later(kind, method, chain, gravity, lanes, i, start),
-            _press_later(kind, method, chain, gravity, lanes, i, low),
-        )
+        one = _press_later(kind, method, chain, gravity, lane, start)
+        two = _press_later(kind, method, chain, gravity, lane, low)
         pressed += 0.5 * (one.n + two.n) * (end - start)
         pressed_second += 0.5 * (one.m + two.m) * (end - start)
     after = left - end
-    r1 = walls.carry(during(chain, left, after), first, r)
-    then = at(chain, after)
+    r1, then = _carried(chain, lane, end), at(chain, after)
     v1 = walls.velocity(then, first, r1)
     twice = square(v1) + 2.0 * potential(gravity, r1)
-    given = twice - rows[TWICE, i]
-    rows[TWICE, i], rows[LEFT, i], rows[KEEP, i] = twice, after, 0.0
-    put(rows, R, i, r1)
-    put(rows, V, i, v1)
+    given = twice - lane.twice
+    lane.r, lane.v, lane.left, lane.twice, lane.keep = r1, v1, after, twice, 0.0
     push(chain, state, lanes, i, pressed, pressed_second)
-    work(moving, chain, state, lanes, i, given, 0.0)
+    work(chain, state, lanes, i, given, 0.0)
     state.contacts.sliding[lanes.particle[i]] += end
     if goes_on or not after > 0.0:
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
         state.contacts.met[lanes.particle[i]] = met
-        put(rows, R, i, walls.settle(then, met, r1))
+        lane.r = walls.settle(then, met, r1)
         return EVENT
-    held = kind.of_lane(first, rows[WALL + 1, i])
-    force = slides.force(methods.laws(method), held, then, gravity, r1, v1)
-    put(rows, A, i, force.acceleration)
-    rows[PRESS, i], rows[PRESS + 1, i] = force.n, force.m
+    force = slides.force(methods.laws(method), lane.held(kind), then, gravity, r1, v1)
+    lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
     return phase_of(kind)
 
 
-@by_type
-def _rubs(kind, laws, now, lanes, i, r, slowest):
+def _rubs(kind, laws, now, lane, r, slowest):
     """Whether the second wall has friction and slips on a lane that moves with the first one."""
-    return False
-
-
-@_rubs.register(hold.Two)
-def _(kind, laws, now, lanes, i, r, slowest):
-    second = lanes.rows[WALL + 1, i]
-    slip = column(lanes.rows, V, i) - walls.velocity(now, second, r)
-    return wall_laws.of_wall(wall_laws.friction(laws), second) > 0.0 and square(slip) > slowest
+    if not isinstance(kind, hold.Two):
+        return False
+    slip = lane.v - walls.velocity(now, lane.second, r)
+    return wall_laws.of_wall(wall_laws.friction(laws), lane.second) > 0.0 and square(slip) > slowest
 
 
 @outlined
-def _clear(kind, method, chain, lanes, i, low, high):
+def _clear(kind, method, chain, lane, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
-    rows, left = lanes.rows, lanes.rows[LEFT, i]
-    held = kind.of_lane(rows[WALL, i], rows[WALL + 1, i])
+    left, held, near = lane.left, lane.held(kind), crossing.near(method, lane.r)
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
-        start, then = at(chain, left - time), at(chain, left - end)
-        path, near = _way(chain, lanes, i, time, end), crossing.near(method, column(rows, R, i))
+        start, then, path = at(chain, left - time), at(chain, left - end), _way(chain, lane, time, end)
         if not crossing.meets(start, then, held, path, near):
             if end == high:
                 return Clear(high, -1.0)
@@ -159,46 +129,39 @@ def _clear(kind, method, chain, lanes, i, low, high):
 
 
 @outlined
-def _way(chain, lanes, i, start, end):
+def _carried(chain, lane, t):
+    """Where a lane that moves with its first wall is after a time."""
+    return walls.carry(during(chain, lane.left, lane.left - t), lane.first, lane.r)
+
+
+@outlined
+def _way(chain, lane, start, end):
     """The way of a lane that moves with its first wall, from one time to another."""
-    rows, left, first = lanes.rows, lanes.rows[LEFT, i], lanes.rows[WALL, i]
-    r = column(rows, R, i)
-    r0 = walls.carry(during(chain, left, left - start), first, r)
-    r1 = walls.carry(during(chain, left, left - end), first, r)
-    v0, v1 = walls.velocity(at(chain, left - start), first, r0), walls.velocity(at(chain, left - end), first, r1)
+    r0, r1 = _carried(chain, lane, start), _carried(chain, lane, end)
+    v0 = walls.velocity(at(chain, lane.left - start), lane.first, r0)
+    v1 = walls.velocity(at(chain, lane.left - end), lane.first, r1)
     return crossing.Path(r0, v0, r1, v1, end - start)
 
 
 @outlined
-def _rests(kind, method, now, gravity, lanes, i, r):
+def _rests(kind, method, now, gravity, lane, r):
     """Whether a lane that moves with its first wall goes on to do so from here."""
-    force, acceleration = _force_at_rest(kind, method, now, gravity, lanes, i, r)
+    force, acceleration = _force_at_rest(kind, method, now, gravity, lane, r), walls.acceleration(now, lane.first, r)
     pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
     pressed = not kind.lets_go(force.n, force.m)
     return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
 
 
 @outlined
-def _force_at_rest(kind, method, now, gravity, lanes, i, r):
-    """The force on a lane at r that moves with its first wall, and the acceleration of that."""
-    first = lanes.rows[WALL, i]
-    held = kind.of_lane(first, lanes.rows[WALL + 1, i])
-    u = walls.velocity(now, first, r)
-    return slides.force(methods.laws(method), held, now, gravity, r, u), walls.acceleration(now, first, r)
+def _force_at_rest(kind, method, now, gravity, lane, r):
+    """The force on a lane at r that moves with its first wall."""
+    u = walls.velocity(now, lane.first, r)
+    return slides.force(methods.laws(method), lane.held(kind), now, gravity, r, u)
 
 
-@outlined
-def _rests_later(kind, method, chain, gravity, lanes, i, t):
-    rows = lanes.rows
-    left, r = rows[LEFT, i], column(rows, R, i)
-    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
-    return _rests(kind, method, at(chain, left - t), gravity, lanes, i, r1)
+def _rests_later(kind, method, chain, gravity, lane, t):
+    return _rests(kind, method, at(chain, lane.left - t), gravity, lane, _carried(chain, lane, t))
 
 
-@outlined
-def _press_later(kind, method, chain, gravity, lanes, i, t):
-    rows = lanes.rows
-    left, r = rows[LEFT, i], column(rows, R, i)
-    r1 = walls.carry(during(chain, left, left - t), rows[WALL, i], r)
-    force, _acceleration = _force_at_rest(kind, method, at(chain, left - t), gravity, lanes, i, r1)
-    return force
+def _press_later(kind, method, chain, gravity, lane, t):
+    return _force_at_rest(kind, method, at(chain, lane.left - t), gravity, lane, _carried(chain, lane, t))

@@ -16,7 +16,7 @@ from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
-from ..lanes import compose, meet, slide
+from ..lanes import meet, slide, sliding, table
 from ..lanes import log as impact_log
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles
@@ -193,7 +193,7 @@ class Run(BaseRun):
             self._chain = self._scene.chain(moment)
 
     def share_done(self, span: float) -> float:
-        left = self._halted.rows[lanes.LEFT]
+        left = self._halted.time_left()
         if self.state.contacts is not None:
             left = np.append(left, self.state.contacts.left[self.state.contacts.left > 0.0])
         return float((self._phase == ARRIVED).sum() + (1.0 - left / span).sum()) / len(self._phase)
@@ -216,7 +216,7 @@ class Run(BaseRun):
     def _empty_lanes(self) -> lanes.Lanes:
         made = lanes.empty(len(self._owners), self._booked, self.state.period)
         watched = self._impacts is not None or self._tally is not None
-        return made._replace(before=lanes.table(impact_log.ROWS)) if watched else made
+        return made._replace(before=table.table(impact_log.ROWS)) if watched else made
 
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """What a thread shares with the others, and its counts."""
@@ -235,7 +235,7 @@ class Run(BaseRun):
         common = self._numbers, self._chain, self._gravity, share
         if _KINDS[phase] is None:
             return meet.meet_block if phase == EVENT else meet.careful_block, common
-        return slide.slide_block, (_KINDS[phase], *common, compose.empty(self.state.period, self.state.openings))
+        return slide.slide_block, (_KINDS[phase], *common, sliding.empty(self.state.period, self.state.openings))
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""

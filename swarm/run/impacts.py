@@ -9,8 +9,9 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from ..lanes.arrays import STRIDE, Share
+from ..lanes.arrays import Share
 from ..lanes.log import GOING, Log
+from ..lanes.table import STRIDE
 from ..scene import Scene
 from ..status import Status
 from .options import Task

@@ -5,8 +5,8 @@ import time
 
 import numpy as np
 
-from ..lanes.arrays import LANES
 from ..lanes.block import NEVER
+from ..lanes.table import LANES
 
 # Flights of the caller's thread in its first frame, compiled and in plain Python, after which it is free again: 0.1 s
 # or so of dear ones. Then their number is doubled as long as they take less than the second time [s], and halved where

@@ -1,0 +1,156 @@
+"""The particles that slide, one a lane: their rows, and the accounts of what they give to their walls."""
+
+from typing import Any
+
+import numpy as np
+
+from ..contact import hold
+from ..contact import laws as wall_laws
+from ..contact.events import EDGE, HELD
+from ..kernel.jit import Array, outlined
+from ..kernel.record import Record
+from ..methods import contract as methods
+from ..surfaces import fold as walls
+from .table import STRIDE, Rows, copy_lane, table
+
+# What a step may end with.
+LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES = 1, 2, 4, 8, 16, 32, 64
+# A lane goes on to stay.
+AGAIN = -1
+
+_named = Rows()
+
+
+class Sliding(Record):
+    """A particle that slides, in its lane. What its second wall has is 0 where it has none."""
+
+    rows: Array
+    i: int
+
+    r, v, a = _named.vector(), _named.vector(), _named.vector()
+    # The numbers of its walls, -1 for none, and how they press on it.
+    first, second, press, press_second = _named.number(), _named.number(), _named.number(), _named.number()
+    # The time left, the next step, and where a step is cut; how often the step has been cut.
+    left, step, cut, trials = _named.number(), _named.number(), _named.number(), _named.number()
+    # The speed that it keeps across the walls, twice its energy, the square of its speed scale.
+    keep, twice, scale2 = _named.number(), _named.number(), _named.number()
+    # The particle and the time left when all lanes were looked at last.
+    looked_particle, looked_left = _named.number(), _named.number()
+    # The rows of a particle; those that follow are of the step of a pass.
+    ROWS = _named.count
+
+    # Its length, how far the composition has come, and how the walls press at its end.
+    h, r1, v1 = _named.number(), _named.vector(), _named.vector()
+    press1, press1_second = _named.number(), _named.number()
+    # Its impulses, the work of friction, and twice the work of the second wall, where walls move.
+    impulse, impulse_second = _named.number(), _named.number()
+    work, given_by_second = _named.number(), _named.number()
+    # By how much it may be off, and by how much the last sweep but one.
+    allowed, still = _named.number(), _named.number()
+    # Of the part of the composition under way: w0, the last guess of its end, the direction in which it slides.
+    w, end, toward = _named.vector(), _named.vector(), _named.vector()
+    # The changes of velocity that the accelerations of the last two parts would make in the whole step.
+    change, before = _named.vector(), _named.vector()
+    ALL = _named.count
+
+    def held(self, kind):
+        """The walls that hold it."""
+        return kind.of_lane(self.first, self.second)
+
+
+class Lanes(Record):
+    """Arrays of one column a lane."""
+
+    rows: Array  # (Sliding.ALL, stride)
+    particle: Array  # int64
+    unsolved: Array  # bool, whether the sweeps of a step go on; at its end, whether it is taken
+    event: Array  # int64, what the step of this pass may end with
+    gained: Array  # twice what walls that move give in the step of this pass, per mass
+    after: Array  # twice the energy per mass at its end
+    period: Any  # the cell where it repeats
+    openings: Any  # of the walls, or None
+
+    def lane(self, i):
+        """The rows of a lane."""
+        return Sliding(self.rows, i)
+
+    def move(self, source, target):
+        """The last live lane into the free slot."""
+        copy_lane(self.rows, source, self.rows, target, Sliding.ROWS)
+        self.particle[target] = self.particle[source]
+
+
+def empty(period: Any = None, openings: Any = None) -> Lanes:
+    """Lanes for one block."""
+    return Lanes(
+        table(Sliding.ALL),
+        np.zeros(STRIDE, np.int64),
+        np.zeros(STRIDE, np.bool_),
+        np.zeros(STRIDE, np.int64),
+        table(1)[0],
+        table(1)[0],
+        period,
+        openings,
+    )
+
+
+def phase_of(kind):
+    """The phase of particles that one wall holds, or two."""
+    return EDGE if isinstance(kind, hold.Two) else HELD
+
+
+def moves(method):
+    """Whether a wall moves: a constant for the compiler."""
+    return wall_laws.moving(methods.laws(method)) is not None
+
+
+@outlined
+def with_kept(kind, chain, lane):
+    """The velocity of a lane with the speed that it keeps across its walls."""
+    v, keep = lane.v, lane.keep
+    if not keep > 0.0:
+        return v
+    held = lane.held(kind)
+    taken = held.split_at(chain, None, lane.r, v)
+    return v + keep * held.inward(taken.n, taken.m)
+
+
+# --- Accounts --------------------------------------------------------------------------------------------
+
+
+def account(method, chain, state, lanes, i):
+    """Book a step that is taken."""
+    if not lanes.unsolved[i]:
+        return
+    lane = lanes.lane(i)
+    state.contacts.sliding[lanes.particle[i]] += lane.h
+    push(chain, state, lanes, i, lane.impulse, lane.impulse_second)
+    lane.trials = 0.0
+    if methods.friction(method) is not None:
+        lose(state, lanes, i, lane.work)
+    if moves(method):
+        work(chain, state, lanes, i, lanes.gained[i], lane.given_by_second)
+
+
+def push(chain, state, lanes, i, first, second):
+    """Impulses per mass to the walls that hold a lane."""
+    lane, p = lanes.lane(i), lanes.particle[i]
+    state.impulse[walls.row(chain, lane.first), p] += first * state.mass[p]
+    if lane.second >= 0.0:
+        state.impulse[walls.row(chain, lane.second), p] += second * state.mass[p]
+
+
+def work(chain, state, lanes, i, twice, second):
+    """Book twice the work per mass of walls that move, and of it that of the second wall."""
+    lane, p, behind = lanes.lane(i), lanes.particle[i], state.impulse.shape[0] // 2
+    state.energy[p] = 0.5 * lane.twice
+    state.impulse[behind + walls.row(chain, lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+    if lane.second >= 0.0:
+        state.impulse[behind + walls.row(chain, lane.second), p] += 0.5 * second * state.mass[p]
+
+
+def lose(state, lanes, i, twice):
+    """Book twice the energy per mass that a lane has lost; its row knows what is left."""
+    p = lanes.particle[i]
+    state.energy[p] = 0.5 * lanes.lane(i).twice
+    state.dissipated[p] += 0.5 * twice * state.mass[p]
