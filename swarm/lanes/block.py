@@ -231,7 +231,7 @@ def _end(method, chain, lanes, i, contact):
     put_end(lanes, i, contact)
     _count(method, lanes, i, contact)
     _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-    add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
+    add_work(chain, lanes.impulse, i, contact.wall, contact.work)
     lanes.wall[i] = contact.wall
     hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
     return contact.lasts | (not (contact.left > 0.0)), hard
