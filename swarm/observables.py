@@ -8,16 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contact.energy import contact_energy
-from .kernel.gravity import Nothing, potential
-from .kernel.jit import by_type, inlined, kernel, scratch, select
+from .kernel.gravity import potential
+from .kernel.jit import kernel, scratch, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .particles import Floats, State, has_escaped
 from .scene import Scene
 from .surfaces import contract as surfaces
 from .surfaces import flights
-from .surfaces.fold import Field
+from .surfaces.fold import Field, each
 from .surfaces.moving import at
-from .surfaces.period import Period
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
@@ -27,43 +26,21 @@ _COLUMNS = 64
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
 
-@by_type
 def penetration(chain, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
-    distance = surfaces.distance(chain.first, r)
-    other = penetration(chain.rest, r)
-    return select(distance > other, distance, other)
+    deepest = 0.0
+    for link in reversed(each(chain)):
+        is_field = isinstance(link, Field)
+        distance = link.first.deepest_in_cell(r) if is_field else surfaces.distance(link.first, r)
+        deepest = select(distance > deepest, distance, deepest)
+    return deepest
 
 
-@penetration.register(Field)
-def _(chain, r):
-    distance, other = chain.first.deepest_in_cell(r), penetration(chain.rest, r)
-    return select(distance > other, distance, other)
-
-
-@penetration.register(Nothing)
-def _(chain, r):
-    return 0.0
-
-
-@by_type
-def _fall_of(period):
-    """The potential energy per mass of one image along each axis, None where there is none."""
-    return
-
-
-_fall_of.register(Period, lambda period: period.fall)
-
-
-@by_type
-def _whole_fall(fall, state, i, in_cell):
+def _whole_fall(period, state, i, in_cell):
     """The potential energy per mass of particle i where it is, if it has come through the faces of the cell."""
-    return in_cell
-
-
-@_whole_fall.register(Vec)
-def _(fall, state, i, in_cell):
-    image = state.image
+    if period is None or period.fall is None:
+        return in_cell
+    fall, image = period.fall, state.image
     return in_cell + (image[0, i] * fall.x + image[1, i] * fall.y + image[2, i] * fall.z)
 
 
@@ -79,7 +56,6 @@ class Energies(NamedTuple):
         return self.kinetic + self.fall + self.stored
 
 
-@inlined
 def _energies(law, chain, gravity, m, r, v):
     return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, chain, 1.0 / m, r))
 
@@ -142,7 +118,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
                     depth = select(has_escaped(state.escape_time, i), 0.0, penetration(at(chain, 0.0), r))
                     sums[_KINETIC, j] += m * e.kinetic
-                    sums[_POTENTIAL, j] += m * _whole_fall(_fall_of(state.period), state, i, e.fall)
+                    sums[_POTENTIAL, j] += m * _whole_fall(state.period, state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
                     spin = cross(r, p)
                     sums[_PX, j] += p.x
@@ -180,28 +156,16 @@ def count_escaped(chain, gravity, far, faces, state):
         for k in range(faces.shape[0]):
             n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
-        leaves = out or _escapes_from(state.period, gravity, chain, r, v)
+        leaves = out or _escapes(state.period, gravity, chain, r, v)
         count += leaves and not has_escaped(state.escape_time, i)
     return count
 
 
-@by_type
-def _escapes_from(period, gravity, chain, r, v):
-    return _escapes(gravity, chain, r, v)
-
-
-# A flight that hits no wall of its cell may hit those of others.
-_escapes_from.register(Period, lambda period, gravity, chain, r, v: False)
-
-
-@by_type
-def _escapes(gravity, chain, r, v):
-    """Under gravity only the distance decides."""
-    return False
-
-
-@_escapes.register(Nothing)
-def _(gravity, chain, r, v):
+def _escapes(period, gravity, chain, r, v):
+    """Whether a flight hits no wall. Under gravity only the distance decides."""
+    # With a period, one that hits no wall of its cell may hit those of others.
+    if period is not None or gravity is not None:
+        return False
     return (flights.first_hit(at(chain, 0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks, notebook
 from .columns import read_columns
 from .errors import SceneError
-from .kernel.jit import by_type
 
 Floats = NDArray[np.float64]
 
@@ -162,13 +161,9 @@ class State(NamedTuple):
     openings: Any = None  # `Openings` of the walls
 
 
-@by_type
 def has_escaped(escape_time, i):
     """Whether particle i has passed an opening, and is no more among the walls."""
-    return not math.isnan(escape_time[i])
-
-
-has_escaped.register(type(None), lambda escape_time, i: False)
+    return False if escape_time is None else not math.isnan(escape_time[i])
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -7,7 +7,7 @@ import numpy as np
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from .jit import Array, inlined, kept, select
+from .jit import Array, inlined, select
 
 
 class Vec(NamedTuple):
@@ -166,11 +166,6 @@ def either(condition, a, b):
 def moves(a):
     """Whether a vector is not 0."""
     return a.x != 0.0 or a.y != 0.0 or a.z != 0.0
-
-
-@kept.register(Vec)
-def _(value):
-    return Vec(kept(value.x), kept(value.y), kept(value.z))
 
 
 @inlined

@@ -205,7 +205,7 @@ def _end(method, chain, lanes, i, contact):
     """The end of a lane's contact: (whether it reached the end of the frame, whether it is hard)."""
     _put_contact(method, lanes, i, contact)
     _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-    _add_work(chain, lanes.impulse, i, contact.wall, methods.work_of(contact))
+    _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
     lanes.wall[i] = contact.wall
     hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
     return contact.lasts | (not (contact.left > 0.0)), hard

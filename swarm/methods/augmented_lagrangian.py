@@ -16,7 +16,7 @@ from ..contact.regularisation import regularisation
 from ..contact.touching import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import inlined, kept, scratch, select
+from ..kernel.jit import kept, scratch, select
 from ..kernel.vector import norm
 from ..particles import Particles
 from ..scene import Scene
@@ -179,27 +179,11 @@ class AugmentedLagrangian(base.Method):
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@contract.constants.register(steps.Numbers)
-def _(method, mass, energy, scale2):
-    return 2.0 * energy, 0.5 / mass, 0.0
-
-
-@contract.own.register(steps.Numbers)
-def _(method, first, second, third):
-    return fixed_step.Own(first, second, third)
-
-
-contract.dissipates.register(steps.Numbers, lambda method: method.moving is not None)
-# Of all walls, as in fixed_step.py.
-contract.walls_of.register(steps.Numbers, lambda method, chain, left: chain)
-
-
 @contract.most_sweeps.register(steps.Numbers)
 def _(method, chain):
     return contact_impulse.NEWTON_STEPS
 
 
-@inlined
 def _free_step(gravity, lane, h):
     """The step without walls: r0, p and c = h^2/(2m)."""
     return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
@@ -207,7 +191,7 @@ def _free_step(gravity, lane, h):
 
 @contract.guess.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall):
-    cut, over = steps.step_of(method, lane.left), fixed_step.over(method.dt, chain, lane.left)
+    cut, over = method.cut(lane.left), method.over(chain, lane.left)
     kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
     touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
@@ -215,8 +199,7 @@ def _(method, chain, gravity, lane, wall):
 
 @contract.improve.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, solution, multiplier):
-    cut, kappa = steps.step_of(method, lane.left), solution.kappa
-    over = fixed_step.over(method.dt, chain, lane.left)
+    cut, over, kappa = method.cut(lane.left), method.over(chain, lane.left), solution.kappa
     newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
     return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
@@ -228,8 +211,7 @@ def _(method):
 
 @contract.first_multiplier.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, kappa):
-    cut = steps.step_of(method, lane.left)
-    over = fixed_step.over(method.dt, chain, lane.left)
+    cut, over = method.cut(lane.left), method.over(chain, lane.left)
     better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
     use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
     limited = uzawa.has_limit(over, wall, cut.law, lane.r)
@@ -238,7 +220,7 @@ def _(method, chain, gravity, lane, wall, kappa):
 
 @contract.next_multiplier.register(steps.Numbers)
 def _(method, left, acceleration, multiplier, record, before):
-    miss = steps.step_of(method, left).law.alpha * record.mean
+    miss = method.cut(left).law.alpha * record.mean
     following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
     return following, miss, not (record.stored <= method.tolerance)
 
@@ -246,8 +228,8 @@ def _(method, left, acceleration, multiplier, record, before):
 @contract.contact.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
-    cut, kappa = steps.step_of(method, lane.left), solution.kappa
-    over, after = fixed_step.over(method.dt, chain, lane.left), fixed_step.after(method.dt, chain, lane.left)
+    cut, kappa = method.cut(lane.left), solution.kappa
+    over, after = method.over(chain, lane.left), method.after(chain, lane.left)
     h, p = cut.h, displacement(gravity, lane.v, cut.h)
     r1 = walls.push(over, wall, lane.r, p, kappa)
     g = walls.inner_gradient(over, wall, lane.r, r1)
@@ -256,17 +238,17 @@ def _(method, chain, gravity, lane, wall, solution):
     v1 = accelerated(gravity, lane.v, h) - f * g
     given = abs(f) * norm(g)
 
-    alone = steps.is_alone(method, after, wall, lane.r, r1, kappa)
+    alone = method.is_alone(after, wall, lane.r, r1, kappa)
     solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
     touching = wall >= 0.0
     step = (lane.left > 0.0) & touching & solved
     budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
     factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
-    new = step & steps.is_new(method, over, lane.r)
+    new = step & method.is_new(over, lane.r)
     work = select(step, work, 0.0)
     # A step without contact: only fixed steps end here that way, just before one.
     loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
-    found = contract.Contact(
+    return contract.Contact(
         select(step, r1, select(loose, lane.r + p, kept(lane.r))),
         select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
         lane.left - select(step | loose, cut.used, 0.0),
@@ -275,8 +257,8 @@ def _(method, chain, gravity, lane, wall, solution):
         select(new, 1.0, 0.0),
         lane.own.twice_energy + 2.0 * work,
         False,
+        work,
     )
-    return contract.worked(method.moving, found, work)
 
 
 # --- Several walls, nested solves, and loops that do not converge ----------------------------------------
@@ -284,23 +266,23 @@ def _(method, chain, gravity, lane, wall, solution):
 
 @contract.hard_pass.register(steps.Numbers)
 def _(method, chain, gravity, lane, wall, lanes, i):
-    cut, record = steps.step_of(method, lane.left), lanes.record
-    h, over, after = cut.h, fixed_step.over(method.dt, chain, lane.left), fixed_step.after(method.dt, chain, lane.left)
-    if steps.is_blocked(method, chain, wall, lane.r, h * lane.v):
+    cut, record = method.cut(lane.left), lanes.record
+    h, over, after = cut.h, method.over(chain, lane.left), method.after(chain, lane.left)
+    if method.is_blocked(chain, wall, lane.r, h * lane.v):
         record[uzawa.SWEEPS, i] = 0.0
-        return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
+        return method.as_impacts(chain, lane, cut, wall, lanes, i)
     free = _free_step(gravity, lane, h)
-    if fixed_step.too_fast(method.longest, free.p):
+    if method.is_too_fast(free.p):
         return fixed_step.refused(lane, Status.TOO_FAST.value)
     reactions = scratch((walls.length(chain), 4), np.float64)
     end = uzawa.loop(method, cut.law, over, free, reactions)
     record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
     record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
     if not end.converged and method.policy == IMPACT:
-        return steps.as_impacts(method, chain, lane, cut, wall, lanes, i)
+        return method.as_impacts(chain, lane, cut, wall, lanes, i)
     if not end.converged and (method.policy == RAISE or not end.solved):
         return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
-    new = 1.0 if steps.is_new(method, over, lane.r) else 0.0
+    new = 1.0 if method.is_new(over, lane.r) else 0.0
     reaction = corner.total(reactions)
     v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
     corner.add_impulses(reactions, h, lanes.impulse, i)

@@ -17,7 +17,6 @@ and one with a multiplier the three functions of Uzawa's loop. examples/own_meth
 from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
-from ..contact.laws import Moves
 from ..contact.reflection import Turned
 from ..kernel.jit import by_type, by_type_outlined
 from ..kernel.vector import ZERO, Vec, dot
@@ -70,7 +69,8 @@ class Contact(NamedTuple):
     """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
 
     Where contacts change the energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
-    particles on walls, `lasts` says that another kernel decides what follows, at this wall.
+    particles on walls, `lasts` says that another kernel decides what follows, at this wall. Where walls move, `work` is
+    what this wall gave by its motion, per mass.
     """
 
     r: Vec
@@ -81,52 +81,12 @@ class Contact(NamedTuple):
     hits: float
     twice_energy: float
     lasts: Any
+    work: Any = 0.0
 
 
-class Worked(NamedTuple):
-    """The same where walls move, with what the wall gave by its motion, per mass."""
-
-    r: Vec
-    v: Vec
-    left: float
-    wall: float
-    impulse: float
-    hits: float
-    twice_energy: float
-    lasts: Any
-    work: float
-
-
-@by_type
-def worked(moving, contact, work):
-    """A contact, with its work where walls move."""
-    return contact
-
-
-@worked.register(Moves)
-def _(moving, contact, work):
-    c = contact
-    return Worked(c.r, c.v, c.left, c.wall, c.impulse, c.hits, c.twice_energy, c.lasts, work)
-
-
-@by_type
-def work_of(contact):
-    """What the wall gave by its motion, per mass."""
-    return 0.0
-
-
-work_of.register(Worked, lambda contact: contact.work)
-
-
-@by_type
 def work_along(moving, chain, wall, force):
     """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-    return 0.0
-
-
-@work_along.register(Moves)
-def _(moving, chain, wall, force):
-    return dot(force, walls.way(chain, wall))
+    return 0.0 if moving is None else dot(force, walls.way(chain, wall))
 
 
 # --- What a lane keeps -----------------------------------------------------------------------------------

@@ -11,7 +11,8 @@ from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import by_type, by_type_outlined, inlined, kept, select
+from ..kernel.jit import kept, select
+from ..kernel.record import Record
 from ..kernel.vector import Vec, square
 from ..particles import Particles
 from ..scene import Scene
@@ -154,85 +155,70 @@ def of_steps(scene: Scene) -> tuple[Any, ...]:
     return asked
 
 
-# --- What kernels know -----------------------------------------------------------------------------------
+# --- As kernels know it -----------------------------------------------------------------------------------
 
 
-class Numbers(NamedTuple):
-    """What kernels know of a method with soft walls; each method has its own subclass."""
+class Steps(Record):
+    """A method of steps, with the fields `dt`, `longest`, `factor` and `moving`: the walls of a step, and its ends."""
+
+    point = 1.0  # the part of a step after which it takes its force
+
+    def before(self: Any, chain, left):
+        """The walls at the start of a step, with so many of the frame left."""
+        return at(chain, left * self.dt)
+
+    def over(self: Any, chain, left):
+        """The walls over that step."""
+        return during(chain, left * self.dt, (left - 1.0) * self.dt)
+
+    def after(self: Any, chain, left):
+        """The walls at the end of that step."""
+        return at(chain, (left - 1.0) * self.dt)
+
+    def reach(self: Any, before, gravity, lane):
+        """From r0 to the point whose force it takes, as if there were no wall."""
+        return displacement(gravity, lane.v, self.dt)
+
+    def is_too_fast(self: Any, p):
+        """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
+        return False if self.longest is None else square(p) > self.longest * self.longest
+
+
+class Numbers(Steps):
+    """A method with soft walls as kernels know it; each method has its own subclass."""
 
     dt: float
     law: Any
     longest: Any  # step that jumps over no solid [m], None where there is none
     factor: float  # of 1/mass in what a lane keeps
-    form: Any  # of the discrete gradient, or an implicit rule, or None
+    form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves
+
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
+        raise NotImplementedError
 
 
 class Own(NamedTuple):
-    """What a lane keeps."""
+    """The numbers that a lane keeps."""
 
     twice_energy: float  # per mass, at the start, and with the work of walls since
     over_mass: float  # the method's factor over the mass
     unused: float
 
 
-@contract.constants.register(Numbers)
+@contract.constants.register(Steps)
 def _(method, mass, energy, scale2):
     return 2.0 * energy, method.factor / mass, 0.0
 
 
-@contract.own.register(Numbers)
-def _(method, first, second, third):
-    return Own(first, second, third)
-
-
-contract.dissipates.register(Numbers, lambda method: method.moving is not None)
+contract.own.register(Steps, lambda method, first, second, third: Own(first, second, third))
+contract.dissipates.register(Steps, lambda method: method.moving is not None)
 # Of all walls: each part of a step asks for those that it needs.
-contract.walls_of.register(Numbers, lambda method, chain, left: chain)
-
-
-@inlined
-def before(dt, chain, left):
-    """The walls at the start of a step of length dt, with so many of the frame left."""
-    return at(chain, left * dt)
-
-
-@inlined
-def over(dt, chain, left):
-    """The walls over that step."""
-    return during(chain, left * dt, (left - 1.0) * dt)
-
-
-@inlined
-def after(dt, chain, left):
-    """The walls at the end of that step."""
-    return at(chain, (left - 1.0) * dt)
-
-
-@by_type
-def point_of(form):
-    """After what part of a step an implicit rule takes its force; the end for any other method."""
-    return 1.0
+contract.walls_of.register(Steps, lambda method, chain, left: chain)
 
 
 # --- The way to a contact --------------------------------------------------------------------------------
-
-
-@by_type
-def too_fast(longest, p):
-    """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
-    return False
-
-
-@too_fast.register(float)
-def _(longest, p):
-    return square(p) > longest * longest
-
-
-@by_type
-def reach(form, h, law, chain, gravity, lane):
-    """From r0 to the point whose force an implicit rule takes, as if there were none; to r1 for any other method."""
-    return displacement(gravity, lane.v, h)
 
 
 @contract.flight.register(Numbers)
@@ -247,13 +233,12 @@ def flight(method, chain, gravity, lane):
         lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
         lane.own,
     )  # fmt: skip
-    now = before(dt, chain, start.left)
-    to_point = during(chain, start.left * dt, (start.left - point_of(method.form)) * dt)
-    touched = walls.touched(to_point, start.r, reach(method.form, dt, method.law, now, gravity, start))
+    to_point = during(chain, start.left * dt, (start.left - method.point) * dt)
+    touched = walls.touched(to_point, start.r, method.reach(method.before(chain, start.left), gravity, start))
     # Several walls at once, or nested solves: the careful way.
     alone = (touched.number <= 1.0) & (not isinstance(method.form, MeanValue))
     wall = select(alone, touched.wall, contract.HARD - touched.wall)
-    wall = select(too_fast(method.longest, displacement(gravity, start.v, dt)), contract.HARD, wall)
+    wall = select(method.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
     return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
 
 
@@ -271,13 +256,12 @@ class Taken(NamedTuple):
     work: float
 
 
-@inlined
-def contact(moving, lane, wall, taken):
+def contact(lane, wall, taken):
     """The `Contact` of a lane that takes its step, or leaves it to the careful way, or is at the end of its frame."""
     touching = wall >= 0.0
     step = (lane.left > 0.0) & select(touching, taken.solved, wall > contract.HARD)
     work = select(step & touching, taken.work, 0.0)
-    found = contract.Contact(
+    return contract.Contact(
         select(step, taken.r, kept(lane.r)),
         select(step, taken.v, kept(lane.v)),
         lane.left - select(step, 1.0, 0.0),
@@ -286,8 +270,8 @@ def contact(moving, lane, wall, taken):
         select(step & taken.new, 1.0, 0.0),
         lane.own.twice_energy + 2.0 * work,
         False,
+        work,
     )
-    return contract.worked(moving, found, work)
 
 
 class Careful(NamedTuple):
@@ -299,24 +283,17 @@ class Careful(NamedTuple):
     work: float
 
 
-@by_type_outlined
-def careful_step(method, chain, gravity, lane, impulse, i):
-    """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
-    raise NotImplementedError
-
-
 @contract.hard_pass.register(Numbers)
 def _(method, chain, gravity, lane, wall, lanes, i):
-    if too_fast(method.longest, displacement(gravity, lane.v, method.dt)):
+    if method.is_too_fast(displacement(gravity, lane.v, method.dt)):
         return refused(lane, Status.TOO_FAST.value)
-    step = careful_step(method, chain, gravity, lane, lanes.impulse, i)
-    new = select(walls.outside(before(method.dt, chain, lane.left), -1.0, lane.r), 0.0, 1.0)
+    step = method.careful_step(chain, gravity, lane, lanes.impulse, i)
+    new = select(walls.outside(method.before(chain, lane.left), -1.0, lane.r), 0.0, 1.0)
     status = Status.DONE.value if step.solved else Status.UNSOLVED.value
     twice_energy = lane.own.twice_energy + 2.0 * step.work
     return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
 
 
-@inlined
 def refused(lane, status):
     """A hard step that is not taken, for this reason."""
     return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status

@@ -12,7 +12,7 @@ from ..contact import sliding, touching
 from ..contact.reflection import CHORD_NEEDS, Energy, exact
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import by_type, kept, select
+from ..kernel.jit import kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
@@ -251,14 +251,10 @@ def _(method, chain, gravity, lane, hit):
 # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
 
 
-@by_type
-def _is_within(laws, method, lane, speed, part):
+def _is_within(method, lane, speed, part):
     """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last."""
-    return speed <= part * lane.own.slow
-
-
-@_is_within.register(wall_laws.Laws)
-def _(laws, method, lane, speed, part):
+    if method.laws is None:
+        return speed <= part * lane.own.slow
     # By the velocity with which it comes: such walls change that. One of both is 0.
     speed2 = (square(lane.v) + method.fall2) / (method.size * method.size)
     by_time, by_length = method.shortest_flight * method.size * speed2, method.shortest_length
@@ -270,14 +266,14 @@ def _(method, chain, gravity, lane, wall, solution):
     bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
     hit = wall >= 0.0
     impulse = select(hit, bounce.impulse, 0.0)
-    contact = contract.Contact(
+    return contract.Contact(
         lane.r,
         select(hit, bounce.v, kept(lane.v)),
         lane.left,
         wall,
         impulse,
-        select(_is_within(method.laws, method, lane, impulse, _NO_IMPACT), 0.0, 1.0),
+        select(_is_within(method, lane, impulse, _NO_IMPACT), 0.0, 1.0),
         select(hit, bounce.twice_energy, lane.own.energy.twice),
-        hit & _is_within(method.laws, method, lane, bounce.twice_away, 1.0),
+        hit & _is_within(method, lane, bounce.twice_away, 1.0),
+        select(hit, 0.5 * bounce.work, 0.0),
     )
-    return contract.worked(wall_laws.moving(method.laws), contact, select(hit, 0.5 * bounce.work, 0.0))

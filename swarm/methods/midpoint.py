@@ -1,7 +1,7 @@
 """Midpoint: implicit steps with soft walls. It does not conserve the energy: a baseline for the charts."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..contact import corner, implicit
 from ..kernel.gravity import accelerated
@@ -39,32 +39,24 @@ class Midpoint(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *implicit.NEEDS
 
     def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.numbers(self, scene, MidpointRule())
+        return implicit_rule.numbers(self, scene, MidpointNumbers)
 
 
-class MidpointRule(NamedTuple):
-    """Chooses this rule."""
+class MidpointNumbers(implicit_rule.RuleNumbers):
+    """The method as kernels know it."""
 
+    point = 0.5
 
-@fixed_step.reach.register(MidpointRule)
-def _(form, h, law, chain, gravity, lane):
-    # rm = r0 + h/2 v0 + h^2/4 a(rm)
-    return 0.5 * h * accelerated(gravity, lane.v, 0.5 * h)
+    def reach(self, before, gravity, lane):
+        # rm = r0 + h/2 v0 + h^2/4 a(rm)
+        return 0.5 * self.dt * accelerated(gravity, lane.v, 0.5 * self.dt)
 
+    def end(self, before, gravity, lane, s, push):
+        # r1 = 2 rm - r0, v1 = v0 + h G - (4/h) kappa grad q(rm)
+        kick = 4.0 / self.dt * push
+        return implicit_rule.RuleStep(2.0 * s - lane.r, accelerated(gravity, lane.v, self.dt) - kick, kick)
 
-fixed_step.point_of.register(MidpointRule, lambda form: 0.5)
-
-
-@implicit_rule.end.register(MidpointRule)
-def _(rule, h, law, chain, gravity, lane, point, push):
-    # r1 = 2 rm - r0, v1 = v0 + h G - (4/h) kappa grad q(rm)
-    kick = 4.0 / h * push
-    return implicit_rule.RuleStep(2.0 * point - lane.r, accelerated(gravity, lane.v, h) - kick, kick)
-
-
-@implicit_rule.add_impulses.register(MidpointRule)
-def _(rule, method, chain, lane, reactions, impulse, i):
-    h = method.dt
-    corner.add_impulses(reactions, 0.5 * h, impulse, i)
-    over = fixed_step.over(h, chain, lane.left)
-    return corner.add_works(method.moving, over, -4.0 / (h * h), reactions, impulse, i)
+    def add_impulses(self, chain, lane, reactions, impulse, i):
+        h = self.dt
+        corner.add_impulses(reactions, 0.5 * h, impulse, i)
+        return corner.add_works(self.moving, self.over(chain, lane.left), -4.0 / (h * h), reactions, impulse, i)

@@ -11,7 +11,7 @@ from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.records import Step
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import inlined, scratch, select
+from ..kernel.jit import scratch, select
 from ..kernel.vector import norm
 from ..scene import Scene
 from ..surfaces import fold as walls
@@ -67,16 +67,33 @@ class Penalty(fixed_step.SoftWalls):
 
 
 class PenaltyNumbers(fixed_step.Numbers):
-    """What kernels know of the method."""
+    """The method as kernels know it."""
+
+    def free(self, gravity, lane):
+        """The step without walls: r0, p and c."""
+        return Step(lane.r, displacement(gravity, lane.v, self.dt), lane.own.over_mass)
+
+    def restored(self, over, after, gravity, lane, work, ends):
+        """The factor of v1 with which the energy is that of the start and `work`, and whether it was so before."""
+        budget = energies.Budget(
+            2.0 / (self.dt * self.dt) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0
+        )
+        return energies.restored(self.law, over, after, gravity, budget, ends)
+
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        """The step against all walls at once."""
+        h, step = self.dt, self.free(gravity, lane)
+        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        reactions = scratch((walls.length(chain), 4), np.float64)
+        r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
+        corner.add_impulses(reactions, h, impulse, i)
+        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
+        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
+        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
+        return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)
 
 
 # --- One pass --------------------------------------------------------------------------------------------
-
-
-@inlined
-def _step(method, gravity, lane):
-    """The step without walls: r0, p and c."""
-    return Step(lane.r, displacement(gravity, lane.v, method.dt), lane.own.over_mass)
 
 
 @contract.most_sweeps.register(PenaltyNumbers)
@@ -86,8 +103,8 @@ def _(method, chain):
 
 @contract.guess.register(PenaltyNumbers)
 def _(method, chain, gravity, lane, wall):
-    over = fixed_step.over(method.dt, chain, lane.left)
-    kappa = contact_impulse.guess(over, wall, method.law, _step(method, gravity, lane))
+    over = method.over(chain, lane.left)
+    kappa = contact_impulse.guess(over, wall, method.law, method.free(gravity, lane))
     touching = wall >= 0.0
     return select(touching, kappa, 0.0), touching
 
@@ -95,8 +112,8 @@ def _(method, chain, gravity, lane, wall):
 @contract.improve.register(PenaltyNumbers)
 def _(method, chain, gravity, lane, wall, solution, multiplier):
     kappa, unsolved = solution.kappa, solution.unsolved
-    over = fixed_step.over(method.dt, chain, lane.left)
-    newton = contact_impulse.improve(over, wall, method.law, None, _step(method, gravity, lane), kappa)
+    over = method.over(chain, lane.left)
+    newton = contact_impulse.improve(over, wall, method.law, None, method.free(gravity, lane), kappa)
     return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
 
 
@@ -104,8 +121,8 @@ def _(method, chain, gravity, lane, wall, solution, multiplier):
 def _(method, chain, gravity, lane, wall, solution):
     # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
     h, kappa = method.dt, solution.kappa
-    over, after = fixed_step.over(h, chain, lane.left), fixed_step.after(h, chain, lane.left)
-    step = _step(method, gravity, lane)
+    over, after = method.over(chain, lane.left), method.after(chain, lane.left)
+    step = method.free(gravity, lane)
     touching = wall >= 0.0
     r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
     # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
@@ -115,27 +132,9 @@ def _(method, chain, gravity, lane, wall, solution):
     work = contract.work_along(method.moving, over, wall, -f / h * g)
 
     # A push into another wall, or an equation that is not solved yet: the careful way.
-    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0)
-    factor, balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(step.r, r1, v1, h))
+    factor, balanced = method.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
     solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
     solved = solved & (not walls.outside(after, wall, r1))
     new = touching & (not walls.outside(over, -1.0, lane.r))
     taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
-    return fixed_step.contact(method.moving, lane, wall, taken)
-
-
-# --- Several walls at once -------------------------------------------------------------------------------
-
-
-@fixed_step.careful_step.register(PenaltyNumbers)
-def _(method, chain, gravity, lane, impulse, i):
-    h, step = method.dt, _step(method, gravity, lane)
-    over, after = fixed_step.over(h, chain, lane.left), fixed_step.after(h, chain, lane.left)
-    reactions = scratch((walls.length(chain), 4), np.float64)
-    r1, solved = corner.hold(method.form, method.law, None, over, step, reactions)
-    corner.add_impulses(reactions, h, impulse, i)
-    work = corner.add_works(method.moving, over, -2.0 / (h * h), reactions, impulse, i)
-    v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
-    budget = energies.Budget(2.0 / (h * h) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0)
-    factor, balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(step.r, r1, v1, h))
-    return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)
+    return fixed_step.contact(lane, wall, taken)

@@ -1,7 +1,7 @@
 """The steps of `AugmentedLagrangian`: of fixed length, or cut at the instant of impact.
 
-Each function here has one definition for either: how a flight ends, how long its contact step is, whether another wall
-has a part in it, and the exact impacts that replace it.
+Each of the two says how a flight ends, how long its contact step is, whether another wall has a part in it, and which
+exact impacts replace it.
 """
 
 import math
@@ -11,8 +11,7 @@ from ..contact import uzawa
 from ..contact.discrete_gradient import MeanValue
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
-from ..kernel.gravity import Nothing
-from ..kernel.jit import by_type, by_type_outlined, inlined, outlined, select
+from ..kernel.jit import outlined, select
 from ..kernel.vector import square
 from ..status import Status
 from ..surfaces import flights
@@ -27,9 +26,19 @@ _MOST_BOUNCES = 1000
 _ROUND_OFF = 1e-13
 
 
-class Numbers(NamedTuple):
-    """What kernels know of the method."""
+class Cut(NamedTuple):
+    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
 
+    h: float
+    used: float
+    law: Any
+
+
+class Numbers(fixed_step.Steps):
+    """The method as kernels know it, and what is different between its two kinds of steps."""
+
+    # Of 1/mass in what a lane keeps.
+    factor = 0.5
     dt: float
     law: Any
     form: Any  # of the discrete gradient
@@ -41,51 +50,25 @@ class Numbers(NamedTuple):
     longest: Any  # step that jumps over no solid [m], None where there is none
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
 
+    def cut(self, left):
+        """The `Cut` of the next contact step."""
+        raise NotImplementedError
 
-class FixedSteps(Numbers):
-    """The method with steps of fixed length."""
+    def is_new(self, chain, r):
+        """Whether a contact step starts with an impact."""
+        raise NotImplementedError
 
+    def is_alone(self, chain, wall, r0, r1, kappa):
+        """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
+        raise NotImplementedError
 
-class CutSteps(Numbers):
-    """The method with steps that begin at the impact, without gravity."""
+    def is_blocked(self, chain, wall, r, p):
+        """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
+        return False
 
-
-class Cut(NamedTuple):
-    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
-
-    h: float
-    used: float
-    law: Any
-
-
-@by_type
-def step_of(method, left):
-    """The `Cut` of the next contact step."""
-    raise NotImplementedError
-
-
-@by_type
-def is_new(method, chain, r):
-    """Whether a contact step starts with an impact."""
-    raise NotImplementedError
-
-
-@by_type
-def is_alone(method, chain, wall, r0, r1, kappa):
-    """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
-    raise NotImplementedError
-
-
-@by_type
-def is_blocked(method, chain, wall, r, p):
-    """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
-    return False
-
-
-@by_type_outlined
-def as_impacts(method, chain, lane, cut, wall, lanes, i):
-    """The contact as exact impacts: the result of `hard_pass`."""
-    raise NotImplementedError
+    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+        """The contact as exact impacts: the result of `hard_pass`."""
+        raise NotImplementedError
 
 
 @outlined
@@ -96,64 +79,82 @@ def _first_energy(lane):
     return Energy(speed2, 0.5 / speed2)
 
 
-# --- Steps of fixed length -------------------------------------------------------------------------------
-
-
-contract.flight.register(FixedSteps, fixed_step.flight)
-
-
-@step_of.register(FixedSteps)
-def _(method, left):
-    return Cut(method.dt, 1.0, method.law)
-
-
-@is_new.register(FixedSteps)
-def _(method, chain, r):
-    return not walls.outside(chain, -1.0, r)
-
-
-@is_alone.register(FixedSteps)
-def _(method, chain, wall, r0, r1, kappa):
-    return not walls.outside(chain, wall, r1)
-
-
-@as_impacts.register(FixedSteps)
-def _(method, chain, lane, cut, wall, lanes, i):
-    return _in_one_step(method.moving, chain, lane, cut, lanes, i)
-
-
-@by_type_outlined
-def _in_one_step(moving, chain, lane, cut, lanes, i):
-    """The same; walls that move are refused before the run."""
-    return fixed_step.refused(lane, Status.UNCONVERGED.value)
-
-
-@_in_one_step.register(Nothing)
-def _(moving, chain, lane, cut, lanes, i):
-    energy, r, v = _first_energy(lane), lane.r, lane.v
-    remaining, hits = cut.h, 0.0
-    for _i in range(_MOST_BOUNCES):
-        hit = flights.first_hit(chain, None, r, v)
-        t = min(hit.time, remaining)
-        r, remaining = r + t * v, remaining - t
-        if not hit.time < math.inf or remaining <= 0.0:
-            return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
-        if hit.wall < 0.0:
-            continue
-        bounce = exact(None, chain, None, hit.wall, r, v, energy)
-        v = bounce.v
-        lanes.impulse[int(hit.wall), i] += bounce.impulse
-        hits += 1.0
-    return _after(r, v, lane.left, hits), Status.STALLED.value
-
-
-@inlined
 def _after(r, v, left, hits):
     """The contact, whose impulses were added one by one."""
     return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0, False)
 
 
-# --- Steps that are cut at the impact --------------------------------------------------------------------
+class FixedSteps(Numbers):
+    """The method with steps of fixed length."""
+
+    def cut(self, left):
+        return Cut(self.dt, 1.0, self.law)
+
+    def is_new(self, chain, r):
+        return not walls.outside(chain, -1.0, r)
+
+    def is_alone(self, chain, wall, r0, r1, kappa):
+        return not walls.outside(chain, wall, r1)
+
+    @outlined
+    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+        if self.moving is not None:
+            # Refused before the run.
+            return fixed_step.refused(lane, Status.UNCONVERGED.value)
+        energy, r, v = _first_energy(lane), lane.r, lane.v
+        remaining, hits = cut.h, 0.0
+        for _i in range(_MOST_BOUNCES):
+            hit = flights.first_hit(chain, None, r, v)
+            t = min(hit.time, remaining)
+            r, remaining = r + t * v, remaining - t
+            if not hit.time < math.inf or remaining <= 0.0:
+                return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
+            if hit.wall < 0.0:
+                continue
+            bounce = exact(None, chain, None, hit.wall, r, v, energy)
+            v = bounce.v
+            lanes.impulse[int(hit.wall), i] += bounce.impulse
+            hits += 1.0
+        return _after(r, v, lane.left, hits), Status.STALLED.value
+
+
+class CutSteps(Numbers):
+    """The method with steps that begin at the impact, without gravity."""
+
+    def cut(self, left):
+        # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger
+        # alpha.
+        h = select(self.dt < left, self.dt, left)
+        part = self.dt / h
+        return Cut(h, h, self.law.stiffened(part * part))
+
+    def is_new(self, chain, r):
+        return True
+
+    def is_alone(self, chain, wall, r0, r1, kappa):
+        # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
+        # flight ends outside it again) was hit all the same.
+        return (flights.other_hit(chain, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
+
+    def is_blocked(self, chain, wall, r, p):
+        kappa = chord(chain, wall, r, p)
+        r1 = walls.push(chain, wall, r, p, kappa)
+        other = flights.other_hit(chain, wall, r, r1 - r)
+        # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
+        later = other.time <= 1.0 and not uzawa.has_limit(chain, other.wall, self.law, r)
+        later = later or uzawa.meets_later(chain, wall, self.law, r, p)
+        return not walls.pushes(chain, wall, kappa) or kappa == 0.0 or later
+
+    @outlined
+    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+        energy = _first_energy(lane)
+        shortest = self.shortest_length / math.sqrt(energy.twice)
+        contacts = Contacts(None, None, shortest, _SAME_INSTANT * self.shortest_length)
+        end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
+        return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value
+
+
+contract.flight.register(FixedSteps, fixed_step.flight)
 
 
 @contract.land.register(CutSteps)
@@ -166,43 +167,3 @@ def _(method, chain, gravity, lane, hit):
     met = met & (hit.wall >= 0.0) & (left > 0.0)
     wall = select(isinstance(method.form, MeanValue), contract.HARD - hit.wall, hit.wall)
     return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
-
-
-@step_of.register(CutSteps)
-def _(method, left):
-    # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger alpha.
-    h = select(method.dt < left, method.dt, left)
-    part = method.dt / h
-    return Cut(h, h, method.law.stiffened(part * part))
-
-
-@is_new.register(CutSteps)
-def _(method, chain, r):
-    return True
-
-
-@is_alone.register(CutSteps)
-def _(method, chain, wall, r0, r1, kappa):
-    # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free flight
-    # ends outside it again) was hit all the same.
-    return (flights.other_hit(chain, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
-
-
-@is_blocked.register(CutSteps)
-def _(method, chain, wall, r, p):
-    kappa = chord(chain, wall, r, p)
-    r1 = walls.push(chain, wall, r, p, kappa)
-    other = flights.other_hit(chain, wall, r, r1 - r)
-    # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-    later = other.time <= 1.0 and not uzawa.has_limit(chain, other.wall, method.law, r)
-    later = later or uzawa.meets_later(chain, wall, method.law, r, p)
-    return not walls.pushes(chain, wall, kappa) or kappa == 0.0 or later
-
-
-@as_impacts.register(CutSteps)
-def _(method, chain, lane, cut, wall, lanes, i):
-    energy = _first_energy(lane)
-    shortest = method.shortest_length / math.sqrt(energy.twice)
-    contacts = Contacts(None, None, shortest, _SAME_INSTANT * method.shortest_length)
-    end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
-    return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value

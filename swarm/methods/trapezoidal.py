@@ -1,7 +1,7 @@
 """Trapezoidal: implicit steps with soft walls. It does not conserve the energy: a baseline for the charts."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..contact import corner, implicit
 from ..contact.force import add_impulses, add_works, force
@@ -40,33 +40,27 @@ class Trapezoidal(fixed_step.SoftWalls):
         return *fixed_step.of_steps(scene), *implicit.NEEDS
 
     def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.numbers(self, scene, TrapezoidalRule())
+        return implicit_rule.numbers(self, scene, TrapezoidalNumbers)
 
 
-class TrapezoidalRule(NamedTuple):
-    """Chooses this rule."""
+class TrapezoidalNumbers(implicit_rule.RuleNumbers):
+    """The method as kernels know it."""
 
+    def reach(self, before, gravity, lane):
+        # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
+        return displacement(gravity, lane.v, self.dt) + lane.own.over_mass * force(before, self.law, lane.r)
 
-@fixed_step.reach.register(TrapezoidalRule)
-def _(form, h, law, chain, gravity, lane):
-    # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
-    return displacement(gravity, lane.v, h) + lane.own.over_mass * force(chain, law, lane.r)
+    def end(self, before, gravity, lane, s, push):
+        # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
+        kick = 2.0 / self.dt * (push - lane.own.over_mass * force(before, self.law, lane.r))
+        return implicit_rule.RuleStep(s, accelerated(gravity, lane.v, self.dt) - kick, kick)
 
-
-@implicit_rule.end.register(TrapezoidalRule)
-def _(rule, h, law, chain, gravity, lane, point, push):
-    # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
-    kick = 2.0 / h * (push - lane.own.over_mass * force(chain, law, lane.r))
-    return implicit_rule.RuleStep(point, accelerated(gravity, lane.v, h) - kick, kick)
-
-
-@implicit_rule.add_impulses.register(TrapezoidalRule)
-def _(rule, method, chain, lane, reactions, impulse, i):
-    h, law, moving = method.dt, method.law, method.moving
-    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
-    corner.add_impulses(reactions, h, impulse, i)
-    # h/(2m) |F0|
-    factor = 2.0 * lane.own.over_mass / h
-    add_impulses(before, law, factor, lane.r, impulse, i)
-    work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
-    return work + corner.add_works(moving, over, -2.0 / (h * h), reactions, impulse, i)
+    def add_impulses(self, chain, lane, reactions, impulse, i):
+        h, law, moving = self.dt, self.law, self.moving
+        before, over = self.before(chain, lane.left), self.over(chain, lane.left)
+        corner.add_impulses(reactions, h, impulse, i)
+        # h/(2m) |F0|
+        factor = 2.0 * lane.own.over_mass / h
+        add_impulses(before, law, factor, lane.r, impulse, i)
+        work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
+        return work + corner.add_works(moving, over, -2.0 / (h * h), reactions, impulse, i)

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 from ..contact.force import NEEDS as FORCE_NEEDS
 from ..contact.force import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import inlined
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
 from ..surfaces import fold as walls
@@ -49,14 +48,24 @@ class Verlet(fixed_step.SoftWalls):
 
 
 class VerletNumbers(fixed_step.Numbers):
-    """What kernels know of the method."""
+    """The method as kernels know it."""
+
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        """The step against all walls at once."""
+        step, over_mass, law = _step(self, chain, gravity, lane), lane.own.over_mass, self.law
+        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+        add_impulses(before, law, over_mass, lane.r, impulse, i)
+        add_impulses(after, law, over_mass, step.r, impulse, i)
+        work = add_works(self.moving, over, before, law, over_mass / self.dt, lane.r, impulse, i)
+        work += add_works(self.moving, over, after, law, over_mass / self.dt, step.r, impulse, i)
+        return fixed_step.Careful(step.r, step.v, True, work)
 
 
 # --- One pass --------------------------------------------------------------------------------------------
 
 
 class VerletStep(NamedTuple):
-    """r1, v1, what the walls add to the velocity, h (F0 + F1)/(2m), and their work per mass."""
+    """r1, v1, the change of the velocity by the walls, h (F0 + F1)/(2m), and their work per mass."""
 
     r: Vec
     v: Vec
@@ -64,12 +73,10 @@ class VerletStep(NamedTuple):
     work: float
 
 
-@inlined
 def _step(method, chain, gravity, lane):
     """The step of a lane."""
     h, over_mass = method.dt, lane.own.over_mass
-    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
-    after = fixed_step.after(h, chain, lane.left)
+    before, over, after = method.before(chain, lane.left), method.over(chain, lane.left), method.after(chain, lane.left)
     f0 = force(before, method.law, lane.r)
     # h^2/(2m) F0
     r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
@@ -81,21 +88,6 @@ def _step(method, chain, gravity, lane):
 @contract.contact.register(VerletNumbers)
 def _(method, chain, gravity, lane, wall, solution):
     step = _step(method, chain, gravity, lane)
-    new = (wall >= 0.0) & (not walls.outside(fixed_step.before(method.dt, chain, lane.left), -1.0, lane.r))
+    new = (wall >= 0.0) & (not walls.outside(method.before(chain, lane.left), -1.0, lane.r))
     taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
-    return fixed_step.contact(method.moving, lane, wall, taken)
-
-
-# --- Several walls at once -------------------------------------------------------------------------------
-
-
-@fixed_step.careful_step.register(VerletNumbers)
-def _(method, chain, gravity, lane, impulse, i):
-    step, over_mass, h = _step(method, chain, gravity, lane), lane.own.over_mass, method.dt
-    over, before = fixed_step.over(h, chain, lane.left), fixed_step.before(h, chain, lane.left)
-    after = fixed_step.after(h, chain, lane.left)
-    add_impulses(before, method.law, over_mass, lane.r, impulse, i)
-    add_impulses(after, method.law, over_mass, step.r, impulse, i)
-    work = add_works(method.moving, over, before, method.law, over_mass / h, lane.r, impulse, i)
-    work += add_works(method.moving, over, after, method.law, over_mass / h, step.r, impulse, i)
-    return fixed_step.Careful(step.r, step.v, True, work)
+    return fixed_step.contact(lane, wall, taken)

@@ -1,5 +1,6 @@
-"""What kernels take of a scene with walls that react, from its description."""
+"""A scene with walls that react as kernels take it, from its description."""
 
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -9,11 +10,11 @@ from numpy.typing import NDArray
 from ..kernel.vector import Vec, vec
 from ..motion import Guide, Rotation, Translation, pose, unit_axis
 from ..scene import Scene
-from ..surfaces.fold import Chain
+from ..surfaces.fold import Chain, each
 from ..surfaces.moving import at
 from ..surfaces.surface import Surface
-from .freedoms import Free, Freedoms, Guided, Hinged, Sprung, posed
-from .pendulum import TERMS, Pendulum, expand
+from .freedoms import Free, Freedoms, Guided, Sprung
+from .pendulum import TERMS, Hinged, Pendulum
 from .queue import Scenery
 from .walls import Reacting
 
@@ -46,10 +47,7 @@ def _reacting(scene: Scene) -> Chain | None:
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
         number += len(walls)
-    chain = None
-    for wall in reversed(made):
-        chain = Chain(wall, chain)
-    return chain
+    return functools.reduce(lambda chain, wall: Chain(wall, chain), reversed(made), None)
 
 
 def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Any:
@@ -104,16 +102,14 @@ def freedoms_of(scene: Scene, width: float) -> Freedoms:
         widths[k] = width if surface.inertia is None else width / size
     series = np.zeros((3 * TERMS, count))
     made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
-    wall = _reacting(scene)
-    while wall is not None:
-        if isinstance(wall.first.freedom, Pendulum):
-            expand(wall.first.freedom, made)
-        wall = wall.rest
+    for link in each(_reacting(scene)):
+        if isinstance(link.first.freedom, Pendulum):
+            link.first.freedom.expand(made)
     return made
 
 
 class Observed(NamedTuple):
-    """What is observed of the surfaces of a scene: of those that react where they are, and how they move."""
+    """The surfaces of a scene as observed: those that react where they are, and how they move."""
 
     position: Floats  # (surfaces, 3) where what is given at the origin is [m]
     orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
@@ -156,19 +152,12 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
 
 def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Chain | None:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
-    given, reacting = _walls(at(scenery.given, 0.0)), _walls(scenery.reacting)
+    given, reacting = ([link.first for link in each(chain)] for chain in (at(scenery.given, 0.0), scenery.reacting))
     made = []
     for i in scene.owners():
         if scene.surfaces[i].reacts():
             wall = reacting.pop(0)
-            made.append(posed(wall.freedom, wall.body, freedoms, 0.0))
+            made.append(wall.freedom.posed(wall.body, freedoms, 0.0))
         else:
             made.append(given.pop(0))
-    chain = None
-    for wall in reversed(made):
-        chain = Chain(wall, chain)
-    return chain
-
-
-def _walls(chain: Chain | None) -> list[Any]:
-    return [] if chain is None else [chain.first, *_walls(chain.rest)]
+    return functools.reduce(lambda chain, wall: Chain(wall, chain), reversed(made), None)

@@ -5,18 +5,22 @@ the velocity stays within a width of a middle one, so that what was said of far 
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
-from ..kernel.jit import Array, by_type, index, inlined, select
-from ..kernel.vector import ZERO, Vec, column, cross, dot, norm, put, square
-from ..surfaces import contract
-from ..surfaces.drive import Drive, Pose, Rows, Swing, Turn
+from ..kernel.jit import Array, index, select
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
+from ..surfaces import contract, flights, safe
+from ..surfaces.drive import Drive, Pose, Swing
 from ..surfaces.fold import Chain
+from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
+from ..surfaces.relative import flight_of
+from .reach import Seen, reach_of
 
 
 class Freedoms(NamedTuple):
-    """What is known of the walls that react: arrays of one column a wall."""
+    """The motion of the walls that react: arrays of one column a wall."""
 
     shift: Array  # (3, K) the displacement at `time` [m]
     velocity: Array  # (3, K) [m/s]
@@ -32,40 +36,14 @@ class Freedoms(NamedTuple):
     until: Array  # (K,) when it may leave the lease by what pulls it [s]
 
 
-class Free(NamedTuple):
-    """A wall that moves in any direction and does not turn."""
+class Flight(NamedTuple):
+    """A particle at a time of the frame, and how far ahead of it matters [s]."""
 
-    row: int
-    lightness: float  # 1/M
+    r: Vec
+    v: Vec
     pull: Vec
-
-
-class Guided(NamedTuple):
-    """A wall that moves along a guide."""
-
-    row: int
-    lightness: float
-    pull: Vec  # along the axis
-    axis: Vec
-
-
-class Sprung(NamedTuple):
-    """A wall on a guide with a spring, which is relaxed where the wall is given."""
-
-    row: int
-    lightness: float
-    pull: Vec
-    axis: Vec
-    rate: float  # of its vibration [rad/s]
-
-
-class Hinged(NamedTuple):
-    """A wall that turns about an axis, on which its centre of mass is."""
-
-    row: int
-    lightness: float  # 1/I
-    axis: Vec
-    center: Vec
+    time: float
+    longest: float
 
 
 class Falling(Posed):
@@ -86,220 +64,180 @@ def _(surface, r, v, pull):
     return contract.falling_hit(surface.body, way, speed, pull - surface.pose.acceleration)
 
 
-# --- Where it is -----------------------------------------------------------------------------------------
+class Freedom(Record):
+    """How a wall may move, with its `row` among the `walls` and its `lightness`, 1/M or 1/I. Times are of the frame."""
+
+    def pose(self, walls, t):
+        """Its `Pose` at a time."""
+        raise NotImplementedError
+
+    def drive(self, walls, t):
+        """Its motion from a time on as that of a wall whose motion is given, whose frame ends then."""
+        raise NotImplementedError
+
+    def posed(self, body, walls, t):
+        """The wall at a time, as a surface."""
+        drive = self.drive(walls, t)
+        here = drive.pose(0.0)
+        return Posed(body, here, here, drive, 0.0, 0.0)
+
+    def arm(self, r):
+        """From the centre of the rotation to a point."""
+        return r
+
+    def mobility(self, n, arm):
+        """The velocity along n that a unit impulse along n gives the wall at the end of the arm [1/kg]."""
+        raise NotImplementedError
+
+    def push(self, walls, t, impulse, arm):
+        """Give the wall an impulse at a time, at the end of an arm from its centre."""
+        raise NotImplementedError
+
+    def renew(self, walls, t):
+        """A new lease from a time on, about the velocity that the wall has."""
+        raise NotImplementedError
+
+    def stays(self, walls):
+        """Whether a wall that was just struck is within its lease; says until when."""
+        raise NotImplementedError
+
+    def reach(self, body, walls, flight):
+        """A time during which the flight surely does not meet this wall, at most the longest that matters."""
+        raise NotImplementedError
+
+    def hit(self, body, gravity, walls, flight):
+        """When a flight meets the wall: (time, whether it does then)."""
+        return march(Moving(body, self.drive(walls, flight.time)), flight, flight.longest)
 
 
-@by_type
-def pose_of(freedom, walls, t):
-    """The `Pose` at a time of the frame."""
-    # s = s0 + V t + a t^2/2
-    k = index(freedom.row)
-    t = t - walls.time[k]
-    v, pull = column(walls.velocity, 0, k), freedom.pull
-    return Pose(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
+def march(wall, flight, longest):
+    """The same of a wall that is met by safe steps, within so long [s]."""
+    found = safe.march(Chain(wall, None), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    return found.time, found.wall >= 0.0
 
 
-@pose_of.register(Sprung)
-def _(freedom, walls, t):
-    # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
-    k, rate = index(freedom.row), freedom.rate
-    angle = rate * (t - walls.time[k])
-    rest = freedom.pull / (rate * rate)
-    c, s = math.cos(angle), math.sin(angle)
-    away, speed = column(walls.shift, 0, k) - rest, column(walls.velocity, 0, k) / rate
-    here = c * away + s * speed
-    return Pose(rest + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+# --- Without turning -------------------------------------------------------------------------------------
 
 
-@pose_of.register(Hinged)
-def _(freedom, walls, t):
-    k = index(freedom.row)
-    angle = walls.angle[k] + walls.rate[k] * (t - walls.time[k])
-    return Pose(ZERO, ZERO, ZERO, rows_about(freedom.axis, angle))
+class Shifted(Freedom):
+    """A wall that does not turn, pulled by its weight: in any direction, or along the `axis` of a guide."""
+
+    axis = cast(Any, None)
+
+    def pose(self: Any, walls, t):
+        # s = s0 + V t + a t^2/2
+        k = index(self.row)
+        t = t - walls.time[k]
+        v, pull = column(walls.velocity, 0, k), self.pull
+        return Pose(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
+
+    def posed(self: Any, body, walls, t):
+        here = self.pose(walls, t)
+        return Falling(body, here, here, _AT_REST, 0.0, 0.0)
+
+    def mobility(self: Any, n, arm):
+        if self.axis is None:
+            return self.lightness * square(n)
+        along = dot(n, self.axis)
+        return self.lightness * along * along
+
+    def push(self: Any, walls, t, impulse, arm):
+        change = self.lightness * impulse
+        if self.axis is not None:
+            change = (self.lightness * dot(impulse, self.axis)) * self.axis
+        k, here = index(self.row), self.pose(walls, t)
+        more = change + column(walls.rest, 0, k)
+        x, y, z = (
+            exact_sum(here.velocity.x, more.x),
+            exact_sum(here.velocity.y, more.y),
+            exact_sum(here.velocity.z, more.z),
+        )
+        put(walls.shift, 0, k, here.shift)
+        put(walls.velocity, 0, k, Vec(x[0], y[0], z[0]))
+        put(walls.rest, 0, k, Vec(x[1], y[1], z[1]))
+        walls.time[k] = t
+
+    def hardest(self: Any, walls):
+        """A bound of the wall's acceleration between impacts [m/s^2]."""
+        return norm(self.pull)
+
+    def renew(self: Any, walls, t):
+        put(walls.middle, 0, index(self.row), self.pose(walls, t).velocity)
+        self._extend(walls, t, 0.0)
+
+    def stays(self: Any, walls):
+        k = index(self.row)
+        away = norm(column(walls.velocity, 0, k) - column(walls.middle, 0, k))
+        self._extend(walls, walls.time[k], away)
+        return away < walls.width[k]
+
+    def _extend(self: Any, walls, t, away):
+        k, most = index(self.row), self.hardest(walls)
+        walls.until[k] = select(most > 0.0, t + (walls.width[k] - away) / select(most > 0.0, most, 1.0), math.inf)
+
+    def reach(self: Any, body, walls, flight):
+        k = index(self.row)
+        r, v = flight.r - self.pose(walls, flight.time).shift, flight.v - column(walls.middle, 0, k)
+        return reach_of(body, Seen(r, v, flight.pull, walls.width[k], self.axis, flight.longest))
+
+    def hit(self: Any, body, gravity, walls, flight):
+        return flights.hit(gravity, self.posed(body, walls, flight.time), flight.r, flight.v)
 
 
-@inlined
-def rows_about(axis, angle):
-    """The rows of the rotation about an axis by an angle (Rodrigues)."""
-    a, c, s = axis, math.cos(angle), math.sin(angle)
-    b = 1.0 - c
-    return Rows(
-        Vec(c + b * a.x * a.x, b * a.x * a.y - s * a.z, b * a.x * a.z + s * a.y),
-        Vec(b * a.y * a.x + s * a.z, c + b * a.y * a.y, b * a.y * a.z - s * a.x),
-        Vec(b * a.z * a.x - s * a.y, b * a.z * a.y + s * a.x, c + b * a.z * a.z),
-    )
+class Free(Shifted):
+    """A wall that moves in any direction."""
+
+    row: int
+    lightness: float
+    pull: Vec
 
 
-@by_type
-def drive_of(freedom, walls, t):
-    """Its motion from this time on as that of a wall whose motion is given, whose frame ends then."""
-    return _AT_REST
+class Guided(Shifted):
+    """A wall that moves along a guide."""
+
+    row: int
+    lightness: float
+    pull: Vec  # along the axis
+    axis: Vec
 
 
-@drive_of.register(Sprung)
-def _(freedom, walls, t):
-    found, rate = pose_of(freedom, walls, t), freedom.rate
-    away, speed = found.shift - freedom.pull / (rate * rate), found.velocity / rate
-    most = math.sqrt(square(away) + square(speed))
-    bounds = rate * most, rate * rate * most, rate * rate * rate * most
-    swings, jerks = Chain(Swing(away, speed, rate), None), Vec(bounds[2], bounds[2], bounds[2])
-    return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
+class Sprung(Shifted):
+    """A wall on a guide with a spring, which is relaxed where the wall is given."""
+
+    row: int
+    lightness: float
+    pull: Vec
+    axis: Vec
+    rate: float  # of its vibration [rad/s]
+
+    def pose(self, walls, t):
+        # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
+        k, rate = index(self.row), self.rate
+        angle = rate * (t - walls.time[k])
+        rest = self.pull / (rate * rate)
+        c, s = math.cos(angle), math.sin(angle)
+        away, speed = column(walls.shift, 0, k) - rest, column(walls.velocity, 0, k) / rate
+        here = c * away + s * speed
+        return Pose(rest + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+
+    def drive(self, walls, t):
+        found, rate = self.pose(walls, t), self.rate
+        away, speed = found.shift - self.pull / (rate * rate), found.velocity / rate
+        most = math.sqrt(square(away) + square(speed))
+        bounds = rate * most, rate * rate * most, rate * rate * rate * most
+        swings, jerks = Chain(Swing(away, speed, rate), None), Vec(bounds[2], bounds[2], bounds[2])
+        return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
+
+    def hardest(self, walls):
+        k, rate = index(self.row), self.rate
+        away, speed = column(walls.shift, 0, k) - self.pull / (rate * rate), column(walls.velocity, 0, k) / rate
+        return rate * rate * math.sqrt(square(away) + square(speed))
+
+    posed, hit = Freedom.posed, Freedom.hit
 
 
-@drive_of.register(Hinged)
-def _(freedom, walls, t):
-    rate, turn = walls.rate[index(freedom.row)], pose_of(freedom, walls, t).turn
-    turning, spin = Turn(turn.x, turn.y, turn.z, freedom.axis, rate), rate * freedom.axis
-    return Drive(ZERO, ZERO, None, None, turning, spin, freedom.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
-
-
-@by_type
-def posed(freedom, body, walls, t):
-    """A wall at a time of the frame, as a surface."""
-    here = pose_of(freedom, walls, t)
-    return Falling(body, here, here, _AT_REST, 0.0, 0.0)
-
-
-@posed.register(Sprung)
-@posed.register(Hinged)
-def _(freedom, body, walls, t):
-    drive = drive_of(freedom, walls, t)
-    here = drive.pose(0.0)
-    return Posed(body, here, here, drive, 0.0, 0.0)
-
-
-# --- What an impulse does --------------------------------------------------------------------------------
-
-
-@by_type
-def mobility(freedom, n, arm):
-    """The velocity along n that a unit impulse along n gives the wall at the end of the arm [1/kg]."""
-    return freedom.lightness * square(n)
-
-
-@mobility.register(Guided)
-@mobility.register(Sprung)
-def _(freedom, n, arm):
-    along = dot(n, freedom.axis)
-    return freedom.lightness * along * along
-
-
-@mobility.register(Hinged)
-def _(freedom, n, arm):
-    lever = dot(cross(arm, n), freedom.axis)
-    return freedom.lightness * lever * lever
-
-
-@by_type
-def push(freedom, walls, t, impulse, arm):
-    """Give the wall an impulse at a time, at the end of an arm from its centre."""
-    _move(freedom, walls, t, freedom.lightness * impulse)
-
-
-@push.register(Guided)
-@push.register(Sprung)
-def _(freedom, walls, t, impulse, arm):
-    _move(freedom, walls, t, (freedom.lightness * dot(impulse, freedom.axis)) * freedom.axis)
-
-
-@push.register(Hinged)
-def _(freedom, walls, t, impulse, arm):
-    k = index(freedom.row)
-    walls.angle[k] += walls.rate[k] * (t - walls.time[k])
-    change = freedom.lightness * dot(cross(arm, impulse), freedom.axis)
-    walls.rate[k], walls.rate_rest[k] = _exact_sum(walls.rate[k], change + walls.rate_rest[k])
-    walls.time[k] = t
-
-
-@inlined
-def _move(freedom, walls, t, change):
-    k, here = index(freedom.row), pose_of(freedom, walls, t)
-    more = change + column(walls.rest, 0, k)
-    x, y, z = (
-        _exact_sum(here.velocity.x, more.x),
-        _exact_sum(here.velocity.y, more.y),
-        _exact_sum(here.velocity.z, more.z),
-    )
-    put(walls.shift, 0, k, here.shift)
-    put(walls.velocity, 0, k, Vec(x[0], y[0], z[0]))
-    put(walls.rest, 0, k, Vec(x[1], y[1], z[1]))
-    walls.time[k] = t
-
-
-@inlined
-def _exact_sum(a, b):
+def exact_sum(a, b):
     """a + b and what round-off takes of it (Knuth)."""
     found = a + b
     other = found - a
     return found, (a - (found - other)) + (b - other)
-
-
-@by_type
-def arm_of(freedom, r):
-    """From the centre of the rotation to a point."""
-    return r
-
-
-arm_of.register(Hinged, lambda freedom, r: r - freedom.center)
-
-# --- Leases ----------------------------------------------------------------------------------------------
-
-
-@by_type
-def hardest(freedom, walls):
-    """A bound of the wall's acceleration between impacts [m/s^2]."""
-    return norm(freedom.pull)
-
-
-@hardest.register(Sprung)
-def _(freedom, walls):
-    k, rate = index(freedom.row), freedom.rate
-    away, speed = column(walls.shift, 0, k) - freedom.pull / (rate * rate), column(walls.velocity, 0, k) / rate
-    return rate * rate * math.sqrt(square(away) + square(speed))
-
-
-hardest.register(Hinged, lambda freedom, walls: 0.0)
-
-
-@by_type
-def renew(freedom, walls, t):
-    """A new lease from this time on, about the velocity that the wall has."""
-    put(walls.middle, 0, index(freedom.row), pose_of(freedom, walls, t).velocity)
-    _extend(freedom, walls, t, 0.0)
-
-
-@renew.register(Hinged)
-def _(freedom, walls, t):
-    walls.turning[index(freedom.row)] = walls.rate[index(freedom.row)]
-    _extend(freedom, walls, t, 0.0)
-
-
-@inlined
-def _extend(freedom, walls, t, away):
-    k, most = index(freedom.row), hardest(freedom, walls)
-    walls.until[k] = select(most > 0.0, t + (walls.width[k] - away) / select(most > 0.0, most, 1.0), math.inf)
-
-
-@by_type
-def stays(freedom, walls):
-    """Whether a wall that was just struck is within its lease; says until when."""
-    k = index(freedom.row)
-    away = norm(column(walls.velocity, 0, k) - column(walls.middle, 0, k))
-    _extend(freedom, walls, walls.time[k], away)
-    return away < walls.width[k]
-
-
-@stays.register(Hinged)
-def _(freedom, walls):
-    k = index(freedom.row)
-    return abs(walls.rate[k] - walls.turning[k]) < walls.width[k]
-
-
-@by_type
-def axis_of(freedom):
-    """The direction in which its velocity may change, or None for any."""
-    return
-
-
-axis_of.register(Guided, lambda freedom: freedom.axis)
-axis_of.register(Sprung, lambda freedom: freedom.axis)

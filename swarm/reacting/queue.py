@@ -11,16 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..contact.reflection import Energy, exact
-from ..kernel.gravity import Nothing, accelerated, displacement, potential
+from ..kernel.gravity import accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
-from ..kernel.jit import Array, by_type, index, inlined, long_kernel, outlined, select
+from ..kernel.jit import Array, index, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
 from ..surfaces.flights import NEVER
-from ..surfaces.fold import Chain
-from ..surfaces.moving import Carried, Marched, at
-from .walls import Flight, all_stay, first_hit, reach_of_all, renew_all, settle_all, strike
+from ..surfaces.moving import Marched, at
+from .freedoms import Flight
+from .walls import all_stay, first_hit, reach_of_all, renew_all, settle_all, strike
 
 # What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
 # found, so that it is looked at again.
@@ -78,26 +78,15 @@ class Rule(NamedTuple):
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-@by_type
-def _as_vector(gravity):
-    return gravity
-
-
-_as_vector.register(Nothing, lambda gravity: ZERO)
-
-
-@by_type
 def _given_hit(chain, gravity, r, v, left):
     """The first hit with the walls that do not react."""
-    return NEVER
+    if chain is None:
+        return NEVER
+    if isinstance(chain, Marched):
+        return safe.first_hit(chain, gravity, r, v, left)
+    return flights.first_hit(at(chain, left), gravity, r, v)
 
 
-_given_hit.register(Chain, lambda chain, gravity, r, v, left: flights.first_hit(chain, gravity, r, v))
-_given_hit.register(Carried, lambda chain, gravity, r, v, left: flights.first_hit(at(chain, left), gravity, r, v))
-_given_hit.register(Marched, lambda chain, gravity, r, v, left: safe.first_hit(chain, gravity, r, v, left))
-
-
-@inlined
 def _aim(scenery, queue, i, end):
     """Find when particle i meets a wall that does not react, from where it is."""
     t, r, v = queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
@@ -105,16 +94,14 @@ def _aim(scenery, queue, i, end):
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 
-@inlined
 def _seen(scenery, queue, i, now, end):
     """The `Flight` of particle i at a time."""
     t, r, v = now - queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     pull, target = scenery.pull, select(queue.due[i] < end, queue.due[i], end)
     here = r + displacement(pull, v, t)
-    return Flight(here, accelerated(pull, v, t), _as_vector(pull), now, target - now)
+    return Flight(here, accelerated(pull, v, t), ZERO if pull is None else pull, now, target - now)
 
 
-@inlined
 def _next(scenery, walls, queue, i, now, end, soon):
     """The time at which something may happen to particle i: by its reach if that is far, else as it is now."""
     flight = _seen(scenery, queue, i, now, end)
@@ -133,7 +120,6 @@ def _next(scenery, walls, queue, i, now, end, soon):
     return now + hit.time
 
 
-@inlined
 def _fly(scenery, queue, i, t, way):
     """Bring particle i to a time, which is so long from where it is."""
     v, pull = column(queue.velocity, 0, i), scenery.pull
@@ -179,7 +165,6 @@ def _strike(scenery, walls, queue, i, now):
 # --- Of all ----------------------------------------------------------------------------------------------
 
 
-@inlined
 def _soon(clock):
     """The mean time from one strike of a wall that reacts to the next: who is nearer waits for it."""
     return (clock[BEFORE] + clock[NOW]) / (1.0 + clock[STRIKES])
@@ -220,7 +205,6 @@ def settle(scenery, freedoms, t):
     settle_all(scenery.reacting, freedoms, t)
 
 
-@inlined
 def _until(freedoms):
     """When the first lease may end without a strike."""
     first = np.inf
@@ -229,7 +213,6 @@ def _until(freedoms):
     return first
 
 
-@inlined
 def _list(queue, close, i):
     """How many are listed, with particle i if it is near."""
     if queue.near[i] and not queue.listed[i]:
@@ -254,7 +237,6 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
     return kept
 
 
-@inlined
 def _carry_out(scenery, freedoms, queue, i, now, end):
     """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
     queue.hits[i] += select(now > queue.time[i], 1, AT_ONCE)
@@ -269,7 +251,6 @@ def _carry_out(scenery, freedoms, queue, i, now, end):
     return queue.hits[i] <= MOST_HITS
 
 
-@inlined
 def _listed(queue):
     """List those that are near; how many there are."""
     close = 0

@@ -16,8 +16,8 @@ from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
-from ..lanes import meet, slide, sliding, table
 from ..lanes import log as impact_log
+from ..lanes import meet, slide, sliding, table
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles
 from ..scene import Scene

@@ -134,5 +134,3 @@ def _during(chain, last, left, after):
     elif isinstance(wall, Moving):
         wall = wall.during(left, after)
     return kind(wall, _during(chain.rest, wall, left, after))
-
-

@@ -91,6 +91,9 @@ def operation(function: Any) -> Any:
 
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
     """A call while a helper is traced."""
+    if isinstance(function, python_types.MethodType):
+        # Before it is looked up: a method of a record may be outlined.
+        function, given = function.__func__, (function.__self__, *given)
     try:
         replaced, is_operation = REPLACED.get(function), function in OPERATIONS
     except TypeError:  # not hashable: a method of a proxy
@@ -103,8 +106,6 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
         return _operation(function, given, named)
     if any(one is UNDEFINED for one in given):
         bool(UNDEFINED)
-    if isinstance(function, python_types.MethodType):
-        function, given = function.__func__, (function.__self__, *given)
     if isinstance(function, python_types.FunctionType):
         return traced(function, given, named)
     is_python = getattr(function, "__module__", None) == "builtins"

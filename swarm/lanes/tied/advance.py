@@ -4,15 +4,19 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import inlined, long_kernel, next_of, scratch, select
+from ...kernel.jit import long_kernel, next_of, scratch, select
 from ...kernel.vector import Vec
 from ...status import Status
 from ...surfaces import fold as walls
-from . import blow, contract, hold, instant, lead, soft
-from .arrays import Held, Lanes, Pace
+from . import blow, hold, instant, lead
+from .arrays import PACES, Held, Lanes, Pace
 from .contacts import point_of
+from .hold import HardContacts
+from .soft import SoftContacts
 from .stage import solve
 
+# How many arrays of `Lanes` have a row for each point, for each tie with its direction, and for each tie.
+_POINTS, _TIES, _ROWS = 8, 3, 6
 # A step longer than the frame that is left by this part is the last of it.
 _SAME = 1.0 + 1e-9
 # Trials after which a body is stuck: brackets take a hundred at most.
@@ -31,35 +35,17 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
     `chains` are the walls of the scene, and those with the walls of the body's own guides and cavities after them.
     """
     points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
-    lanes = Lanes(
-        scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
-        scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
-        scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
-        scratch((points, 3, count), np.float64), scratch((points, 3, count), np.float64),
-        scratch((rows, 3, count), np.float64), scratch((rows, 3, count), np.float64),
-        scratch((rows, 3, count), np.float64), scratch((rows, rows, count), np.float64),
-        scratch((rows, count), np.float64), scratch((rows, count), np.float64),
-        scratch((rows, count), np.float64), scratch((rows, count), np.float64),
-        scratch((rows, count), np.float64), scratch((rows, count), np.float64),
-        scratch((rows if rule.loop else 0, count), np.float64),
-    )  # fmt: skip
-    pace = Pace(
-        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
-        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
-        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
-        scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64), scratch(count, np.float64),
-        scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_), scratch(count, np.bool_),
-        scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64), scratch(count, np.int64),
-        scratch(count, np.int64), scratch(count, np.bool_), scratch(count, np.int64), scratch(count, np.bool_),
-        scratch(count, np.bool_), scratch(count, np.float64), scratch(count, np.int64),
-        scratch(count, np.int64), scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.bool_),
-    )  # fmt: skip
+    offsets = rows if rule.loop else 0
+    shapes = (*_POINTS * ((points, 3, count),), *_TIES * ((rows, 3, count),), (rows, rows, count))
+    lanes = Lanes(*(scratch(shape, np.float64) for shape in (*shapes, *_ROWS * ((rows, count),), (offsets, count))))
+    pace = Pace(*(scratch(count, kind) for kind in PACES))
     held = Held(
         scratch((count, rule.most, 2), np.int64), scratch((count, rule.most, 3, 3), np.float64),
         scratch((count, 3 * rule.most), np.float64), scratch((count, 3 * rule.most), np.float64),
         scratch((count, rule.most), np.float64), scratch((count, rule.most), np.int64),
         scratch(count, np.float64), scratch((count, rule.most), np.float64),
     )  # fmt: skip
+    contacts = (HardContacts if rule.walls is None else SoftContacts)(body, chains[1], rule, lanes, pace, held)
     c = scratch((3, count), np.float64)
     for i in range(count):
         pace.body[i] = -1
@@ -85,10 +71,10 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         if live == 0:
             return (Status.INTERRUPTED if halted else Status.DONE), 0
         passes += 1
-        _try(body, chains[1], rule, state, lanes, (pace, held))
+        _try(contacts, state)
         _look(body[1], chains, lanes, pace, c)
         for i in range(count):
-            pace.action[i] = _judge(body[1], chains[1], rule, lanes, (pace, held), i)
+            pace.action[i] = _judge(contacts, i)
             if pace.body[i] >= 0 and (pace.action[i] == instant.FAILED or pace.stuck[i] > _STUCK):
                 status = Status.UNSOLVED if pace.action[i] == instant.FAILED else Status.STALLED
                 status = Status.UNCONVERGED if pace.loose[i] and rule.strict else status
@@ -98,16 +84,15 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         _commit(lanes, pace, rule.dt)
         for i in range(count):
             if pace.action[i] != instant.AGAIN:
-                _finish(body, chains[1], rule, state, lanes, (pace, held), i)
+                _finish(contacts, state, i)
                 if pace.left[i] <= 0.0:
                     _store(state, lanes, pace, i)
                     pace.body[i] = -1
 
 
-@inlined
-def _judge(touching, chain, rule, lanes, paces, i):
+def _judge(contacts, i):
     """What becomes of a lane after its trial."""
-    pace, _held = paces
+    rule, pace, held = contacts.rule, contacts.pace, contacts.held
     pace.fresh[i] = False
     if pace.body[i] < 0 or 0 < pace.waits[i] <= _WAITS:
         return instant.AGAIN
@@ -115,18 +100,17 @@ def _judge(touching, chain, rule, lanes, paces, i):
     pace.waits[i] = 0
     if pace.loose[i]:
         return instant.FAILED if rule.strict else instant.COMMIT
-    if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and hold.is_mixed(paces, i, rule.stages.size):
+    if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and hold.is_mixed((pace, held), i, rule.stages.size):
         pace.whole[i] = True
         return instant.AGAIN
     if pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]:
-        return contract.judge(rule.walls, touching, chain, rule, lanes, paces, i)
+        return contacts.judge(i)
     return instant.COMMIT
 
 
-@inlined
-def _finish(body, chain, rule, state, lanes, paces, i):
+def _finish(contacts, state, i):
     """After a step, or a blow."""
-    pace, _held = paces
+    rule, lanes, pace = contacts.rule, contacts.lanes, contacts.pace
     number, action = pace.body[i], pace.action[i]
     if action != instant.STRIKE_NOW:
         state.steps[number] += 1
@@ -136,16 +120,15 @@ def _finish(body, chain, rule, state, lanes, paces, i):
             state.sweeps[number] += pace.turns[i]
             state.unconverged[number] += pace.loose[i]
         if pace.lasts[i]:
-            contract.end(rule.walls, body, chain, lanes, paces, state, i)
+            contacts.end(state, i)
     if action != instant.COMMIT:
-        contract.strike(rule.walls, body, chain, rule, lanes, paces, state, i)
+        contacts.strike(state, i)
         for a in range(lanes.recent.shape[0]):
             lanes.older[a, i] = math.nan
     pace.fresh[i], pace.whole[i] = True, False
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
 
 
-@inlined
 def _load(state, lanes, paces, i, number):
     """Take a body into a lane."""
     pace, _held = paces
@@ -161,7 +144,6 @@ def _load(state, lanes, paces, i, number):
         lanes.older[a, i] = state.guess[2, a, number]
 
 
-@inlined
 def _store(state, lanes, pace, i):
     """Give the body of a lane back, as it is at the start of its step."""
     number = pace.body[i]
@@ -175,7 +157,6 @@ def _store(state, lanes, pace, i):
         state.guess[2, a, number] = lanes.older[a, i]
 
 
-@inlined
 def _stop(state, lanes, pace):
     """Give back the bodies that go on with the same bits from their positions and velocities alone."""
     for i in range(pace.body.size):
@@ -185,18 +166,16 @@ def _stop(state, lanes, pace):
             pace.body[i] = -1
 
 
-@inlined
 def _store_all(state, lanes, pace):
     for i in range(pace.body.size):
         if pace.body[i] >= 0:
             _store(state, lanes, pace, i)
 
 
-@inlined
-def _try(body, chain, rule, state, lanes, paces):
+def _try(contacts, state):
     """The step of every lane, to r1 and v1."""
-    tied = body[0]
-    pace, held = paces
+    body, _chain, rule, lanes, pace, held = contacts
+    tied, paces = body[0], (pace, held)
     points, count, stages = lanes.r.shape[0], lanes.r.shape[2], rule.stages.size
     elapsed = 0.0
     for i in range(count):
@@ -208,7 +187,7 @@ def _try(body, chain, rule, state, lanes, paces):
         if pace.body[i] >= 0 and pace.lasts[i]:
             if (pace.fresh[i] or not pace.solved[i]) and state.steps[pace.body[i]] % _AFRESH == 0:
                 pace.held[i] = 0
-            contract.begin(rule.walls, body, chain, rule, lanes, paces, i)
+            contacts.begin(i)
             hold.forget(held, i)
         pace.solved[i] = True
     for q in range(points):
@@ -237,12 +216,12 @@ def _try(body, chain, rule, state, lanes, paces):
         for i in range(count):
             pace.done[i] = (pace.body[i] < 0) | (pace.whole[i] & (stage < stages - 1))
         if rule.loop:
-            soft.begin_loop(tied, rule, lanes, paces)
+            contacts.begin_loop()
         while True:
-            solve(body, chain, rule, lanes, paces)
+            solve(contacts)
             for i in range(count):
                 pace.solved[i] = pace.solved[i] & pace.done[i]
-            if not rule.loop or contract.again(rule.walls, body, chain, rule, lanes, paces) == 0:
+            if not rule.loop or contacts.again() == 0:
                 break
         for i in range(count):
             if pace.held[i] > 0 and (not pace.whole[i] or stage == stages - 1):
@@ -256,7 +235,6 @@ def _try(body, chain, rule, state, lanes, paces):
                             lanes.ra[q, x, i], lanes.va[q, x, i] = lanes.r1[q, x, i], lanes.v1[q, x, i]
 
 
-@inlined
 def _look(touching, chains, lanes, pace, c):
     """Which lanes end with a point outside."""
     count = pace.out.size
@@ -287,7 +265,6 @@ def _look(touching, chains, lanes, pace, c):
             pace.out[i] = pace.out[i] | (walls.distance(chains[1], wall, point_of(touching, lanes.r1, k, i)) > 0.0)
 
 
-@inlined
 def _commit(lanes, pace, whole):
     """Take the trial as the step where it is one."""
     count = pace.out.size

@@ -1,6 +1,8 @@
-"""What kernels of bodies take and keep: the body, the rule of a step, the state of all copies, and the lanes."""
+"""The arrays of kernels of bodies: the body, the rule of a step, the state of all copies, and the lanes."""
 
 from typing import Any, NamedTuple
+
+import numpy as np
 
 
 class Ties(NamedTuple):
@@ -140,6 +142,12 @@ class Pace(NamedTuple):
     ease: Any  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
     loops: Any  # bool: it goes on
     loose: Any  # bool: it ended above its tolerance
+
+
+_FLAGS = frozenset(("done", "last", "solved", "out", "lasts", "fresh", "whole", "loops", "loose"))
+_COUNTS = frozenset(("body", "point", "wall", "stuck", "action", "held", "waits", "turns"))
+# The type of each array of `Pace`.
+PACES = tuple(np.bool_ if one in _FLAGS else np.int64 if one in _COUNTS else np.float64 for one in Pace._fields)
 
 
 class Held(NamedTuple):

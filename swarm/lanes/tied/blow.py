@@ -4,13 +4,10 @@ import math
 
 import numpy as np
 
-from ...kernel.gravity import Nothing
-from ...kernel.jit import inlined, outlined, scratch
+from ...kernel.jit import outlined, scratch
 from ...kernel.vector import Vec, dot
 from ...surfaces import fold as walls
-from . import contract
 from .contacts import MOST_CONTACTS, direction, near, point_of, width
-from .instant import STRIKE_NOW
 
 # Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
 _BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
@@ -21,32 +18,15 @@ SHORT = 1.0 / 16.0
 # Units of round-off by which a body may miss its energy.
 _EPS = float(np.finfo(np.float64).eps)
 _ROUND_OFF = 64.0 * _EPS
-# After so many blows without a step the contacts last.
-_LASTS = 20
 
 
-@contract.strike.register(Nothing)
-def _(kind, body, chain, rule, lanes, paces, state, i):
-    pace = paces[0]
-    number, at_once = pace.body[i], pace.action[i] == STRIKE_NOW
-    short = at_once or pace.step[i] < SHORT * rule.dt
-    state.short[number] = state.short[number] + 1 if short else 0
-    blows = strike(body, chain, rule, lanes, state, i, number)
-    # The energy of a strain takes as many products as the square of its edges.
-    if blows > 0 and max(body[0].led) < 0 and body[0].compliance.shape[0] == 0:
-        _restore(body[0], rule, lanes, state, i, number)
-    stays = _chatters(body[1], state, number) or pace.stuck[i] > _LASTS
-    pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
-
-
-@inlined
-def _chatters(touching, state, number):
+def chatters(touching, state, number):
     """Whether bounces follow one another ever faster: then they end."""
     return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
 
 
 @outlined
-def _restore(ties, rule, lanes, state, i, number):
+def restore(ties, rule, lanes, state, i, number):
     """Restore the energy of a body after a blow, where only round-off is missing: else it is an error to be seen.
 
     Steps miss 1.5e-16 of it and blows 3e-16, at random: after 10^5 impacts 3e-12. All velocities are scaled, so that
@@ -69,7 +49,6 @@ def _restore(ties, rule, lanes, state, i, number):
                     lanes.v[q, x, i] += factor * lanes.v[q, x, i]
 
 
-@inlined
 def _stretched(ties, r, i):
     """The energy of springs."""
     total = 0.0
@@ -91,7 +70,7 @@ def strike(body, chain, rule, lanes, state, i, number):
     guides leave: K = W - W J (J W J)^-1 J W with a row of J for each. It is the contact step of the scheme for h -> 0.
     """
     touching = body[1]
-    bounces = 0.0 if _chatters(touching, state, number) else 1.0
+    bounces = 0.0 if chatters(touching, state, number) else 1.0
     name = scratch((MOST_CONTACTS, 2), np.int64)
     frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
     for turn in range(_BLOWS):
@@ -144,7 +123,6 @@ def _blow(body, chain, lanes, state, contacts, bounces, which):
     return True
 
 
-@inlined
 def _is_elastic(touching, contacts):
     name, found = contacts
     elastic = True
@@ -154,25 +132,21 @@ def _is_elastic(touching, contacts):
     return elastic
 
 
-@inlined
 def _vector(rows, a):
     return Vec(rows[a, 0], rows[a, 1], rows[a, 2])
 
 
-@inlined
 def _direction(frame, a, wide):
     """Direction a of contacts with so many each."""
     return direction(frame, 3 * (a // wide) + a % wide)
 
 
-@inlined
 def _name(body, row):
     """The row of a link or guide among all couplings."""
     ties, touching = body
     return row if row < ties.links else row - ties.links + ties.ends.shape[0] + touching.points
 
 
-@inlined
 def _velocity(body, v, row, i):
     """The relative velocity of a link's ends, or that of a guide's point."""
     ties, touching = body
@@ -182,7 +156,6 @@ def _velocity(body, v, row, i):
     return Vec(v[a, 0, i] - v[b, 0, i], v[a, 1, i] - v[b, 1, i], v[a, 2, i] - v[b, 2, i])
 
 
-@inlined
 def _rigid(body, chain, r, i, rows):
     """The vector of every link and guide, and the Cholesky factor of J W J."""
     ties, touching = body
@@ -199,7 +172,6 @@ def _rigid(body, chain, r, i, rows):
             system[a, b] = s / system[b, b] if b < a else math.sqrt(s)
 
 
-@inlined
 def _respond(body, contacts, rigid, answer, schur):
     """How the velocities of contacts answer impulses at them, n K n, and x = (J W J)^-1 J W b d of each."""
     ties = body[0]
@@ -226,7 +198,6 @@ def _respond(body, contacts, rigid, answer, schur):
             answer[a, row] /= system[row, row]
 
 
-@inlined
 def _kinetic(ties, v, i):
     total = 0.0
     for p in range(v.shape[0]):
@@ -237,7 +208,6 @@ def _kinetic(ties, v, i):
     return total
 
 
-@inlined
 def _impulses(touching, contacts, schur, rate, p, bounces):
     """Gauss-Seidel over the contacts: w+ = -e w- where a wall pushes; friction within its cone, or the point sticks."""
     name, found, wide = contacts
@@ -267,7 +237,6 @@ def _impulses(touching, contacts, schur, rate, p, bounces):
             break
 
 
-@inlined
 def _apply(body, contacts, across, impulses, v, i):
     """v -= W sum p (b d - sum x J)"""
     ties, touching = body

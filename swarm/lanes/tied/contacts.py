@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...kernel.jit import by_type, by_type_outlined, inlined
+from ...kernel.jit import outlined
 from ...kernel.vector import Vec, cross, dot, norm
 from ...surfaces import fold as walls
 
@@ -10,9 +10,10 @@ from ...surfaces import fold as walls
 NEAR = 64.0
 # Most contacts at one instant; more follow in the next blow at the same instant.
 MOST_CONTACTS = 16
+# How far outside a contact that lasts may end, in units of round-off.
+ROOM = 64.0
 
 
-@inlined
 def point_of(touching, r, k, i):
     """The place, or velocity, of contact point k of a lane."""
     q = touching.plain[k]
@@ -27,7 +28,6 @@ def point_of(touching, r, k, i):
     return Vec(x, y, z)
 
 
-@inlined
 def span(touching, k):
     """The walls that a contact point can meet: from the first to the one before the last."""
     own = k - touching.points
@@ -36,57 +36,40 @@ def span(touching, k):
     return first, last
 
 
-@by_type
 def count_at(chain, span, c):
     """How many walls of a span a point may be at: of a field those of its cell."""
     first, last = span
-    return last - first
-
-
-@count_at.register(walls.Field)
-def _(chain, span, c):
-    first, last = span
-    if first > 0:
+    fields = _fields(chain)
+    if len(fields) == 0 or first > 0:
         return last - first
-    return _count_in_cells(chain, c) + last - int(walls.count_in_fields(chain))
+    found = 0
+    for link in reversed(fields):
+        found = int(link.first.count_in_cell(c)) + found
+    return found + last - int(walls.count_in_fields(chain))
 
 
-@by_type
-def _count_in_cells(chain, c):
-    return 0
-
-
-@_count_in_cells.register(walls.Field)
-def _(chain, c):
-    return int(chain.first.count_in_cell(c)) + _count_in_cells(chain.rest, c)
-
-
-@by_type
 def wall_at(chain, span, j, c):
     """One of these walls."""
-    return span[0] + j
+    if len(_fields(chain)) == 0 or span[0] > 0:
+        return span[0] + j
+    return _wall_of_cells(chain, j, 0, c)
 
 
-@wall_at.register(walls.Field)
-def _(chain, span, j, c):
-    return span[0] + j if span[0] > 0 else _wall_of_cells(chain, j, 0, c)
+def _fields(chain):
+    return tuple(link for link in walls.each(chain) if isinstance(link, walls.Field))
 
 
-@by_type_outlined
+@outlined
 def _wall_of_cells(chain, j, before, c):
     """The same of a chain that has so many walls before it."""
-    return before + j
-
-
-@_wall_of_cells.register(walls.Field)
-def _(chain, j, before, c):
+    if not isinstance(chain, walls.Field):
+        return before + j
     here = int(chain.first.count_in_cell(c))
     if j < here:
         return before + int(chain.first.one_in_cell(j, c))
     return _wall_of_cells(chain.rest, j - here, before + int(walls.count(chain.first)), c)
 
 
-@inlined
 def width(touching, name, found):
     """How many directions of each contact matter: the normal, or the tangents too, where there is friction."""
     rough = False
@@ -95,7 +78,6 @@ def width(touching, name, found):
     return 3 if rough else 1
 
 
-@inlined
 def near(touching, chain, rule, motion, i, contacts, approaching):
     """The contacts at their walls, or those that approach: their names (point, wall), a normal and two tangents."""
     r, v = motion
@@ -116,13 +98,11 @@ def near(touching, chain, rule, motion, i, contacts, approaching):
     return found
 
 
-@inlined
 def direction(frame, a):
     """Direction a of the contacts: normal, tangent, tangent, normal of the next, ..."""
     return Vec(frame[a // 3, a % 3, 0], frame[a // 3, a % 3, 1], frame[a // 3, a % 3, 2])
 
 
-@inlined
 def _frame(frame, a, n):
     """The normal and two unit vectors across it."""
     flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
@@ -132,3 +112,27 @@ def _frame(frame, a, n):
     frame[a, 0, 0], frame[a, 0, 1], frame[a, 0, 2] = n.x, n.y, n.z
     frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2] = t.x, t.y, t.z
     frame[a, 2, 0], frame[a, 2, 1], frame[a, 2, 2] = s.x, s.y, s.z
+
+
+def index_of(held, i, found, k, wall):
+    """The number of a contact of a lane, -1 for none."""
+    index = -1
+    for a in range(found):
+        if held.name[i, a, 0] == k and held.name[i, a, 1] == wall:
+            index = a
+    return index
+
+
+def solve_dense(a, f):
+    """f = a^-1 f of a system whose symmetric part, but for factors of rows, is positive."""
+    rows = f.shape[0]
+    for k in range(rows):
+        for row in range(k + 1, rows):
+            part = a[row, k] / a[k, k]
+            for column in range(k + 1, rows):
+                a[row, column] -= part * a[k, column]
+            f[row] -= part * f[k]
+    for row in range(rows - 1, -1, -1):
+        for column in range(row + 1, rows):
+            f[row] -= a[row, column] * f[column]
+        f[row] /= a[row, row]

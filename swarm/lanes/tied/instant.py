@@ -2,15 +2,12 @@
 
 import math
 
-from ...kernel.gravity import Nothing
-from ...kernel.jit import inlined, outlined
+from ...kernel.jit import outlined
 from ...kernel.vector import dot
 from ...surfaces import fold as walls
-from . import contract
 from .contacts import NEAR, count_at, point_of, span, wall_at
-from .hold import ROOM
 
-# What becomes of a lane after a trial.
+# The action of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
 # A bracket of the time of impact this narrow, as a part of a whole step, is a point; a step this short from a wall to
 # itself is none.
@@ -23,12 +20,6 @@ _QUICK = 40
 _HALVED = 2.0**-20
 
 
-@contract.judge.register(Nothing)
-def _(kind, touching, chain, rule, lanes, paces, i):
-    return look(touching, chain, rule, lanes, paces[0], i, 2.0 * ROOM * rule.room)
-
-
-@inlined
 def halve(rule, pace, i):
     """A step whose ties have no solution is halved, but not for ever."""
     pace.trial[i] = 0.5 * pace.step[i]
@@ -86,7 +77,6 @@ def look(touching, chain, rule, lanes, pace, i, larger):
     return AGAIN
 
 
-@inlined
 def _inside(rule, pace, i, gap):
     """The trial ends inside: it is the step, the step to the impact, or a lower end of the bracket."""
     wall, tau = pace.wall[i], pace.step[i]
@@ -101,14 +91,12 @@ def _inside(rule, pace, i, gap):
     return AGAIN
 
 
-@inlined
 def _weight(gap, before):
     """What an end that stays counts when the other moves again (Anderson and Bjorck)."""
     weight = 1.0 - gap / before
     return weight if weight > 0.0 else 0.5
 
 
-@inlined
 def _between(rule, pace, i):
     """The next time to try in the bracket: by the secant, to where the worst contact is half of round-off inside."""
     low, high = pace.low[i], pace.high[i]

@@ -2,10 +2,7 @@
 
 import math
 
-from ...kernel.jit import inlined
 
-
-@inlined
 def lead(ties, rule, state, lanes, pace, elapsed):
     """Put led points where their paths are at the end of a stage, with the velocity there.
 
@@ -33,7 +30,6 @@ def lead(ties, rule, state, lanes, pace, elapsed):
                         lanes.v1[q, x, i] = path[row, 3 + x, n] + rate * turned
 
 
-@inlined
 def book(body, lanes, paces, last):
     """Add the work of led points in a stage on ties and contacts: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
     ties, touching = body

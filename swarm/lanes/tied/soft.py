@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.gravity import Nothing
-from ...kernel.jit import inlined, outlined, scratch
+from ...kernel.jit import outlined, scratch
 from ...kernel.vector import ZERO, square
 from ...surfaces import contract as surfaces
 from ...surfaces import fold as walls
-from . import contract, hold, instant
-from .contacts import MOST_CONTACTS, NEAR, direction, near, point_of, span
+from . import hold, instant
+from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, index_of, near, point_of, solve_dense, span
+from .contract import Contacts
 
 
 class Soft(NamedTuple):
@@ -32,13 +32,11 @@ class Soft(NamedTuple):
     deepest: float  # gap [m] that stores the tolerance
 
 
-@inlined
 def _normal_of(surface, r0, r1):
     rise, _curvature = surfaces.gap_slope(surface, surfaces.inner(surface, r0), surfaces.inner(surface, r1))
     return rise * surfaces.inner_gradient(surface, r0, r1)
 
 
-@inlined
 def _gap_of(surface, r):
     return surfaces.gap_of(surface, surfaces.inner(surface, r))
 
@@ -55,185 +53,6 @@ _normal = walls.of_wall(_normal_of, ZERO)
 _gap = walls.of_wall(_gap_of, 0.0)
 
 
-@inlined
-def _start(kind, chain, rule, wall, y):
-    """The gap at the start of a step; in the loop what its tolerance leaves counts as 0: only State I has a limit."""
-    gap = _gap(chain, wall, y)
-    return 0.0 if rule.loop and abs(gap) <= 2.0 * max(kind.deepest, hold.ROOM * rule.room) else gap
-
-
-@contract.begin.register(Soft)
-def _(kind, body, chain, rule, lanes, paces, i):
-    # Those at their walls where steps are cut; else those that are outside, at the start or in the trial before.
-    pace, held = paces
-    touching, name, found = body[1], held.name[i], 0
-    again = not pace.fresh[i]
-    fresh = scratch((rule.most, 2), np.int64)
-    press = scratch(rule.most, np.float64)
-    if kind.is_cut:
-        if again and pace.solved[i]:
-            return
-        found = near(touching, chain, rule, (lanes.r, lanes.v), i, (fresh, held.frame[i]), False)
-    else:
-        for k in range(touching.plain.size):
-            first, last = span(touching, k)
-            for w in range(first, last):
-                inside = not _gap(chain, float(w), point_of(touching, lanes.r, k, i)) > 0.0
-                if inside and again:
-                    inside = _index(held, i, pace.held[i], k, w) < 0
-                    inside = inside and not _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
-                if not inside:
-                    fresh[found, 0], fresh[found, 1] = k, w
-                    found += 1
-    for a in range(found):
-        known = _index(held, i, pace.held[i], fresh[a, 0], fresh[a, 1])
-        press[a] = held.press[i, 3 * known] if known >= 0 and pace.solved[i] else 0.0
-    pace.held[i] = found
-    for a in range(found):
-        name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
-        held.press[i, 3 * a], held.press[i, 3 * a + 1], held.press[i, 3 * a + 2] = press[a], 0.0, 0.0
-
-
-@inlined
-def _index(held, i, found, k, wall):
-    """Which contact of a lane this is, -1 for none."""
-    index = -1
-    for a in range(found):
-        if held.name[i, a, 0] == k and held.name[i, a, 1] == wall:
-            index = a
-    return index
-
-
-@contract.turn.register(Soft)
-def _(kind, body, chain, lanes, held, pace, i, r1):
-    tied, touching = body
-    half, ties = 0.5 * pace.h[i] * pace.h[i], tied.ends.shape[0]
-    for a in range(pace.held[i]):
-        k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-        n = _normal(chain, wall, point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
-        # What its force moves the point by, as a change of D turns it.
-        turned = (
-            half * tied.couplings[ties + k, ties + k] * held.press[i, 3 * a] * (n - direction(held.frame[i], 3 * a))
-        )
-        pace.lag[i] += square(turned)
-        held.frame[i, a, 0, 0], held.frame[i, a, 0, 1], held.frame[i, a, 0, 2] = n.x, n.y, n.z
-
-
-@hold.gap_gradient.register(Soft)
-def _(kind, chain, wall, y):
-    return _normal(chain, wall, y, y)
-
-
-@contract.correct.register(Soft)
-def _(kind, body, chain, rule, lanes, paces, i, number):
-    touching = body[1]
-    pace, held = paces
-    law = kind.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
-    found, m = pace.held[i], lanes.f.shape[0]
-    contacts = held.name[i], held.frame[i], held.press[i], 1, found
-    along, across = scratch((found, m), np.float64), scratch((found, m), np.float64)
-    system, change = scratch((found, found), np.float64), scratch(found, np.float64)
-    hold.eliminate(kind, body, chain, lanes, pace, contacts, (along, across, system, change), i)
-    error = pace.residue[i]
-    for a in range(found):
-        k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-        g0 = _start(kind, chain, rule, wall, point_of(touching, lanes.ra, k, i))
-        g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
-        # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are not
-        # met: then it is what g1 = 0 asks for, as of a rigid wall.
-        force = held.press[i, 3 * a] + g1 / system[a, a]
-        if g0 == 0.0 and 0.0 <= force <= held.multiplier[i, a]:
-            error = max(error, abs(g1) / rule.room)
-            change[a] += g1
-            continue
-        end = g1
-        if g0 == 0.0 and held.multiplier[i, a] > 0.0:
-            end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
-        force, stiffness = law.force(held.multiplier[i, a], g0, end)
-        missing = force + stiffness * (g1 - end) - held.press[i, 3 * a]
-        # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
-        give = system[a, a] / (1.0 + stiffness * system[a, a])
-        error = max(error, give * abs(missing) / rule.room)
-        change[a] = missing + stiffness * change[a]
-        for b in range(found):
-            system[a, b] *= stiffness
-        system[a, a] += 1.0
-    _solve(system, change)
-    for a in range(found):
-        held.press[i, 3 * a] += change[a]
-        for row in range(m):
-            lanes.f[row, i] -= across[a, row] * change[a]
-    before = pace.unsettled[i] if number > 0 else math.inf
-    pace.unsettled[i] = error
-    # What D lags behind does work on springs: to stop without asking loses 1e-9 of the energy of a chain that whips,
-    # and as much of that of a pin that slides in its cavity.
-    settled = error <= 1.0 and pace.lag[i] <= _SETTLED * _SETTLED * rule.room * rule.room
-    # Where V is stiff its round-off is more than that of a place.
-    pace.last[i] = settled or (number >= _PATIENT and error <= _LARGER and error >= 0.5 * before)
-
-
-@inlined
-def _solve(a, f):
-    """f = a^-1 f of a system whose symmetric part, but for factors of rows, is positive."""
-    rows = f.shape[0]
-    for k in range(rows):
-        for row in range(k + 1, rows):
-            part = a[row, k] / a[k, k]
-            for column in range(k + 1, rows):
-                a[row, column] -= part * a[k, column]
-            f[row] -= part * f[k]
-    for row in range(rows - 1, -1, -1):
-        for column in range(row + 1, rows):
-            f[row] -= a[row, column] * f[column]
-        f[row] /= a[row, row]
-
-
-# --- Uzawa's loop ----------------------------------------------------------------------------------------
-
-
-@inlined
-def begin_loop(tied, rule, lanes, paces):
-    """The multipliers of links from the steps before, those of walls from 0: above its limit a loop has no step."""
-    pace, held = paces
-    for i in range(pace.h.size):
-        # A sweep shrinks errors by alpha h^2/m: what the cut of a step leaves would take thousands.
-        pace.ease[i] = (pace.h[i] / rule.dt) * (pace.h[i] / rule.dt)
-    for a in range(tied.springs - tied.relaxed, tied.springs):
-        for i in range(pace.h.size):
-            lanes.offset[a, i] = tied.give[a] * pace.ease[i] * lanes.multiplier[a, i]
-    for i in range(pace.h.size):
-        pace.turns[i], pace.loops[i], pace.loose[i] = 0, not pace.done[i], False
-        for a in range(held.multiplier.shape[1]):
-            held.multiplier[i, a] = 0.0
-
-
-@contract.again.register(Nothing)
-def _(kind, body, chain, rule, lanes, paces):
-    return 0
-
-
-@contract.again.register(Soft)
-def _(kind, body, chain, rule, lanes, paces):
-    pace = paces[0]
-    live = 0
-    for i in range(pace.h.size):
-        if pace.loops[i] and pace.solved[i]:
-            pace.turns[i] += 1
-            stored = _stored(kind, body, chain, rule, lanes, paces, i)
-            pace.loose[i] = not stored <= kind.tolerance
-            pace.loops[i] = pace.loose[i] and pace.turns[i] < kind.sweeps
-        pace.loops[i] = pace.loops[i] and pace.solved[i]
-        pace.done[i] = not pace.loops[i]
-        live += pace.loops[i]
-        if pace.loops[i]:
-            _update(kind, body, chain, rule, lanes, paces, i)
-    for i in range(pace.h.size):
-        # D stays as it is where others go on. (To ask for `done` in `launch` takes a third longer for a free step.)
-        pace.waits[i] = 1 if live > 0 and pace.done[i] else 0
-    return live
-
-
-@inlined
 def _lengths(ties, lanes, a, i):
     """|y|^2 of a tie at both ends of the stage, less l^2"""
     first, second = ties.ends[a, 0], ties.ends[a, 1]
@@ -245,89 +64,229 @@ def _lengths(ties, lanes, a, i):
     return before - ties.rest[a], after - ties.rest[a]
 
 
-@outlined
-def _stored(kind, body, chain, rule, lanes, paces, i):
-    """V at the end of the step, of walls and links; a link stores alpha c^2/2 with c = (|y|^2 - l^2)/(2 l).
+class SoftContacts(Contacts):
+    """Contacts with walls that are springs."""
 
-    What is round-off of a length stores nothing.
-    """
-    ties, touching = body
-    pace, held = paces
-    stored = 0.0
-    for a in range(ties.springs - ties.relaxed, ties.springs):
-        _before, after = _lengths(ties, lanes, a, i)
-        if abs(after) > _ROUND_OFF * rule.noise * ties.rest[a]:
-            stored += kind.law.alpha * after * after / (8.0 * ties.rest[a])
-    for a in range(pace.held[i]):
-        g1 = _gap(chain, float(held.name[i, a, 1]), point_of(touching, lanes.r1, held.name[i, a, 0], i))
-        stored += kind.law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
-    return stored
+    def _start(self: Any, wall, y):
+        """The gap at the start of a step; in the loop what its tolerance leaves is 0: only State I has a limit."""
+        gap, rule = _gap(self.chain, wall, y), self.rule
+        return 0.0 if rule.loop and abs(gap) <= 2.0 * max(rule.walls.deepest, ROOM * rule.room) else gap
 
-
-@outlined
-def _update(kind, body, chain, rule, lanes, paces, i):
-    """lambda <- lambda + alpha (Phi0 + Phi1)/2 of walls and links"""
-    ties, touching = body
-    pace, held = paces
-    for a in range(ties.springs - ties.relaxed, ties.springs):
-        before, after = _lengths(ties, lanes, a, i)
-        lanes.offset[a, i] += before + after
-    for a in range(pace.held[i]):
-        k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-        g0 = _start(kind, chain, rule, wall, point_of(touching, lanes.ra, k, i))
-        g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
-        mean = 0.5 * (kind.law.constraint(g0) + kind.law.constraint(g1))
-        held.multiplier[i, a] += kind.law.alpha / pace.ease[i] * mean
-
-
-# --- After a trial ---------------------------------------------------------------------------------------
-
-
-@contract.judge.register(Soft)
-def _(kind, touching, chain, rule, lanes, paces, i):
-    pace, held = paces
-    if kind.is_cut:
-        # The loop leaves a contact outside by what its tolerance stores.
-        return instant.look(touching, chain, rule, lanes, pace, i, 2.0 * max(kind.deepest, hold.ROOM * rule.room))
-    pace.stuck[i] += 1
-    if not pace.solved[i]:
-        return instant.halve(rule, pace, i)
-    for k in range(touching.plain.size):
-        first, last = span(touching, k)
-        for w in range(first, last):
-            outside = _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
-            if outside and _index(held, i, pace.held[i], k, w) < 0:
-                pace.lasts[i] = True
-                return instant.AGAIN
-    return instant.COMMIT
-
-
-@contract.end.register(Soft)
-def _(kind, body, chain, lanes, paces, state, i):
-    # Where steps are cut a contact lasts as long as it pushes, else as long as its point is outside.
-    pace, held = paces
-    number, lasts = pace.body[i], False
-    for a in range(pace.held[i]):
-        k, wall = held.name[i, a, 0], held.name[i, a, 1]
-        pushes = held.press[i, 3 * a] > 0.0
-        state.impulse[wall, number] += held.impulse[i, a]
+    @outlined
+    def begin(self: Any, i):
+        # Those at their walls where steps are cut; else those that are outside, at the start or in the trial before.
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        touching, name, found = body[1], held.name[i], 0
+        again = not pace.fresh[i]
+        fresh = scratch((rule.most, 2), np.int64)
+        press = scratch(rule.most, np.float64)
         if kind.is_cut:
-            lasts = lasts or pushes
+            if again and pace.solved[i]:
+                return
+            found = near(touching, chain, rule, (lanes.r, lanes.v), i, (fresh, held.frame[i]), False)
         else:
-            lasts = lasts or _gap(chain, float(wall), point_of(body[1], lanes.r1, k, i)) > 0.0
-            new = not _gap(chain, float(wall), point_of(body[1], lanes.ra, k, i)) > 0.0
-            state.impacts[number] += 1 if pushes and new else 0
-    pace.lasts[i] = lasts
-    if not lasts:
-        pace.held[i] = 0
+            for k in range(touching.plain.size):
+                first, last = span(touching, k)
+                for w in range(first, last):
+                    inside = not _gap(chain, float(w), point_of(touching, lanes.r, k, i)) > 0.0
+                    if inside and again:
+                        inside = index_of(held, i, pace.held[i], k, w) < 0
+                        inside = inside and not _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
+                    if not inside:
+                        fresh[found, 0], fresh[found, 1] = k, w
+                        found += 1
+        for a in range(found):
+            known = index_of(held, i, pace.held[i], fresh[a, 0], fresh[a, 1])
+            press[a] = held.press[i, 3 * known] if known >= 0 and pace.solved[i] else 0.0
+        pace.held[i] = found
+        for a in range(found):
+            name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
+            held.press[i, 3 * a], held.press[i, 3 * a + 1], held.press[i, 3 * a + 2] = press[a], 0.0, 0.0
 
+    @outlined
+    def turn(self: Any, i, r1):
+        (tied, touching), chain, _rule, lanes, pace, held = self
+        half, ties = 0.5 * pace.h[i] * pace.h[i], tied.ends.shape[0]
+        for a in range(pace.held[i]):
+            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
+            n = _normal(chain, wall, point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
+            # What its force moves the point by, as a change of D turns it.
+            turned = (
+                half * tied.couplings[ties + k, ties + k] * held.press[i, 3 * a] * (n - direction(held.frame[i], 3 * a))
+            )
+            pace.lag[i] += square(turned)
+            held.frame[i, a, 0, 0], held.frame[i, a, 0, 1], held.frame[i, a, 0, 2] = n.x, n.y, n.z
 
-@contract.strike.register(Soft)
-def _(kind, body, chain, rule, lanes, paces, state, i):
-    # The next step is that of the contact, from State I.
-    pace = paces[0]
-    name = scratch((MOST_CONTACTS, 2), np.int64)
-    frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
-    found = near(body[1], chain, rule, (lanes.r, lanes.v), i, (name, frame), True)
-    state.impacts[pace.body[i]] += found
-    pace.lasts[i] = True
+    @outlined
+    def correct(self: Any, i, number):
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        touching = body[1]
+        law = kind.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
+        found, m = pace.held[i], lanes.f.shape[0]
+        contacts = held.name[i], held.frame[i], held.press[i], 1, found
+        along, across = scratch((found, m), np.float64), scratch((found, m), np.float64)
+        system, change = scratch((found, found), np.float64), scratch(found, np.float64)
+        hold.eliminate(self, contacts, (along, across, system, change), i)
+        error = pace.residue[i]
+        for a in range(found):
+            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
+            g0 = self._start(wall, point_of(touching, lanes.ra, k, i))
+            g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
+            # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are
+            # not met: then it is what g1 = 0 asks for, as of a rigid wall.
+            force = held.press[i, 3 * a] + g1 / system[a, a]
+            if g0 == 0.0 and 0.0 <= force <= held.multiplier[i, a]:
+                error = max(error, abs(g1) / rule.room)
+                change[a] += g1
+                continue
+            end = g1
+            if g0 == 0.0 and held.multiplier[i, a] > 0.0:
+                end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
+            force, stiffness = law.force(held.multiplier[i, a], g0, end)
+            missing = force + stiffness * (g1 - end) - held.press[i, 3 * a]
+            # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
+            give = system[a, a] / (1.0 + stiffness * system[a, a])
+            error = max(error, give * abs(missing) / rule.room)
+            change[a] = missing + stiffness * change[a]
+            for b in range(found):
+                system[a, b] *= stiffness
+            system[a, a] += 1.0
+        solve_dense(system, change)
+        for a in range(found):
+            held.press[i, 3 * a] += change[a]
+            for row in range(m):
+                lanes.f[row, i] -= across[a, row] * change[a]
+        before = pace.unsettled[i] if number > 0 else math.inf
+        pace.unsettled[i] = error
+        # What D lags behind does work on springs: to stop without asking loses 1e-9 of the energy of a chain that
+        # whips, and as much of that of a pin that slides in its cavity.
+        settled = error <= 1.0 and pace.lag[i] <= _SETTLED * _SETTLED * rule.room * rule.room
+        # Where V is stiff its round-off is more than that of a place.
+        pace.last[i] = settled or (number >= _PATIENT and error <= _LARGER and error >= 0.5 * before)
+
+    def gap_gradient(self: Any, wall, y):
+        return _normal(self.chain, wall, y, y)
+
+    # --- Uzawa's loop
+
+    def begin_loop(self: Any):
+        # The multipliers of links are from the steps before, those of walls from 0: above its limit a loop has no step.
+        (tied, _touching), _chain, rule, lanes, pace, held = self
+        for i in range(pace.h.size):
+            # A sweep shrinks errors by alpha h^2/m: what the cut of a step leaves would take thousands.
+            pace.ease[i] = (pace.h[i] / rule.dt) * (pace.h[i] / rule.dt)
+        for a in range(tied.springs - tied.relaxed, tied.springs):
+            for i in range(pace.h.size):
+                lanes.offset[a, i] = tied.give[a] * pace.ease[i] * lanes.multiplier[a, i]
+        for i in range(pace.h.size):
+            pace.turns[i], pace.loops[i], pace.loose[i] = 0, not pace.done[i], False
+            for a in range(held.multiplier.shape[1]):
+                held.multiplier[i, a] = 0.0
+
+    def again(self: Any):
+        kind, pace = self.rule.walls, self.pace
+        live = 0
+        for i in range(pace.h.size):
+            if pace.loops[i] and pace.solved[i]:
+                pace.turns[i] += 1
+                stored = self._stored(i)
+                pace.loose[i] = not stored <= kind.tolerance
+                pace.loops[i] = pace.loose[i] and pace.turns[i] < kind.sweeps
+            pace.loops[i] = pace.loops[i] and pace.solved[i]
+            pace.done[i] = not pace.loops[i]
+            live += pace.loops[i]
+            if pace.loops[i]:
+                self._update(i)
+        for i in range(pace.h.size):
+            # D stays as it is where others go on. (To ask for `done` in `launch` takes a third longer for a free step.)
+            pace.waits[i] = 1 if live > 0 and pace.done[i] else 0
+        return live
+
+    @outlined
+    def _stored(self: Any, i):
+        """V at the end of the step, of walls and links; a link stores alpha c^2/2 with c = (|y|^2 - l^2)/(2 l).
+
+        What is round-off of a length stores nothing.
+        """
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        ties, touching = body
+        stored = 0.0
+        for a in range(ties.springs - ties.relaxed, ties.springs):
+            _before, after = _lengths(ties, lanes, a, i)
+            if abs(after) > _ROUND_OFF * rule.noise * ties.rest[a]:
+                stored += kind.law.alpha * after * after / (8.0 * ties.rest[a])
+        for a in range(pace.held[i]):
+            g1 = _gap(chain, float(held.name[i, a, 1]), point_of(touching, lanes.r1, held.name[i, a, 0], i))
+            stored += kind.law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
+        return stored
+
+    @outlined
+    def _update(self: Any, i):
+        """lambda <- lambda + alpha (Phi0 + Phi1)/2 of walls and links"""
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        ties, touching = body
+        for a in range(ties.springs - ties.relaxed, ties.springs):
+            before, after = _lengths(ties, lanes, a, i)
+            lanes.offset[a, i] += before + after
+        for a in range(pace.held[i]):
+            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
+            g0 = self._start(wall, point_of(touching, lanes.ra, k, i))
+            g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
+            mean = 0.5 * (kind.law.constraint(g0) + kind.law.constraint(g1))
+            held.multiplier[i, a] += kind.law.alpha / pace.ease[i] * mean
+
+    # --- After a trial
+
+    @outlined
+    def judge(self: Any, i):
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        touching = body[1]
+        if kind.is_cut:
+            # The loop leaves a contact outside by what its tolerance stores.
+            return instant.look(touching, chain, rule, lanes, pace, i, 2.0 * max(kind.deepest, ROOM * rule.room))
+        pace.stuck[i] += 1
+        if not pace.solved[i]:
+            return instant.halve(rule, pace, i)
+        for k in range(touching.plain.size):
+            first, last = span(touching, k)
+            for w in range(first, last):
+                outside = _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
+                if outside and index_of(held, i, pace.held[i], k, w) < 0:
+                    pace.lasts[i] = True
+                    return instant.AGAIN
+        return instant.COMMIT
+
+    @outlined
+    def end(self: Any, state, i):
+        # Where steps are cut a contact lasts as long as it pushes, else as long as its point is outside.
+        body, chain, rule, lanes, pace, held = self
+        kind = rule.walls
+        number, lasts = pace.body[i], False
+        for a in range(pace.held[i]):
+            k, wall = held.name[i, a, 0], held.name[i, a, 1]
+            pushes = held.press[i, 3 * a] > 0.0
+            state.impulse[wall, number] += held.impulse[i, a]
+            if kind.is_cut:
+                lasts = lasts or pushes
+            else:
+                lasts = lasts or _gap(chain, float(wall), point_of(body[1], lanes.r1, k, i)) > 0.0
+                new = not _gap(chain, float(wall), point_of(body[1], lanes.ra, k, i)) > 0.0
+                state.impacts[number] += 1 if pushes and new else 0
+        pace.lasts[i] = lasts
+        if not lasts:
+            pace.held[i] = 0
+
+    @outlined
+    def strike(self: Any, state, i):
+        # The next step is that of the contact, from State I.
+        body, chain, rule, lanes, pace, _held = self
+        name = scratch((MOST_CONTACTS, 2), np.int64)
+        frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
+        found = near(body[1], chain, rule, (lanes.r, lanes.v), i, (name, frame), True)
+        state.impacts[pace.body[i]] += found
+        pace.lasts[i] = True

@@ -4,8 +4,9 @@ The system of the ties is factored once for several corrections, which are cheap
 (h omega)^2. Each lane stops by itself, so that its bits do not depend on its neighbours.
 """
 
-from ...kernel.jit import inlined, select
-from . import contract, hold, ties
+from ...kernel.jit import select
+from . import guides as guides_of
+from . import hold, ties
 
 # Most corrections, and after how many the system is factored again.
 _MOST, _AGAIN = 40, 5
@@ -17,14 +18,13 @@ _SOON = 1
 _BRIEF = 1e-8
 
 
-@inlined
-def solve(body, chain, rule, lanes, paces):
+def solve(contacts):
     """The end r1, v1 of a stage from (ra, va) with the steps pace.h; pace.done is False where none is found.
 
     Points that are led must be in r1 already. Lanes that are done at the start are left out.
     """
+    body, chain, rule, lanes, pace, _held = contacts
     tied, touching = body
-    pace = paces[0]
     count, guides = pace.h.size, touching.guides
     alone = rule.stages.size == 1 and guides == 0 and not rule.loop
     ties.launch(tied, rule.gravity, lanes, pace)
@@ -35,20 +35,20 @@ def solve(body, chain, rule, lanes, paces):
         pace.done[i] = pace.done[i] | brief
         more += pace.held[i] > 0
         if _is_held(touching, pace, i):
-            _turn(body, chain, rule, lanes, paces, i, lanes.ra)
+            _turn(contacts, i, lanes.ra)
     if tied.ends.shape[0] > 1:
         # Where the multipliers are guessed well, D is the only error, and with one tie none: it follows once more.
-        _push(body, lanes, paces, 0)
+        _push(contacts, 0)
         ties.follow(tied, lanes, pace)
     for turn in range(_MOST + 1):
         # D follows the multipliers before they are corrected: together, the second makes up again for the first.
-        _push(body, lanes, paces, more)
+        _push(contacts, more)
         ties.follow(tied, lanes, pace)
         if more > 0:
             for i in range(count):
                 if _is_held(touching, pace, i):
-                    _turn(body, chain, rule, lanes, paces, i, lanes.r1)
-        _push(body, lanes, paces, more)
+                    _turn(contacts, i, lanes.r1)
+        _push(contacts, more)
         if turn == _MOST or _all(pace.done):
             break
         ties.residual(tied, lanes, pace, turn, rule)
@@ -57,16 +57,16 @@ def solve(body, chain, rule, lanes, paces):
             if guides > 0:
                 for i in range(count):
                     if not pace.done[i]:
-                        hold.guide(body, chain, lanes, pace, i)
+                        guides_of.guide(body, chain, lanes, pace, i)
             ties.factor(tied.start, lanes.a)
         if more > 0:
             for i in range(count):
-                pace.residue[i] = hold.worst(touching, lanes, pace, rule, i)
+                pace.residue[i] = guides_of.worst(touching, lanes, pace, rule, i)
         ties.substitute(tied.start, lanes.a, lanes.f)
         if more > 0:
             for i in range(count):
                 if _is_held(touching, pace, i):
-                    contract.correct(rule.walls, body, chain, rule, lanes, paces, i, turn)
+                    contacts.correct(i, turn)
         ties.correct(lanes, pace)
         if alone and turn <= _SOON:
             for i in range(count):
@@ -74,29 +74,25 @@ def solve(body, chain, rule, lanes, paces):
                 pace.waits[i] = select(late, pace.waits[i] + 1, select(pace.done[i], 0, pace.waits[i]))
                 pace.done[i] = pace.done[i] | late
         if _all(pace.done):
-            _push(body, lanes, paces, more)
+            _push(contacts, more)
             break
     ties.arrive(tied, rule.gravity, lanes, pace)
 
 
-@inlined
-def _turn(body, chain, rule, lanes, paces, i, r1):
+def _turn(contacts, i, r1):
     """Directions of guides and contacts."""
-    pace, held = paces
-    hold.turn_guides(body, chain, lanes, i, r1)
-    contract.turn(rule.walls, body, chain, lanes, held, pace, i, r1)
+    guides_of.turn(contacts.body, contacts.chain, contacts.lanes, i, r1)
+    contacts.turn(i, r1)
 
 
-@inlined
 def _is_held(touching, pace, i):
     """Whether more than ties is to be solved in a lane."""
     return (not pace.done[i]) and (touching.guides > 0 or pace.held[i] > 0)
 
 
-@inlined
-def _push(body, lanes, paces, more):
+def _push(contacts, more):
     """r1 = p - (h^2/2) W (sum lambda D + sum p b d)"""
-    pace, held = paces
+    body, _chain, _rule, lanes, pace, held = contacts
     ties.accelerate(body[0], lanes)
     if more > 0:
         for i in range(pace.h.size):
@@ -105,7 +101,6 @@ def _push(body, lanes, paces, more):
     ties.move(lanes, pace)
 
 
-@inlined
 def _all(done):
     """Whether every lane is done."""
     undone = 0

@@ -13,7 +13,7 @@ so that links do no work and what springs and edges do is the change of their en
 
 import math
 
-from ...kernel.jit import inlined, select
+from ...kernel.jit import select
 
 # Where the relative error of |y|^2 would be below this after a correction, it is the last.
 _TOLERANCE = 1e-15
@@ -29,7 +29,6 @@ _AT_FIRST = 1e-3
 _SHORTEST = 1e-8
 
 
-@inlined
 def launch(ties, gravity, lanes, pace):
     """Where the stage would end without ties, p, and D for that."""
     points, count = lanes.force.shape[0], lanes.force.shape[2]
@@ -61,7 +60,6 @@ def launch(ties, gravity, lanes, pace):
                 lanes.d[a, x, i] = select(pace.waits[i] > 0, lanes.d[a, x, i], d)
 
 
-@inlined
 def arrive(ties, gravity, lanes, pace):
     """v1 = v0 + h G - h W sum lambda D"""
     for q in range(lanes.force.shape[0]):
@@ -72,7 +70,6 @@ def arrive(ties, gravity, lanes, pace):
                     lanes.v1[q, x, i] = lanes.va[q, x, i] + pace.h[i] * (g - lanes.force[q, x, i])
 
 
-@inlined
 def move(lanes, pace):
     """r1 = p - (h^2/2) of the deceleration"""
     for q in range(lanes.r1.shape[0]):
@@ -82,7 +79,6 @@ def move(lanes, pace):
                 lanes.r1[q, x, i] = lanes.p[q, x, i] - k2 * lanes.force[q, x, i]
 
 
-@inlined
 def follow(ties, lanes, pace):
     """D = y0 + y1
 
@@ -100,7 +96,6 @@ def follow(ties, lanes, pace):
                 lanes.d[a, x, i] = select(pace.done[i], lanes.d[a, x, i], d)
 
 
-@inlined
 def accelerate(ties, lanes):
     """W sum lambda D, the deceleration by the ties."""
     force, points, count = lanes.force, lanes.force.shape[0], lanes.force.shape[2]
@@ -140,7 +135,6 @@ def accelerate(ties, lanes):
                 force[q, x, i] = lanes.v1[q, x, i] if ties.is_free[q] else 0.0
 
 
-@inlined
 def residual(ties, lanes, pace, turn, rule):
     """How far each tie is from its equation, as an error of |y1|^2; which lanes need no more than one correction."""
     f, count, rows = lanes.f, lanes.f.shape[1], ties.ends.shape[0]
@@ -202,7 +196,6 @@ def residual(ties, lanes, pace, turn, rule):
     _decide(links == rows, pace, turn, rule)
 
 
-@inlined
 def _decide(is_rigid, pace, turn, rule):
     """Which lanes need no more than one correction; `is_rigid`: no tie of the body changes its length."""
     for i in range(pace.error.size):
@@ -222,14 +215,12 @@ def _decide(is_rigid, pace, turn, rule):
         pace.last[i] = settled & ((error * rate <= _TOLERANCE) | (error <= rule.noise))
 
 
-@inlined
 def _worse(worst, i, value):
     """Keep the larger one; NaN counts as infinite."""
     value = select(value < math.inf, value, math.inf)
     worst[i] = select(value > worst[i], value, worst[i])
 
 
-@inlined
 def assemble(ties, lanes, pace):
     """The derivative of each equation by each multiplier, h^2 (beta W beta) y1.D, within the skyline."""
     a, y, d, count = lanes.a, lanes.y1, lanes.d, lanes.f.shape[1]
@@ -254,7 +245,6 @@ def assemble(ties, lanes, pace):
                 a[row, row, i] += lanes.soft[row, i]
 
 
-@inlined
 def factor(start, a):
     """A = L U in place, with 1/U on the diagonal; the entries before `start` of a row, and of its column, are 0."""
     count = a.shape[2]
@@ -275,7 +265,6 @@ def factor(start, a):
             a[row, row, i] = 1.0 / a[row, row, i]
 
 
-@inlined
 def substitute(start, a, f):
     """f = A^-1 f, where A is factored."""
     count = f.shape[1]
@@ -292,7 +281,6 @@ def substitute(start, a, f):
             f[row, i] *= a[row, row, i]
 
 
-@inlined
 def correct(lanes, pace):
     """Add A^-1 f to the multipliers of lanes that are not done."""
     for row in range(lanes.f.shape[0]):
