@@ -25,46 +25,36 @@ class Mirror(Method):
     """Exact flights and reflections."""
 
     def needs(self, scene):
-        return *flights.of_flights(scene.gravity is not None), surfaces.unit_normal
+        return *flights.of_flights(scene.gravity is not None), "unit_normal"
 
     def numbers(self, scene):
         return MirrorNumbers()
 
 
-class MirrorNumbers(NamedTuple):
+class MirrorNumbers(contract.MethodNumbers):
     """What kernels know of the method: which it is."""
 
+    def constants(self, mass, energy, scale2):
+        return 0.0, 0.0, 0.0
 
-@contract.constants.register(MirrorNumbers)
-def _(method, mass, energy, scale2):
-    return 0.0, 0.0, 0.0
+    def own(self, first, second, third):
+        return self
 
+    def land(self, chain, gravity, lane, hit):
+        t = select(hit.time < lane.left, hit.time, lane.left)
+        r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
+        return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
 
-@contract.own.register(MirrorNumbers)
-def _(method, first, second, third):
-    return method
+    def contact(self, chain, gravity, lane, wall, solution):
+        n = fold.unit_normal(chain, wall, lane.r)
+        b = dot(lane.v, n)
+        # v1 = v0 - 2 (v0.n) n where v0.n > 0
+        impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
+        hits = select(wall >= 0.0, 1.0, 0.0)
+        return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0, False)
 
-
-@contract.land.register(MirrorNumbers)
-def _(method, chain, gravity, lane, hit):
-    t = select(hit.time < lane.left, hit.time, lane.left)
-    r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
-    return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
-
-
-@contract.contact.register(MirrorNumbers)
-def _(method, chain, gravity, lane, wall, solution):
-    n = fold.unit_normal(chain, wall, lane.r)
-    b = dot(lane.v, n)
-    # v1 = v0 - 2 (v0.n) n where v0.n > 0
-    impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
-    hits = select(wall >= 0.0, 1.0, 0.0)
-    return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0, False)
-
-
-@contract.hard_pass.register(MirrorNumbers)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0, False), Status.STALLED.value
+    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+        return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0, False), Status.STALLED.value
 
 
 if __name__ == "__main__":

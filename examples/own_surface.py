@@ -68,7 +68,7 @@ def _(surface, r):
 @contract.bend.register(SuperellipsoidNumbers)
 def _(surface, r):
     """The second derivatives are largest at the farthest corner of a box around r, with the semi-axes of the cavity."""
-    h = contract.hessian(surface, absolute(r) + surface.a)
+    h = surface.hessian(absolute(r) + surface.a)
     return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(surface.a.x, surface.a.y, surface.a.z)
 
 

@@ -31,7 +31,7 @@ def penetration(chain, r):
     deepest = 0.0
     for link in reversed(each(chain)):
         is_field = isinstance(link, Field)
-        distance = link.first.deepest_in_cell(r) if is_field else surfaces.distance(link.first, r)
+        distance = link.first.deepest_in_cell(r) if is_field else link.first.distance(r)
         deepest = select(distance > deepest, distance, deepest)
     return deepest
 

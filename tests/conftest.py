@@ -203,19 +203,19 @@ def _as_kernels_take_it(value):
 def wall_point(surface, point):
     """A point of the surface, by Newton's method along the gradient."""
     for _ in range(30):
-        gradient = np.array(call(contract.gradient, surface, point))
+        gradient = np.array(call(surface.gradient, point))
         if not gradient.any():
             reject()  # an example of Hypothesis from which there is no way to the wall
-        step = call(contract.phi, surface, point) / (gradient @ gradient) * gradient
+        step = call(surface.phi, point) / (gradient @ gradient) * gradient
         point = point - step
         if (abs(step) <= EPSILON * abs(point).max()).all():
             break
-    return np.array(call(contract.settle, surface, point))
+    return np.array(call(surface.settle, point))
 
 
 def gap(surface, point):
     """The signed gap at a point."""
-    return float(call(contract.gap_of, surface, call(contract.inner, surface, point)))
+    return float(call(surface.gap_of, call(surface.inner, point)))
 
 
 def scene_of(*names, **keywords):

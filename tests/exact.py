@@ -92,12 +92,12 @@ def levels(walls, kind, position, velocity, half_pull=None):
     if isinstance(body, SolidNumbers):
         parts, rest = [], body.parts
         while rest is not None:
-            parts, rest = [*parts, contract.level_of(rest.first, contract.inner(rest.first, path))], rest.rest
+            parts, rest = [*parts, rest.first.level_of(rest.first.inner(path))], rest.rest
         return 1, parts
     if isinstance(body, (TorusNumbers, CapsuleNumbers)):
         path = own(wall, path) if isinstance(wall, Rotated) else path
         return (_torus if isinstance(body, TorusNumbers) else _capsule)(body, *(path - body.center))
-    return 0, [contract.level_of(wall, contract.inner(wall, path)) for wall in walls]
+    return 0, [wall.level_of(wall.inner(path)) for wall in walls]
 
 
 def _torus(body, x, y, z):

@@ -151,7 +151,7 @@ def test_a_kernel_of_the_users_with_another_helper_is_compiled(tmp_path, monkeyp
 
 
 def phi_of(surface, r):
-    return contract.phi(surface, r) + 0.0
+    return surface.phi(r) + 0.0
 
 
 @compiled_only

@@ -47,21 +47,21 @@ compiled = numba.njit(error_model="numpy")
 
 
 def every_function_of_a_surface(surface, r, v, pull, kappa):
-    q0, q1 = contract.inner(surface, r), contract.inner(surface, v)
+    q0, q1 = surface.inner(r), surface.inner(v)
     return (
-        contract.phi(surface, r),
-        contract.gradient(surface, r),
-        contract.first_hit(surface, r, v),
-        contract.first_hit(surface, r, 0.0 * v),
-        contract.safe_time(surface, r, v, pull),
-        contract.unit_normal(surface, r),
-        contract.chord_normal(surface, r, 0.1 * v, kappa),
-        (q0, q1, contract.gap_of(surface, q0), contract.level_of(surface, q1)),
-        contract.gap_slope(surface, q0, q1),
-        contract.inner_gradient(surface, r, v),
-        contract.push(surface, r, v, kappa),
-        contract.rise(surface, r, v, kappa),
-        contract.settle(surface, r),
+        surface.phi(r),
+        surface.gradient(r),
+        surface.first_hit(r, v),
+        surface.first_hit(r, 0.0 * v),
+        surface.safe_time(r, v, pull),
+        surface.unit_normal(r),
+        surface.chord_normal(r, 0.1 * v, kappa),
+        (q0, q1, surface.gap_of(q0), surface.level_of(q1)),
+        surface.gap_slope(q0, q1),
+        surface.inner_gradient(r, v),
+        surface.push(r, v, kappa),
+        surface.rise(r, v, kappa),
+        surface.settle(r),
     )
 
 

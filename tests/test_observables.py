@@ -145,7 +145,7 @@ def test_blocks_do_not_change_a_bit(seen):
 def test_penetration_is_the_depth_next_to_the_wall(name):
     surface = numbers_of(name)
     wall = wall_point(surface, np.array([0.3, 0.5, -0.4]))
-    normal = np.array(call(contract.unit_normal, surface, wall))
+    normal = np.array(call(surface.unit_normal, wall))
     chain = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).chain()
     assert call(observables.penetration, chain, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
     assert call(observables.penetration, chain, wall - 1e-6 * normal) == 0.0

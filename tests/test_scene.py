@@ -103,7 +103,7 @@ def test_gaps_have_the_sign_of_each_side():
     assert gaps.shape == (2, 50)
     for row, name in zip(gaps, ("ball", "plane"), strict=True):
         (numbers,) = SURFACES[name]().walls()
-        levels = contract.level_of(numbers, np.array([contract.inner(numbers, vec(point)) for point in points.T]))
+        levels = numbers.level_of(np.array([numbers.inner(vec(point)) for point in points.T]))
         assert (np.sign(row) == np.sign(levels)).all()
 
 

@@ -90,7 +90,7 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
     if moving is None:
         return found
     for k, link in reversed(tuple(enumerate(each(chain)))):
-        work = factor * dot(_reaction_of(reactions, k), contract.way(link.first))
+        work = factor * dot(_reaction_of(reactions, k), link.first.way())
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
     return found
@@ -100,5 +100,5 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
 def constraints(chain, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
     for k, link in enumerate(each(chain)):
-        start = contact_impulse.start_gap(0.0, link.first, r, contract.inner(link.first, r))
+        start = contact_impulse.start_gap(0.0, link.first, r, link.first.inner(r))
         into[k] = law.constraint(start.gap)

@@ -104,15 +104,15 @@ def _may_meet(surface, end, path, near):
 
 def _level(surface, r, v):
     """The level of a wall, its rate of change, and the length of its gradient."""
-    n = contract.unit_normal(surface, r)
-    scale = abs(dot(n, contract.slope(surface, r)))
-    speed = dot(n, v - contract.velocity(surface, r))
-    return contract.level_of(surface, contract.inner(surface, r)), scale * speed, scale
+    n = surface.unit_normal(r)
+    scale = abs(dot(n, surface.slope(r)))
+    speed = dot(n, v - surface.velocity(r))
+    return surface.level_of(surface.inner(r)), scale * speed, scale
 
 
 def _on_line(surface, end, r0, r1):
     """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
-    if contract.is_quartic(surface) or contract.flat(surface):
+    if surface.is_quartic or surface.flat:
         return False
     time, _found = straight_hit(surface, end, r0, r1)
     return time < 1.0
@@ -202,14 +202,14 @@ class _Still(Record):
     surface: Any
 
     def depth(self, r, time):
-        return contract.distance(self.surface, r)
+        return self.surface.distance(r)
 
     def pace_into(self, path):
-        return dot(contract.unit_normal(self.surface, path.r0), path.v0)
+        return dot(self.surface.unit_normal(path.r0), path.v0)
 
     def straight(self, path):
         """The part after which the straight way is at the wall, for a step that is deep at none of its places."""
-        time, found = contract.first_hit(self.surface, path.r0, path.r1 - path.r0)
+        time, found = self.surface.first_hit(path.r0, path.r1 - path.r0)
         return time if found and 0.0 < time < 1.0 else math.inf
 
 

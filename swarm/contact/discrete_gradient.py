@@ -34,7 +34,7 @@ _NUDGE = 1e-6
 
 def reaction_needs(gradient: str) -> tuple[Any, ...]:
     """The needs of a step, of every wall, with that argument `gradient` of its method."""
-    return (*impulse.NEEDS, contract.resolve) if gradient == "mean-value" else impulse.NEEDS
+    return (*impulse.NEEDS, "resolve") if gradient == "mean-value" else impulse.NEEDS
 
 
 # --- The vectors -----------------------------------------------------------------------------------------
@@ -43,26 +43,26 @@ def reaction_needs(gradient: str) -> tuple[Any, ...]:
 @outlined
 def composite(law, surface, r0, r1):
     """D = Phi[g0, g1] g[q0, q1] D_q; where q1 = q0 the quotients are their one-sided limits."""
-    q0, q1 = contract.inner(surface, r0), contract.inner(surface, r1)
-    slope, _curvature = law.constraint_slope(contract.gap_of(surface, q0), contract.gap_of(surface, q1))
-    rise, _curvature = contract.gap_slope(surface, q0, q1)
-    return slope * rise * contract.inner_gradient(surface, r0, r1)
+    q0, q1 = surface.inner(r0), surface.inner(r1)
+    slope, _curvature = law.constraint_slope(surface.gap_of(q0), surface.gap_of(q1))
+    rise, _curvature = surface.gap_slope(q0, q1)
+    return slope * rise * surface.inner_gradient(r0, r1)
 
 
 @outlined
 def constraint_gradient(law, surface, r):
     """grad Phi(r) = Phi'(g) g'(q) grad q."""
-    return _constraint_slope(law, surface, contract.inner(surface, r)) * contract.inner_gradient(surface, r, r)
+    return _constraint_slope(law, surface, surface.inner(r)) * surface.inner_gradient(r, r)
 
 
 def _constraint_slope(law, surface, q):
     """dPhi/dq"""
-    slope, _curvature = contract.gap_slope(surface, q, q)
-    return law.constraint_gradient(contract.gap_of(surface, q)) * slope
+    slope, _curvature = surface.gap_slope(q, q)
+    return law.constraint_gradient(surface.gap_of(q)) * slope
 
 
 def _constraint(law, surface, r):
-    return law.constraint(contract.gap_of(surface, contract.inner(surface, r)))
+    return law.constraint(surface.gap_of(surface.inner(r)))
 
 
 @outlined
@@ -103,10 +103,10 @@ class Composite(NamedTuple):
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""
         kappa, solved = impulse.careful(law, multiplier, surface, step)
-        r1 = contract.push(surface, step.r, step.p, kappa)
-        start = impulse.start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
+        r1 = surface.push(step.r, step.p, kappa)
+        start = impulse.start_gap(multiplier, surface, step.r, surface.inner(step.r))
         g1 = impulse.end_gap(surface, step, start, kappa)
-        return Reaction(kappa * contract.inner_gradient(surface, step.r, r1), law.constraint(g1), solved)
+        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(g1), solved)
 
 
 class MeanValue(NamedTuple):
@@ -151,8 +151,8 @@ def form_of(gradient: str) -> Composite | MeanValue:
 @outlined
 def _gradient_at(surface, step, beta, kappa):
     """r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
-    r = contract.resolve(surface, step.r + beta * step.p, beta * kappa)
-    return r, contract.inner_gradient(surface, r, r)
+    r = surface.resolve(step.r + beta * step.p, beta * kappa)
+    return r, surface.inner_gradient(r, r)
 
 
 @outlined
@@ -215,7 +215,7 @@ def _pushed_with(law, multiplier, surface, step, beta, kappa):
     r = kappa * d
     mean = 0.5 * _constraint(law, surface, step.r) + 0.5 * _constraint(law, surface, step.r + step.p - r)
     force = law.alpha * mean + (0.0 if multiplier is None else multiplier)
-    return r, kappa - step.c * force * _constraint_slope(law, surface, contract.inner(surface, r_beta))
+    return r, kappa - step.c * force * _constraint_slope(law, surface, surface.inner(r_beta))
 
 
 # --- A root in a bracket without derivatives -------------------------------------------------------------

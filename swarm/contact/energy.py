@@ -35,7 +35,7 @@ def contact_energy(law, chain, over_mass, r):
         return 0.0
     stored = 0.0
     for link in reversed(each(chain)):
-        stored = law.stored_energy(contract.gap_of(link.first, contract.inner(link.first, r))) + stored
+        stored = law.stored_energy(link.first.gap_of(link.first.inner(r))) + stored
     return stored * over_mass
 
 
@@ -47,10 +47,10 @@ def energy_uncertainty(chain, law, over_mass, r, s):
     found = 0.0
     for link in reversed(each(chain)):
         surface = link.first
-        g = contract.gap_of(surface, contract.inner(surface, r))
+        g = surface.gap_of(surface.inner(r))
         # 2 V/g, which is the force up to the factor (a + 1)/2
         force = law.stiffness(g) * select(g > 0.0, g, 0.0) * over_mass
-        found = force * dot(absolute(contract.gradient(surface, r)), place_scale(surface, s)) + found
+        found = force * dot(absolute(surface.gradient(r)), place_scale(surface, s)) + found
     return found
 
 

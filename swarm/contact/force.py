@@ -6,15 +6,15 @@ from ..surfaces import contract
 from ..surfaces.fold import each, length
 
 # The force needs these of every wall.
-NEEDS = (contract.inner, contract.gap_of, contract.gap_slope, contract.inner_gradient)
+NEEDS = ("inner", "gap_of", "gap_slope", "inner_gradient")
 
 
 def strength(law, surface, q):
     """V'(g) g'(q): the force is this times -grad q."""
-    g = contract.gap_of(surface, q)
+    g = surface.gap_of(q)
     # The divided difference of V for equal gaps.
     push, _stiffness = law.energy_slope(g, g)
-    slope, _curvature = contract.gap_slope(surface, q, q)
+    slope, _curvature = surface.gap_slope(q, q)
     return select(g > 0.0, push * slope, 0.0)
 
 
@@ -28,8 +28,8 @@ def force(chain, law, r):
 
 def _added(others, surface, law, r):
     """A force with that of one more wall."""
-    f = strength(law, surface, contract.inner(surface, r))
-    d = contract.inner_gradient(surface, r, r)
+    f = strength(law, surface, surface.inner(r))
+    d = surface.inner_gradient(r, r)
     # A select and no product: off the wall grad q may be infinite.
     return select(f != 0.0, others - f * d, others)
 
@@ -38,9 +38,9 @@ def _added(others, surface, law, r):
 def add_impulses(chain, law, factor, r, impulse, lane):
     """Add `factor` times the magnitude of the force of each wall to impulse[wall, lane]."""
     for k, link in enumerate(each(chain)):
-        f = strength(law, link.first, contract.inner(link.first, r))
+        f = strength(law, link.first, link.first.inner(r))
         if f != 0.0:
-            impulse[k, lane] += factor * abs(f) * norm(contract.inner_gradient(link.first, r, r))
+            impulse[k, lane] += factor * abs(f) * norm(link.first.inner_gradient(r, r))
 
 
 def work(moving, chain, now, law, r):
@@ -49,7 +49,7 @@ def work(moving, chain, now, law, r):
     if moving is None:
         return found
     for over, link in reversed(tuple(zip(each(chain), each(now), strict=True))):
-        found = dot(_added(ZERO, link.first, law, r), contract.way(over.first)) + found
+        found = dot(_added(ZERO, link.first, law, r), over.first.way()) + found
     return found
 
 
@@ -61,7 +61,7 @@ def add_works(moving, chain, now, law, factor, r, impulse, lane):
         return found
     count = length(chain)
     for k, (over, link) in reversed(tuple(enumerate(zip(each(chain), each(now), strict=True)))):
-        here = factor * dot(_added(ZERO, link.first, law, r), contract.way(over.first))
+        here = factor * dot(_added(ZERO, link.first, law, r), over.first.way())
         impulse[count + k, lane] += here
         found = here + found
     return found

@@ -26,22 +26,22 @@ SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 _EPSILON = 2.220446049250313e-16
 # The equation needs these of every wall.
-NEEDS = (*FORCE_NEEDS, contract.resolve, contract.farthest_push)
+NEEDS = (*FORCE_NEEDS, "resolve", "farthest_push")
 
 
 def _residual(law, surface, r, c, kappa):
     """F(kappa)"""
-    return kappa - c * strength(law, surface, contract.inner(surface, contract.resolve(surface, r, kappa)))
+    return kappa - c * strength(law, surface, surface.inner(surface.resolve(r, kappa)))
 
 
 def _guess(surface, law, r, c):
     """kappa if the wall were flat and the spring linear."""
-    q = contract.inner(surface, r)
-    g = contract.gap_of(surface, q)
-    slope, _curvature = contract.gap_slope(surface, q, q)
+    q = surface.inner(r)
+    g = surface.gap_of(q)
+    slope, _curvature = surface.gap_slope(q, q)
     # g(s) = g - kappa g'(q) |grad q|^2 and V' = k g(s): kappa (1 + c k g'^2 |grad q|^2) = c k g' g
     stiff = c * law.stiffness(g) * slope
-    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(contract.inner_gradient(surface, r, r)))
+    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(surface.inner_gradient(r, r)))
 
 
 def _improve(surface, law, r, c, kappa):
@@ -66,7 +66,7 @@ def reached(chain, wall, r, kappa):
     if chain is None:
         return r
     other = reached(chain.rest, wall - 1.0, r, kappa)
-    return select(wall == 0.0, contract.resolve(chain.first, r, kappa), other)
+    return select(wall == 0.0, chain.first.resolve(r, kappa), other)
 
 
 class AtEnd(NamedTuple):
@@ -81,7 +81,7 @@ class AtEnd(NamedTuple):
         if f_low == 0.0:
             return Reaction(ZERO, 0.0, True)
         # Before the pole of `resolve`.
-        farthest = 0.5 * abs(contract.farthest_push(surface))
+        farthest = 0.5 * abs(surface.farthest_push())
         low, high = 0.0, math.copysign(min(abs(f_low), (1.0 - 1e-12) * farthest), -f_low)
         f_high = _residual(law, surface, r, c, high)
         kappa, found = high, f_low * f_high <= 0.0
@@ -90,4 +90,4 @@ class AtEnd(NamedTuple):
                 break
             kappa = illinois(low, f_low, high, f_high)
             low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, _residual(law, surface, r, c, kappa))
-        return Reaction(r - contract.resolve(surface, r, kappa), 0.0, found)
+        return Reaction(r - surface.resolve(r, kappa), 0.0, found)

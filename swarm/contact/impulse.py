@@ -31,8 +31,8 @@ _EPSILON = 2.220446049250313e-16
 _ON_SURFACE = 8.0 * _EPSILON
 # The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
-    contract.inner, contract.gap_of, contract.gap_slope, contract.gradient, contract.inner_gradient, contract.push,
-    contract.rise, contract.farthest_push,
+    "inner", "gap_of", "gap_slope", "gradient", "inner_gradient", "push",
+    "rise", "farthest_push",
 )  # fmt: skip
 
 
@@ -72,8 +72,8 @@ class Newton(Record):
 
 
 def _residual(law, multiplier, surface, step, start, kappa):
-    rise, drise = contract.rise(surface, step.r, step.p, kappa)
-    slope, dslope = contract.gap_slope(surface, start.q, start.q + rise)
+    rise, drise = surface.rise(step.r, step.p, kappa)
+    slope, dslope = surface.gap_slope(start.q, start.q + rise)
     # g1 - g0 = g[q0, q1] (q1 - q0)
     g1 = start.gap + slope * rise
     g1 = select(abs(g1) <= start.round_off, 0.0, g1)
@@ -85,11 +85,11 @@ def _residual(law, multiplier, surface, step, start, kappa):
 
 def start_gap(multiplier, surface, r, q0):
     """The start of a step from r, where q = q0; only multipliers need a gap of round-off to count as 0."""
-    g0 = contract.gap_of(surface, q0)
+    g0 = surface.gap_of(q0)
     if multiplier is None:
         return Start(q0, g0, 0.0, _NEWTON_TOLERANCE)
     # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
-    round_off = _ON_SURFACE * contract.gap_scale(surface, r)
+    round_off = _ON_SURFACE * surface.gap_scale(r)
     return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
 
 
@@ -107,10 +107,10 @@ def _loop_record(multiplier, law, g0, g1, g, factor):
 
 def _guess(surface, law, step):
     """kappa if the wall were flat and the spring linear."""
-    q0 = contract.inner(surface, step.r)
-    g0 = contract.gap_of(surface, q0)
-    rise, drise = contract.rise(surface, step.r, step.p, 0.0)
-    slope, _dslope = contract.gap_slope(surface, q0, q0 + rise)
+    q0 = surface.inner(step.r)
+    g0 = surface.gap_of(q0)
+    rise, drise = surface.rise(step.r, step.p, 0.0)
+    slope, _dslope = surface.gap_slope(q0, q0 + rise)
     gf = g0 + slope * rise
     # There g1 = gf - e kappa, and with C = c alpha/2 g[q0, q1] e equation (K) is one of
     #   entering (g0 <= 0):  (1 + C) g1^2 - (gf + g0) g1 + gf g0 = 0
@@ -136,7 +136,7 @@ def _improve(surface, law, multiplier, step, kappa):
     What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1 is
     a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
     """
-    start = start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
+    start = start_gap(multiplier, surface, step.r, surface.inner(step.r))
     f = _residual(law, multiplier, surface, step, start, kappa)
     change = f.value / f.slope
     g0, g1 = start.gap, f.gap
@@ -154,8 +154,8 @@ improve = of_wall(_improve, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)))
 
 def end_gap(surface, step, start, kappa):
     """g1 of the step that is pushed with kappa, from g1 - g0: more digits of a small g1 than r1 has."""
-    rise, _drise = contract.rise(surface, step.r, step.p, kappa)
-    slope, _dslope = contract.gap_slope(surface, start.q, start.q + rise)
+    rise, _drise = surface.rise(step.r, step.p, kappa)
+    slope, _dslope = surface.gap_slope(start.q, start.q + rise)
     g1 = start.gap + slope * rise
     return select(abs(g1) <= start.round_off, 0.0, g1)
 
@@ -163,7 +163,7 @@ def end_gap(surface, step, start, kappa):
 @outlined
 def careful(law, multiplier, surface, step):
     """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
-    start = start_gap(multiplier, surface, step.r, contract.inner(surface, step.r))
+    start = start_gap(multiplier, surface, step.r, surface.inner(step.r))
     first = _residual(law, multiplier, surface, step, start, 0.0)
     if first.value == 0.0:
         return 0.0, True
@@ -207,7 +207,7 @@ def _first_push(multiplier, size, df):
 def _bracket(law, multiplier, surface, step, start, sign, first):
     """Two sizes of kappa with F < 0 and F >= 0, the latter `first` doubled some times, and whether they were found."""
     # Doubling from below meets the smallest root first, and it ends: (K) has F > 0 both far out and before the pole.
-    farthest = abs(contract.farthest_push(surface))
+    farthest = abs(surface.farthest_push())
     low, high = 0.0, min(first, 0.5 * farthest)
     for _i in range(_DOUBLINGS):
         f = sign * _residual(law, multiplier, surface, step, start, sign * high).value

@@ -45,8 +45,8 @@ _FAST = 1e-12
 _BEFORE_STOP = 0.999
 # Sliding needs these of every wall.
 NEEDS = (
-    contract.unit_normal, contract.step_normal, contract.outward_acceleration, contract.settle, contract.distance,
-    contract.first_hit, contract.inner, contract.inner_gradient, contract.level_of,
+    "unit_normal", "step_normal", "outward_acceleration", "settle", "distance",
+    "first_hit", "inner", "inner_gradient", "level_of",
 )  # fmt: skip
 
 

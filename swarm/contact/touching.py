@@ -32,7 +32,7 @@ _SWEEPS = 60
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
 # These need of every wall; exact reflections need no more.
-NEEDS = (contract.first_hit, contract.unit_normal, contract.inner_gradient, contract.distance, contract.settle)
+NEEDS = ("first_hit", "unit_normal", "inner_gradient", "distance", "settle")
 
 
 class Contacts(Record):

@@ -42,7 +42,7 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
 
 
 def _start_of(surface, r):
-    return impulse.start_gap(0.0, surface, r, contract.inner(surface, r))
+    return impulse.start_gap(0.0, surface, r, surface.inner(r))
 
 
 def _has_limit(surface, law, r):
@@ -56,7 +56,7 @@ def _has_limit(surface, law, r):
 def _multiplier_of(surface, law, r, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
     start = _start_of(surface, r)
-    slope, _curvature = contract.gap_slope(surface, start.q, start.q)
+    slope, _curvature = surface.gap_slope(start.q, start.q)
     return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 
 
@@ -79,7 +79,7 @@ def meets_later(chain, wall, law, r, p):
     """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
     found = False
     for k, link in enumerate(walls.each(chain)):
-        leaves = contract.level_of(link.first, contract.inner(link.first, r + p)) > 0.0
+        leaves = link.first.level_of(link.first.inner(r + p)) > 0.0
         found = found | (leaves & (wall != float(k)) & (not _has_limit(link.first, law, r)))
     return found
 

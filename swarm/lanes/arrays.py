@@ -69,7 +69,7 @@ class Lanes(NamedTuple):
     def given(self, method, i):
         """A lane as methods are given it."""
         lane = self.lane(i)
-        kept = methods.own(method, *lane.own)
+        kept = method.own(*lane.own)
         return methods.Lane(lane.r, lane.v, lane.left, lane.hits, kept)
 
 
@@ -195,7 +195,7 @@ def load(method, chain, lanes, k, share, i):
         return
     i = index(i)
     lane.r, lane.v = column(state.position, 0, i), column(state.velocity, 0, i)
-    lane.own = Vec(*methods.constants(method, state.mass[i], state.energy[i], speed2_scale(state, i)))
+    lane.own = Vec(*method.constants(state.mass[i], state.energy[i], speed2_scale(state, i)))
     lane.left, lane.hits = select(left > 0.0, left, share.span), 0.0
     for s in range(booked(chain)):
         lanes.impulse[s, k] = 0.0
@@ -245,10 +245,10 @@ def retire(method, chain, lanes, k, share):
     state.impacts[i] += np.int64(lane.hits)
     for s in range(booked(chain)):
         state.impulse[s, i] += lanes.impulse[s, k] * state.mass[i]
-    if methods.dissipates(method):
+    if method.dissipates:
         # Each particle knows its energy: what it has lost is accounted for with it.
         now = 0.5 * lane.twice
-        if loses(methods.laws(method)):
+        if loses(method.laws):
             state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, lanes.impulse, k))
         state.energy[i] = now
     phase = ARRIVED if state.contacts is None else _phase_after(state.contacts, i, lane.left, lanes.wall[k])
@@ -295,4 +295,4 @@ def speed2_scale(state, i):
 
 def goes_on_by(method, v, left):
     """The time from one look to the next by which a particle must go on that has so much left of its frame [s]."""
-    return min(methods.instant(method, v), MOVED * left)
+    return min(method.instant(v), MOVED * left)

@@ -120,7 +120,7 @@ def _look(method, chain, state, lanes, live):
         lane = lanes.lane(i)
         status, p, left = Status.DONE.value, float(lanes.particle[i]), lane.left
         still = goes_on_by(method, lane.v, left) >= lane.looked_left - left
-        if methods.holds(method) and lane.hits > most_hits:
+        if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
         elif lane.looked_particle == p and still and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
@@ -140,7 +140,7 @@ def _hard_passes(hard, method, chain, gravity, lanes, live):
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
             lane = lanes.given(method, i)
-            contact, status = methods.hard_pass(method, chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
+            contact, status = method.hard_pass(chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
             _put_contact(method, lanes, i, contact)
             if lanes.lane(i).hits > hard.most_hits:
                 status = Status.STALLED.value
@@ -157,18 +157,18 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:
         let_out_lanes(state.openings, method, chain, share, lanes, live)
-    if methods.solves(method) is not None:
+    if method.solves is not None:
         solve(method, chain, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if methods.thermal(method) is not None:
+    if method.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
-        here = methods.walls_of(method, of_lane(chain, picked, i), lane.left)
-        contact = methods.contact(method, here, gravity, lane, lanes.wall[i], found)
+        here = method.walls_of(of_lane(chain, picked, i), lane.left)
+        contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _end(method, chain, lanes, i, contact)
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
@@ -186,7 +186,7 @@ def _exchange_heat(method, chain, gravity, share, lanes, live):
         if wall >= 0.0:
             r, v = lane.r, lane.v
             draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
-            now, laws = at(chain, lane.left), methods.laws(method)
+            now, laws = at(chain, lane.left), method.laws
             left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:
                 before, after = lane.twice, square(left.v) + 2.0 * potential(gravity, r)
@@ -207,7 +207,7 @@ def _end(method, chain, lanes, i, contact):
     _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
     _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
     lanes.wall[i] = contact.wall
-    hard = (contact.wall <= methods.HARD) & (not methods.holds(method))
+    hard = (contact.wall <= methods.HARD) & (not method.holds)
     return contact.lasts | (not (contact.left > 0.0)), hard
 
 
@@ -216,7 +216,7 @@ def _put_contact(method, lanes, i, contact):
     lane = lanes.lane(i)
     lane.put_end(contact)
     lane.hits += contact.hits
-    if methods.dissipates(method):
+    if method.dissipates:
         lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
 

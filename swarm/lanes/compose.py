@@ -26,7 +26,7 @@ SLOWEST = 1e-24
 
 def compose(kind, method, chain, gravity, lanes, live):
     """One composed step of every live lane, from its r, v and a to its r1 and v1."""
-    friction, moving = methods.friction(method), wall_laws.moving(methods.laws(method))
+    friction, moving = method.friction, wall_laws.moving(method.laws)
     rubs = friction is not None
     for i in range(live):
         _start(method, chain, gravity, lanes, i)
@@ -81,7 +81,7 @@ def compose(kind, method, chain, gravity, lanes, live):
 
 def _start(method, chain, gravity, lanes, i):
     """How long the step of a lane is, by how much it may be off, and from where it goes."""
-    lane, tolerance = lanes.lane(i), methods.sliding_tolerance(method)
+    lane, tolerance = lanes.lane(i), method.sliding_tolerance
     v, a, r = lane.v, lane.a, lane.r
     h = select(lane.step < lane.left, lane.step, lane.left)
     h = select(lane.cut < h, lane.cut, h)
@@ -99,7 +99,7 @@ def _start(method, chain, gravity, lanes, i):
 
 def _longest(method, chain, wall, motion):
     """A time within which a particle that slides with friction surely does not stop on its first wall."""
-    (r, v, a), friction = motion, methods.friction(method)
+    (r, v, a), friction = motion, method.friction
     if moves(method):
         v, a = v - walls.velocity(chain, wall, r), a - walls.acceleration(chain, wall, r)
     return slides.longest(friction, v, a)
@@ -134,7 +134,7 @@ def end_steps(kind, method, chain, gravity, lanes, live):
 
 
 def _end_step(kind, method, chain, gravity, lanes, i):
-    lane, laws = lanes.lane(i), methods.laws(method)
+    lane, laws = lanes.lane(i), method.laws
     moving, held = wall_laws.moving(laws), lane.held(kind)
     start, now = at(chain, lane.left), at(chain, lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep

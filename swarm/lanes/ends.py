@@ -31,7 +31,7 @@ _RETRY = 0.25
 @outlined
 def set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; its phase then, which may be to rest."""
-    lane, laws = lanes.lane(i), methods.laws(method)
+    lane, laws = lanes.lane(i), method.laws
     r, v, left = lane.r, lane.v, lane.left
     now = at(chain, left)
     if lanes.openings is not None and is_at_opening(lanes.openings, kind, method, now, state, lanes, i):

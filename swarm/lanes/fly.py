@@ -16,7 +16,7 @@ _STRIDES = 3
 
 def go(method, chain, gravity, lanes, live):
     """Every lane to its next contact, or to the end of the frame."""
-    met = methods.landed_on(method, chain)
+    met = method.landed_on(chain)
     if met is None:
         for i in range(index(live)):
             _flight(method, chain, gravity, lanes, i, flights.NEVER)
@@ -127,9 +127,9 @@ def _needs_more(chain, lanes, i):
 def _flight(method, chain, gravity, lanes, i, hit):
     """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lanes.given(method, i)
-    if methods.lands(method):
-        end = methods.land(method, chain, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.left, hit))
+    if method.lands:
+        end = method.land(chain, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.left, hit))
     else:
-        end = methods.flight(method, chain, gravity, lane)
+        end = method.flight(chain, gravity, lane)
     lanes.lane(i).put_end(end)
     lanes.wall[i] = end.wall

@@ -175,7 +175,7 @@ def _add(log, method, chain, state, particle, struck):
     k = _add_struck(log, state, particle, struck)
     if log.slip is not None:
         now = at(chain, struck.left)
-        u = wall_velocity(wall_laws.moving(methods.laws(method)), now, struck.wall, struck.r)
+        u = wall_velocity(wall_laws.moving(method.laws), now, struck.wall, struck.r)
         n, before = walls.unit_normal(now, struck.wall, struck.r), relative(u, struck.before)
         _put(log.slip, k, before - dot(before, n) * n)
 

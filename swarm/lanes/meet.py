@@ -73,7 +73,7 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    is_hot = methods.thermal(method) is not None
+    is_hot = method.thermal is not None
     if is_hot and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
     settles = _settles(method, carried, gravity, p)
@@ -203,7 +203,7 @@ def careful_block(method, chain, gravity, share):
 def _rest(method, chain, gravity, share, i, p, held):
     """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
-    loses = methods.laws(method) is not None
+    loses = method.laws is not None
     for s in range(held.shape[1]):
         taken = held[1, s] if loses else 0.0
         contacts.load[s, i] = held[0, s]

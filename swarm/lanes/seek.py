@@ -72,7 +72,7 @@ def _look_at_all(members, before, lanes, live):
         body, number = member(members, index(m)), before + m
         for i in range(index(live)):
             lane = lanes.lane(i)
-            time, hits = contract.first_hit(body, lane.r, lane.v)
+            time, hits = body.first_hit(lane.r, lane.v)
             sooner = time < course[_TIME, i]
             course[_TIME, i] = select(sooner, time, course[_TIME, i])
             course[_WALL, i] = select(sooner, select(hits, number, -1.0), course[_WALL, i])
@@ -160,7 +160,7 @@ def _look(gravity, like, before, lanes, live, seen, near):
     """Every lane at the next of these bodies: in closed form where flights are straight and none is met by steps."""
     if gravity is None and flights.in_steps(like) is None:
         for i in range(index(live)):
-            time, hits = contract.first_hit(gathered(like, seen.body, i, 0), *_flight(lanes.rows, near, i))
+            time, hits = gathered(like, seen.body, i, 0).first_hit(*_flight(lanes.rows, near, i))
             _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
     else:
         _look_by_steps(gravity, like, before, lanes, live, seen, near)

@@ -101,7 +101,7 @@ def phase_of(kind):
 
 def moves(method):
     """Whether a wall moves: a constant for the compiler."""
-    return wall_laws.moving(methods.laws(method)) is not None
+    return wall_laws.moving(method.laws) is not None
 
 
 @outlined
@@ -126,7 +126,7 @@ def account(method, chain, state, lanes, i):
     state.contacts.sliding[lanes.particle[i]] += lane.h
     push(chain, state, lanes, i, lane.impulse, lane.impulse_second)
     lane.trials = 0.0
-    if methods.friction(method) is not None:
+    if method.friction is not None:
         lose(state, lanes, i, lane.work)
     if moves(method):
         work(chain, state, lanes, i, lanes.gained[i], lane.given_by_second)

@@ -15,30 +15,28 @@ from ..methods import contract as methods
 
 def solve(method, chain, gravity, multipliers, lanes, live):
     """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
-    if methods.most_sweeps(method, chain) > 0:
+    if method.most_sweeps(chain) > 0:
         for i in range(live):
-            lanes.kappa[i], lanes.unsolved[i] = methods.guess(
-                method, chain, gravity, lanes.given(method, i), lanes.wall[i]
-            )
+            lanes.kappa[i], lanes.unsolved[i] = method.guess(chain, gravity, lanes.given(method, i), lanes.wall[i])
     if multipliers is not None:
         _begin_multipliers(method, chain, gravity, lanes, live)
     _newton(method, chain, gravity, multipliers, lanes, live)
     if multipliers is not None:
         _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
-    if methods.turns(method):
+    if method.turns:
         for i in range(live):
-            turned = methods.turn(method, chain, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
+            turned = method.turn(chain, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
             put(lanes.turned, 0, i, turned.v)
             lanes.turned[3, i] = turned.impulse
 
 
 def solution(method, lanes, i):
     """The `Solution` of a lane: nothing where contacts have a closed form."""
-    if methods.solves(method) is None:
+    if method.solves is None:
         return methods.Solution(0.0, False, methods.NOT_TURNED)
     turned = methods.NOT_TURNED
-    if methods.turns(method):
+    if method.turns:
         turned = Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
     return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
@@ -46,12 +44,11 @@ def solution(method, lanes, i):
 def _newton(method, chain, gravity, multipliers, lanes, live):
     """Sweeps of the inner solve, until the last lane is solved."""
     kappa, unsolved, record = lanes.kappa, lanes.unsolved, lanes.record
-    for _sweep in range(methods.most_sweeps(method, chain)):
+    for _sweep in range(method.most_sweeps(chain)):
         remaining = 0
         for i in range(live):
             going = unsolved[i]
-            kappa[i], unsolved[i], found = methods.improve(
-                method, chain, gravity, lanes.given(method, i), lanes.wall[i],
+            kappa[i], unsolved[i], found = method.improve(chain, gravity, lanes.given(method, i), lanes.wall[i],
                 methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), record[MULTIPLIER, i],
             )  # fmt: skip
             if multipliers is not None:
@@ -70,8 +67,8 @@ def _begin_multipliers(method, chain, gravity, lanes, live):
     """The start of the loop (8) of every lane that has a contact."""
     kappa, record = lanes.kappa, lanes.record
     for i in range(live):
-        record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = methods.first_multiplier(
-            method, chain, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
+        record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = method.first_multiplier(
+            chain, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
         )
         lanes.sweeping[i] = lanes.unsolved[i]
         record[BEFORE, i], record[MISS, i] = np.nan, np.nan
@@ -80,7 +77,7 @@ def _begin_multipliers(method, chain, gravity, lanes, live):
 
 def _sweep_multipliers(multipliers, method, chain, gravity, lanes, live):
     """Sweeps of the loop (8), until the last lane has converged."""
-    for _sweep in range(methods.multiplier_sweeps(method)):
+    for _sweep in range(method.multiplier_sweeps):
         if _update_multipliers(method, lanes, live) == 0:
             break
         _newton(method, chain, gravity, multipliers, lanes, live)
@@ -94,8 +91,7 @@ def _update_multipliers(method, lanes, live):
     remaining = 0
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
-        new, miss, more = methods.next_multiplier(
-            method, lanes.lane(i).left, record[ACCELERATION, i], old,
+        new, miss, more = method.next_multiplier(lanes.lane(i).left, record[ACCELERATION, i], old,
             LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
             methods.Sweep(record[BEFORE, i], record[MISS, i]),
         )  # fmt: skip

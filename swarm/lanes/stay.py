@@ -41,7 +41,7 @@ def stay(kind, method, chain, gravity, state, lanes, i):
     left, first, r = lane.left, lane.first, lane.r
     now = at(chain, left)
     u, slowest = walls.velocity(now, first, r), SLOWEST * lane.scale2
-    moves_on = square(lane.v - u) > slowest or _rubs(kind, methods.laws(method), now, lane, r, slowest)
+    moves_on = square(lane.v - u) > slowest or _rubs(kind, method.laws, now, lane, r, slowest)
     if moves_on or not _rests(kind, method, now, gravity, lane, r):
         return phase_of(kind)
     pace, low, high, met, paces = walls.shortest_pace(now), 0.0, 0.0, -1.0, 0.0
@@ -93,7 +93,7 @@ def stay(kind, method, chain, gravity, state, lanes, i):
         state.contacts.met[lanes.particle[i]] = met
         lane.r = walls.settle(then, met, r1)
         return EVENT
-    force = slides.force(methods.laws(method), lane.held(kind), then, gravity, r1, v1)
+    force = slides.force(method.laws, lane.held(kind), then, gravity, r1, v1)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
     return phase_of(kind)
 
@@ -156,7 +156,7 @@ def _rests(kind, method, now, gravity, lane, r):
 def _force_at_rest(kind, method, now, gravity, lane, r):
     """The force on a lane at r that moves with its first wall."""
     u = walls.velocity(now, lane.first, r)
-    return slides.force(methods.laws(method), lane.held(kind), now, gravity, r, u)
+    return slides.force(method.laws, lane.held(kind), now, gravity, r, u)
 
 
 def _rests_later(kind, method, chain, gravity, lane, t):

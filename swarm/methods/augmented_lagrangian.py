@@ -130,7 +130,7 @@ class AugmentedLagrangian(base.Method):
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         # The reaction, the chord that starts the loop, and the exact impacts that may replace a contact
-        contact = *reaction_needs(self.gradient), surfaces.gap_scale, *CHORD_NEEDS, *SLIDING_NEEDS
+        contact = *reaction_needs(self.gradient), "gap_scale", *CHORD_NEEDS, *SLIDING_NEEDS
         return *fixed_step.of_steps(scene), *contact
 
     def numbers(self, scene: Scene) -> steps.Numbers:

@@ -81,8 +81,8 @@ def check_surfaces(method: Method, scene: Scene) -> None:
     """Raise a `SceneError` if a surface does not give what the method, or what is observed, asks of it."""
     purpose = type(method).__name__ + (" without gravity" if scene.gravity is None else " under gravity")
     # `escaped` asks where flights without gravity end.
-    seen = (surfaces.first_hit,) if scene.is_open() and scene.gravity is None else ()
-    required.require(scene.surfaces, purpose, (*method.needs(scene), surfaces.distance, *seen))
+    seen = ("first_hit",) if scene.is_open() and scene.gravity is None else ()
+    required.require(scene.surfaces, purpose, (*method.needs(scene), "distance", *seen))
 
 
 def check_laws(name: str, scene: Scene) -> None:

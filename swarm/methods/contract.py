@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from ..contact.impulse import LoopRecord
 from ..contact.reflection import Turned
 from ..kernel.jit import by_type, by_type_outlined
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
@@ -89,199 +90,144 @@ def work_along(moving, chain, wall, force):
     return 0.0 if moving is None else dot(force, walls.way(chain, wall))
 
 
-# --- What a lane keeps -----------------------------------------------------------------------------------
+class MethodNumbers(Record):
+    """A method as kernels take it."""
+
+    @classmethod
+    def gives(cls, name):
+        """Whether a method has a definition of its own."""
+        return getattr(cls, name) is not getattr(MethodNumbers, name)
+
+    # --- What a lane keeps ---
+
+    def constants(self, mass, energy, scale2):
+        """Three numbers of one particle that hold for the whole run but for what walls do; `own` gives them names.
 
+        `scale2` is the square of the speed that its energy scale is that of.
+        """
+        raise NotImplementedError
 
-@by_type
-def constants(method, mass, energy, scale2):
-    """Three numbers of one particle that hold for the whole run but for what walls do; `own` gives them names.
+    def own(self, first, second, third):
+        """These numbers as the method's own record."""
+        raise NotImplementedError
 
-    `scale2` is the square of the speed that its energy scale is that of.
-    """
-    raise NotImplementedError
+    @property
+    def dissipates(self):
+        """Whether contacts change the energy: then the first constant is twice the energy per mass, and changes."""
+        return False
+
+    @property
+    def holds(self):
+        """Whether a particle may stay on a wall: its numbers are `Held`."""
+        return False
 
+    def instant(self, v):
+        """A time [s] in which a particle of this velocity gets nowhere; 0 where the method does not say."""
+        return 0.0
 
-@by_type
-def own(method, first, second, third):
-    """These numbers as the method's own record."""
-    raise NotImplementedError
+    @property
+    def laws(self):
+        """The laws of its walls, or None."""
+        return None
 
-
-@by_type
-def dissipates(method):
-    """Whether contacts change the energy: then the first constant is twice the energy per mass, and changes."""
-    return False
-
-
-@by_type
-def holds(method):
-    """Whether a particle may stay on a wall: its numbers are `Held`."""
-    return False
-
-
-@by_type
-def instant(method, v):
-    """A time [s] in which a particle of this velocity gets nowhere; 0 where the method does not say."""
-    return 0.0
-
-
-@by_type
-def laws(method):
-    """The laws of its walls, or None."""
-    return
-
-
-@by_type
-def friction(method):
-    """Their friction, or None."""
-    return
-
-
-@by_type
-def thermal(method):
-    """Their temperatures, or None."""
-    return
-
-
-@by_type
-def sliding_tolerance(method):
-    """The relative error of a crossing, of a particle that slides."""
-    return 0.0
-
-
-@by_type
-def walls_of(method, chain, left):
-    """The walls of a scene as `contact` takes them, with so much of the frame left: those at this instant.
-
-    A method of steps takes all there are, to ask them over its step.
-    """
-    return at(chain, left)
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-@by_type
-def flight(method, chain, gravity, lane):
-    """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
-    return Flight(lane.r, lane.v, lane.left, -1.0)
-
-
-@by_type
-def land(method, chain, gravity, lane, hit):
-    """The `Flight` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
-    return Flight(lane.r, lane.v, lane.left, -1.0)
-
-
-@by_type
-def lands(method):
-    """Whether the method registers `land`: a constant for the compiler."""
-    return False
-
-
-@land.implies(lands)
-def _(method):
-    return True
-
-
-@by_type
-def landed_on(method, chain):
-    """The walls whose first hits are found before, for `land`; None where the method finds its contacts by itself."""
-    return
-
-
-@land.implies(landed_on)
-def _(method, chain):
-    return chain
-
-
-# --- The unknown of a contact ----------------------------------------------------------------------------
-
-
-@by_type
-def guess(method, chain, gravity, lane, wall):
-    """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
-    return 0.0, False
-
-
-@by_type
-def improve(method, chain, gravity, lane, wall, solution, multiplier):
-    """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved stays as it is, bit by bit."""
-    return solution.kappa, False, NO_RECORD
-
-
-@by_type
-def most_sweeps(method, chain):
-    """The most sweeps of `improve` a contact may take: a constant for the compiler."""
-    return 0
-
-
-@by_type
-def solves(method):
-    """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
-    return
-
-
-@guess.implies(solves)
-def _(method):
-    return method
-
-
-@by_type
-def turn(method, chain, gravity, lane, wall, kappa):
-    """How the contact has `Turned` the velocity, for `contact`, where one loop of both would be too long."""
-    return NOT_TURNED
-
-
-@by_type
-def turns(method):
-    """Whether the method registers `turn`: a constant for the compiler."""
-    return False
-
-
-@turn.implies(turns)
-def _(method):
-    return True
-
-
-# --- Uzawa's loop (8) around it --------------------------------------------------------------------------
-
-
-@by_type
-def first_multiplier(method, chain, gravity, lane, wall, kappa):
-    """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
-    return 0.0, kappa, 0.0
-
-
-@by_type
-def next_multiplier(method, left, acceleration, multiplier, record, before):
-    """The multiplier after a sweep, what the sweep missed by, and whether to go on; `before` is the last `Sweep`."""
-    return 0.0, 0.0, False
-
-
-@by_type
-def multiplier_sweeps(method):
-    """The most sweeps of the loop."""
-    return 0
-
-
-# --- Contact ---------------------------------------------------------------------------------------------
-
-
-@by_type
-def contact(method, chain, gravity, lane, wall, solution):
-    """The `Contact` with this wall.
-
-    A wall that is HARD already passes through and nothing else changes; to become hard, return `HARD - wall`. A
-    solution that is unsolved was not found, or its multiplier did not converge.
-    """
-    raise NotImplementedError
-
-
-@by_type_outlined
-def hard_pass(method, chain, gravity, lane, wall, lanes, i):
-    """What `flight` or `contact` left, as the `Contact` that it is, and its status.
-
-    Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
-    """
-    raise NotImplementedError
+    @property
+    def friction(self):
+        """Their friction, or None."""
+        return None
+
+    @property
+    def thermal(self):
+        """Their temperatures, or None."""
+        return None
+
+    @property
+    def sliding_tolerance(self):
+        """The relative error of a crossing, of a particle that slides."""
+        return 0.0
+
+    def walls_of(self, chain, left):
+        """The walls of a scene as `contact` takes them, with so much of the frame left: those at this instant.
+
+        A method of steps takes all there are, to ask them over its step.
+        """
+        return at(chain, left)
+
+    # --- Flight ---
+
+    def flight(self, chain, gravity, lane):
+        """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
+        return Flight(lane.r, lane.v, lane.left, -1.0)
+
+    def land(self, chain, gravity, lane, hit):
+        """The `Flight` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
+        return Flight(lane.r, lane.v, lane.left, -1.0)
+
+    @property
+    def lands(self):
+        """Whether the method has a `land`."""
+        return self.gives("land")
+
+    def landed_on(self, chain):
+        """The walls whose first hits are found before, for `land`; None where the method finds its contacts by itself."""
+        return chain if self.lands else None
+
+    # --- The unknown of a contact ---
+
+    def guess(self, chain, gravity, lane, wall):
+        """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
+        return 0.0, False
+
+    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+        """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved stays as it is, bit by bit."""
+        return solution.kappa, False, NO_RECORD
+
+    def most_sweeps(self, chain):
+        """The most sweeps of `improve` a contact may take: a constant for the compiler."""
+        return 0
+
+    @property
+    def solves(self):
+        """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
+        return self if self.gives("guess") else None
+
+    def turn(self, chain, gravity, lane, wall, kappa):
+        """How the contact has `Turned` the velocity, for `contact`, where one loop of both would be too long."""
+        return NOT_TURNED
+
+    @property
+    def turns(self):
+        """Whether the method has a `turn`."""
+        return self.gives("turn")
+
+    # --- Uzawa's loop (8) around it ---
+
+    def first_multiplier(self, chain, gravity, lane, wall, kappa):
+        """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
+        return 0.0, kappa, 0.0
+
+    def next_multiplier(self, left, acceleration, multiplier, record, before):
+        """The multiplier after a sweep, what the sweep missed by, and whether to go on; `before` is the last `Sweep`."""
+        return 0.0, 0.0, False
+
+    @property
+    def multiplier_sweeps(self):
+        """The most sweeps of the loop."""
+        return 0
+
+    # --- Contact ---
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        """The `Contact` with this wall.
+
+        A wall that is HARD already passes through and nothing else changes; to become hard, return `HARD - wall`. A
+        solution that is unsolved was not found, or its multiplier did not converge.
+        """
+        raise NotImplementedError
+
+    @outlined
+    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+        """What `flight` or `contact` left, as the `Contact` that it is, and its status.
+
+        Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
+        """
+        raise NotImplementedError

@@ -158,7 +158,7 @@ def of_steps(scene: Scene) -> tuple[Any, ...]:
 # --- As kernels know it -----------------------------------------------------------------------------------
 
 
-class Steps(Record):
+class Steps(contract.MethodNumbers):
     """A method of steps, with the fields `dt`, `longest`, `factor` and `moving`: the walls of a step, and its ends."""
 
     point = 1.0  # the part of a step after which it takes its force
@@ -183,6 +183,20 @@ class Steps(Record):
         """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
         return False if self.longest is None else square(p) > self.longest * self.longest
 
+    def constants(self, mass, energy, scale2):
+        return 2.0 * energy, self.factor / mass, 0.0
+
+    def own(self, first, second, third):
+        return Own(first, second, third)
+
+    @property
+    def dissipates(self):
+        return self.moving is not None
+
+    def walls_of(self, chain, left):
+        # Of all walls: each part of a step asks for those that it needs.
+        return chain
+
 
 class Numbers(Steps):
     """A method with soft walls as kernels know it; each method has its own subclass."""
@@ -198,6 +212,34 @@ class Numbers(Steps):
         """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
         raise NotImplementedError
 
+    def flight(self, chain, gravity, lane):
+        """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
+        dt = self.dt
+        # One too many by round-off starts a contact 1e-16 deep: harmless.
+        steps = np.floor(safe.free_time(chain, gravity, lane.r, lane.v, lane.left * dt) * (1.0 / dt))
+        steps = select(steps < lane.left, steps, lane.left)
+        t = steps * dt
+        start = contract.Lane(
+            lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
+            lane.own,
+        )  # fmt: skip
+        to_point = during(chain, start.left * dt, (start.left - self.point) * dt)
+        touched = walls.touched(to_point, start.r, self.reach(self.before(chain, start.left), gravity, start))
+        # Several walls at once, or nested solves: the careful way.
+        alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
+        wall = select(alone, touched.wall, contract.HARD - touched.wall)
+        wall = select(self.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
+        return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
+
+    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+        if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
+            return refused(lane, Status.TOO_FAST.value)
+        step = self.careful_step(chain, gravity, lane, lanes.impulse, i)
+        new = select(walls.outside(self.before(chain, lane.left), -1.0, lane.r), 0.0, 1.0)
+        status = Status.DONE.value if step.solved else Status.UNSOLVED.value
+        twice_energy = lane.own.twice_energy + 2.0 * step.work
+        return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
+
 
 class Own(NamedTuple):
     """The numbers that a lane keeps."""
@@ -207,39 +249,7 @@ class Own(NamedTuple):
     unused: float
 
 
-@contract.constants.register(Steps)
-def _(method, mass, energy, scale2):
-    return 2.0 * energy, method.factor / mass, 0.0
-
-
-contract.own.register(Steps, lambda method, first, second, third: Own(first, second, third))
-contract.dissipates.register(Steps, lambda method: method.moving is not None)
-# Of all walls: each part of a step asks for those that it needs.
-contract.walls_of.register(Steps, lambda method, chain, left: chain)
-
-
 # --- The way to a contact --------------------------------------------------------------------------------
-
-
-@contract.flight.register(Numbers)
-def flight(method, chain, gravity, lane):
-    """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
-    dt = method.dt
-    # One too many by round-off starts a contact 1e-16 deep: harmless.
-    steps = np.floor(safe.free_time(chain, gravity, lane.r, lane.v, lane.left * dt) * (1.0 / dt))
-    steps = select(steps < lane.left, steps, lane.left)
-    t = steps * dt
-    start = contract.Lane(
-        lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
-        lane.own,
-    )  # fmt: skip
-    to_point = during(chain, start.left * dt, (start.left - method.point) * dt)
-    touched = walls.touched(to_point, start.r, method.reach(method.before(chain, start.left), gravity, start))
-    # Several walls at once, or nested solves: the careful way.
-    alone = (touched.number <= 1.0) & (not isinstance(method.form, MeanValue))
-    wall = select(alone, touched.wall, contract.HARD - touched.wall)
-    wall = select(method.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
-    return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
 
 
 # --- The contact -----------------------------------------------------------------------------------------
@@ -281,17 +291,6 @@ class Careful(NamedTuple):
     v: Vec
     solved: bool
     work: float
-
-
-@contract.hard_pass.register(Numbers)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    if method.is_too_fast(displacement(gravity, lane.v, method.dt)):
-        return refused(lane, Status.TOO_FAST.value)
-    step = method.careful_step(chain, gravity, lane, lanes.impulse, i)
-    new = select(walls.outside(method.before(chain, lane.left), -1.0, lane.r), 0.0, 1.0)
-    status = Status.DONE.value if step.solved else Status.UNSOLVED.value
-    twice_energy = lane.own.twice_energy + 2.0 * step.work
-    return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
 
 
 def refused(lane, status):

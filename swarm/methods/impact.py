@@ -135,7 +135,7 @@ def _bend(scene: Scene) -> float:
 
 
 def _is_straight(surface: Surface) -> bool:
-    return surface.motion is None and all(flat(wall) for wall in surface.walls())
+    return surface.motion is None and all(wall.flat for wall in surface.walls())
 
 
 def _require_reacting(scene: Scene) -> None:
@@ -175,7 +175,7 @@ class Lasting(NamedTuple):
     sliding_tolerance: float  # a crossing
 
 
-class Reflection(NamedTuple):
+class Reflection(contract.MethodNumbers):
     """What kernels know of the method with the exact reflection: `Lasting` and the laws of the walls."""
 
     size: float
@@ -185,6 +185,61 @@ class Reflection(NamedTuple):
     shortest_length: float
     sliding_tolerance: float
     laws: Any  # None or `Laws`
+
+    def constants(self, mass, energy, scale2):
+        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
+        # its velocity at the start of the frame, on whose ends no contact may depend
+        twice_energy = 2.0 * energy
+        moving = twice_energy > 0.0
+        half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
+        slow = (self.shortest_flight * scale2 + self.shortest_length * math.sqrt(scale2)) / self.size
+        return twice_energy, half_inverse, slow
+
+    def own(self, first, second, third):
+        return ImpactOwn(Energy(first, second), third)
+
+    @property
+    def dissipates(self):
+        return self.laws is not None
+
+    def instant(self, v):
+        speed2 = square(v) + self.fall2
+        return _INSTANT * self.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
+
+    holds = True
+
+    @property
+    def friction(self):
+        return wall_laws.friction(self.laws)
+
+    @property
+    def thermal(self):
+        return wall_laws.thermal(self.laws)
+
+    def land(self, chain, gravity, lane, hit):
+        t = select(hit.time < lane.left, hit.time, lane.left)
+        return contract.Flight(
+            lane.r + displacement(gravity, lane.v, t),
+            accelerated(gravity, lane.v, t),
+            lane.left - t,
+            select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
+        )
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        bounce = exact(self.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
+        hit = wall >= 0.0
+        impulse = select(hit, bounce.impulse, 0.0)
+        return contract.Contact(
+            lane.r,
+            select(hit, bounce.v, kept(lane.v)),
+            lane.left,
+            wall,
+            impulse,
+            select(_is_within(self, lane, impulse, _NO_IMPACT), 0.0, 1.0),
+            select(hit, bounce.twice_energy, lane.own.energy.twice),
+            hit & _is_within(self, lane, bounce.twice_away, 1.0),
+            select(hit, 0.5 * bounce.work, 0.0),
+        )
 
 
 class ImpactOwn(NamedTuple):
@@ -197,55 +252,8 @@ class ImpactOwn(NamedTuple):
 # --- One pass --------------------------------------------------------------------------------------------
 
 
-@contract.constants.register(Reflection)
-@contract.constants.register(Chord)
-def _(method, mass, energy, scale2):
-    # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
-    # its velocity at the start of the frame, on whose ends no contact may depend
-    twice_energy = 2.0 * energy
-    moving = twice_energy > 0.0
-    half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
-    slow = (method.shortest_flight * scale2 + method.shortest_length * math.sqrt(scale2)) / method.size
-    return twice_energy, half_inverse, slow
-
-
-@contract.own.register(Reflection)
-@contract.own.register(Chord)
-def _(method, first, second, third):
-    return ImpactOwn(Energy(first, second), third)
-
-
-@contract.dissipates.register(Reflection)
-def _(method):
-    return method.laws is not None
-
-
-@contract.instant.register(Reflection)
-@contract.instant.register(Chord)
-def _(method, v):
-    speed2 = square(v) + method.fall2
-    return _INSTANT * method.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
-
-
-contract.holds.register(Reflection, lambda method: True)
 contract.holds.register(Chord, lambda method: True)
-contract.laws.register(Reflection, lambda method: method.laws)
-contract.friction.register(Reflection, lambda method: wall_laws.friction(method.laws))
-contract.thermal.register(Reflection, lambda method: wall_laws.thermal(method.laws))
-contract.sliding_tolerance.register(Reflection, lambda method: method.sliding_tolerance)
 contract.sliding_tolerance.register(Chord, lambda method: method.sliding_tolerance)
-
-
-@contract.land.register(Reflection)
-@contract.land.register(Chord)
-def _(method, chain, gravity, lane, hit):
-    t = select(hit.time < lane.left, hit.time, lane.left)
-    return contract.Flight(
-        lane.r + displacement(gravity, lane.v, t),
-        accelerated(gravity, lane.v, t),
-        lane.left - t,
-        select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
-    )
 
 
 # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
@@ -259,21 +267,3 @@ def _is_within(method, lane, speed, part):
     speed2 = (square(lane.v) + method.fall2) / (method.size * method.size)
     by_time, by_length = method.shortest_flight * method.size * speed2, method.shortest_length
     return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
-
-
-@contract.contact.register(Reflection)
-def _(method, chain, gravity, lane, wall, solution):
-    bounce = exact(method.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
-    hit = wall >= 0.0
-    impulse = select(hit, bounce.impulse, 0.0)
-    return contract.Contact(
-        lane.r,
-        select(hit, bounce.v, kept(lane.v)),
-        lane.left,
-        wall,
-        impulse,
-        select(_is_within(method, lane, impulse, _NO_IMPACT), 0.0, 1.0),
-        select(hit, bounce.twice_energy, lane.own.energy.twice),
-        hit & _is_within(method, lane, bounce.twice_away, 1.0),
-        select(hit, 0.5 * bounce.work, 0.0),
-    )

@@ -54,6 +54,37 @@ class RuleNumbers(fixed_step.Numbers):
         step = self.end(before, gravity, lane, point, corner.total(reactions))
         return fixed_step.Careful(step.r, step.v, solved, work)
 
+    def most_sweeps(self, chain):
+        return implicit.SWEEPS
+
+    def guess(self, chain, gravity, lane, wall):
+        r = self.free(chain, gravity, lane)
+        touching = wall >= 0.0
+        kappa = implicit.guess(self.there(chain, lane), wall, self.law, r, lane.own.over_mass)
+        return select(touching, kappa, 0.0), touching
+
+    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+        r, kappa = self.free(chain, gravity, lane), solution.kappa
+        there = self.there(chain, lane)
+        step, more = implicit.improve(there, wall, self.law, r, lane.own.over_mass, kappa)
+        return select(solution.unsolved, kappa - step, kappa), solution.unsolved & more, contract.NO_RECORD
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        r, there = self.free(chain, gravity, lane), self.there(chain, lane)
+        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+        point = implicit.reached(there, wall, r, solution.kappa)
+        step = self.end(before, gravity, lane, point, r - point)
+        touching = wall >= 0.0
+        # Another wall at s, or an equation that is not solved yet: the careful way.
+        solved = (not solution.unsolved) & (not walls.outside(there, wall, point))
+        # The midpoint rule may end outside before it feels a force.
+        inside = not walls.outside(before, -1.0, lane.r)
+        new = inside & (touching | walls.outside(after, -1.0, step.r))
+        # One wall alone has a part in the kick.
+        work = contract.work_along(self.moving, over, wall, -1.0 / self.dt * step.kick)
+        taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
+        return fixed_step.contact(lane, wall, taken)
+
 
 def numbers(method: fixed_step.SoftWalls, scene: Scene, kind: type[RuleNumbers]) -> RuleNumbers:
     """The numbers of a method whose rule this is."""
@@ -64,42 +95,3 @@ def numbers(method: fixed_step.SoftWalls, scene: Scene, kind: type[RuleNumbers])
 
 
 # --- One pass --------------------------------------------------------------------------------------------
-
-
-@contract.most_sweeps.register(RuleNumbers)
-def _(method, chain):
-    return implicit.SWEEPS
-
-
-@contract.guess.register(RuleNumbers)
-def _(method, chain, gravity, lane, wall):
-    r = method.free(chain, gravity, lane)
-    touching = wall >= 0.0
-    kappa = implicit.guess(method.there(chain, lane), wall, method.law, r, lane.own.over_mass)
-    return select(touching, kappa, 0.0), touching
-
-
-@contract.improve.register(RuleNumbers)
-def _(method, chain, gravity, lane, wall, solution, multiplier):
-    r, kappa = method.free(chain, gravity, lane), solution.kappa
-    there = method.there(chain, lane)
-    step, more = implicit.improve(there, wall, method.law, r, lane.own.over_mass, kappa)
-    return select(solution.unsolved, kappa - step, kappa), solution.unsolved & more, contract.NO_RECORD
-
-
-@contract.contact.register(RuleNumbers)
-def _(method, chain, gravity, lane, wall, solution):
-    r, there = method.free(chain, gravity, lane), method.there(chain, lane)
-    before, over, after = method.before(chain, lane.left), method.over(chain, lane.left), method.after(chain, lane.left)
-    point = implicit.reached(there, wall, r, solution.kappa)
-    step = method.end(before, gravity, lane, point, r - point)
-    touching = wall >= 0.0
-    # Another wall at s, or an equation that is not solved yet: the careful way.
-    solved = (not solution.unsolved) & (not walls.outside(there, wall, point))
-    # The midpoint rule may end outside before it feels a force.
-    inside = not walls.outside(before, -1.0, lane.r)
-    new = inside & (touching | walls.outside(after, -1.0, step.r))
-    # One wall alone has a part in the kick.
-    work = contract.work_along(method.moving, over, wall, -1.0 / method.dt * step.kick)
-    taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
-    return fixed_step.contact(lane, wall, taken)

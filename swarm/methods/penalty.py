@@ -92,49 +92,41 @@ class PenaltyNumbers(fixed_step.Numbers):
         factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
         return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)
 
+    def most_sweeps(self, chain):
+        return contact_impulse.NEWTON_STEPS
+
+    def guess(self, chain, gravity, lane, wall):
+        over = self.over(chain, lane.left)
+        kappa = contact_impulse.guess(over, wall, self.law, self.free(gravity, lane))
+        touching = wall >= 0.0
+        return select(touching, kappa, 0.0), touching
+
+    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+        kappa, unsolved = solution.kappa, solution.unsolved
+        over = self.over(chain, lane.left)
+        newton = contact_impulse.improve(over, wall, self.law, None, self.free(gravity, lane), kappa)
+        return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
+        h, kappa = self.dt, solution.kappa
+        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        step = self.free(gravity, lane)
+        touching = wall >= 0.0
+        r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
+        # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
+        g = walls.inner_gradient(over, wall, step.r, r1)
+        f = select(touching, 2.0 / h * kappa, 0.0)
+        v1 = accelerated(gravity, lane.v, h) - f * g
+        work = contract.work_along(self.moving, over, wall, -f / h * g)
+
+        # A push into another wall, or an equation that is not solved yet: the careful way.
+        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
+        solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
+        solved = solved & (not walls.outside(after, wall, r1))
+        new = touching & (not walls.outside(over, -1.0, lane.r))
+        taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
+        return fixed_step.contact(lane, wall, taken)
+
 
 # --- One pass --------------------------------------------------------------------------------------------
-
-
-@contract.most_sweeps.register(PenaltyNumbers)
-def _(method, chain):
-    return contact_impulse.NEWTON_STEPS
-
-
-@contract.guess.register(PenaltyNumbers)
-def _(method, chain, gravity, lane, wall):
-    over = method.over(chain, lane.left)
-    kappa = contact_impulse.guess(over, wall, method.law, method.free(gravity, lane))
-    touching = wall >= 0.0
-    return select(touching, kappa, 0.0), touching
-
-
-@contract.improve.register(PenaltyNumbers)
-def _(method, chain, gravity, lane, wall, solution, multiplier):
-    kappa, unsolved = solution.kappa, solution.unsolved
-    over = method.over(chain, lane.left)
-    newton = contact_impulse.improve(over, wall, method.law, None, method.free(gravity, lane), kappa)
-    return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
-
-
-@contract.contact.register(PenaltyNumbers)
-def _(method, chain, gravity, lane, wall, solution):
-    # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
-    h, kappa = method.dt, solution.kappa
-    over, after = method.over(chain, lane.left), method.after(chain, lane.left)
-    step = method.free(gravity, lane)
-    touching = wall >= 0.0
-    r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
-    # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-    g = walls.inner_gradient(over, wall, step.r, r1)
-    f = select(touching, 2.0 / h * kappa, 0.0)
-    v1 = accelerated(gravity, lane.v, h) - f * g
-    work = contract.work_along(method.moving, over, wall, -f / h * g)
-
-    # A push into another wall, or an equation that is not solved yet: the careful way.
-    factor, balanced = method.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-    solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
-    solved = solved & (not walls.outside(after, wall, r1))
-    new = touching & (not walls.outside(over, -1.0, lane.r))
-    taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
-    return fixed_step.contact(lane, wall, taken)

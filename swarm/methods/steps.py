@@ -153,17 +153,15 @@ class CutSteps(Numbers):
         end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
         return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value
 
+    def land(self, chain, gravity, lane, hit):
+        met = hit.time <= lane.left
+        t = select(met, hit.time, lane.left)
+        r = lane.r + t * lane.v
+        left = lane.left - t
+        # A hit in the last instant of a frame is met again in the next one.
+        met = met & (hit.wall >= 0.0) & (left > 0.0)
+        wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
+        return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+
 
 contract.flight.register(FixedSteps, fixed_step.flight)
-
-
-@contract.land.register(CutSteps)
-def _(method, chain, gravity, lane, hit):
-    met = hit.time <= lane.left
-    t = select(met, hit.time, lane.left)
-    r = lane.r + t * lane.v
-    left = lane.left - t
-    # A hit in the last instant of a frame is met again in the next one.
-    met = met & (hit.wall >= 0.0) & (left > 0.0)
-    wall = select(isinstance(method.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-    return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))

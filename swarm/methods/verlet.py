@@ -60,6 +60,12 @@ class VerletNumbers(fixed_step.Numbers):
         work += add_works(self.moving, over, after, law, over_mass / self.dt, step.r, impulse, i)
         return fixed_step.Careful(step.r, step.v, True, work)
 
+    def contact(self, chain, gravity, lane, wall, solution):
+        step = _step(self, chain, gravity, lane)
+        new = (wall >= 0.0) & (not walls.outside(self.before(chain, lane.left), -1.0, lane.r))
+        taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
+        return fixed_step.contact(lane, wall, taken)
+
 
 # --- One pass --------------------------------------------------------------------------------------------
 
@@ -83,11 +89,3 @@ def _step(method, chain, gravity, lane):
     kick = over_mass * (f0 + force(after, method.law, r1))
     given = work(method.moving, over, before, method.law, lane.r) + work(method.moving, over, after, method.law, r1)
     return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
-
-
-@contract.contact.register(VerletNumbers)
-def _(method, chain, gravity, lane, wall, solution):
-    step = _step(method, chain, gravity, lane)
-    new = (wall >= 0.0) & (not walls.outside(method.before(chain, lane.left), -1.0, lane.r))
-    taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
-    return fixed_step.contact(lane, wall, taken)

@@ -49,19 +49,15 @@ class Flight(NamedTuple):
 class Falling(Posed):
     """A wall at one instant of a free motion with a constant acceleration, or none."""
 
+    def first_hit(self, r, v):
+        return self.body.first_hit(r - self.pose.shift, v - self.pose.velocity)
+
+    def falling_hit(self, r, v, pull):
+        way, speed = r - self.pose.shift, v - self.pose.velocity
+        return self.body.falling_hit(way, speed, pull - self.pose.acceleration)
+
 
 _AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
-
-
-@contract.first_hit.register(Falling)
-def _(surface, r, v):
-    return contract.first_hit(surface.body, r - surface.pose.shift, v - surface.pose.velocity)
-
-
-@contract.falling_hit.register(Falling)
-def _(surface, r, v, pull):
-    way, speed = r - surface.pose.shift, v - surface.pose.velocity
-    return contract.falling_hit(surface.body, way, speed, pull - surface.pose.acceleration)
 
 
 class Freedom(Record):

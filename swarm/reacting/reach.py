@@ -45,7 +45,7 @@ def clear_of(body, r):
         for part in reversed(each(body.parts)):
             clear = max(_out_of(part.first, r), clear)
         return clear
-    return contract.clearance(body, r)
+    return body.clearance(r)
 
 
 def _out_of(part, r):
@@ -53,12 +53,12 @@ def _out_of(part, r):
     if isinstance(part, Rotated):
         return _out_of(part.body, rotated_own(part, r))
     if isinstance(part, (PlaneNumbers, SlabNumbers, SphereNumbers)):
-        return -contract.gap_of(part, contract.inner(part, r))
+        return -part.gap_of(part.inner(r))
     if isinstance(part, QuadricNumbers):
         # phi over its gradient is no more than the distance where phi is convex.
         convex = min(part.a.x, part.a.y, part.a.z) >= 0.0
-        steepness = norm(contract.gradient(part, r))
-        out = -contract.gap_of(part, contract.inner(part, r)) / select(steepness > 0.0, steepness, 1.0)
+        steepness = norm(part.gradient(r))
+        out = -part.gap_of(part.inner(r)) / select(steepness > 0.0, steepness, 1.0)
         return select(convex, out, 0.0)
     return 0.0
 

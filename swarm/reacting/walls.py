@@ -36,10 +36,10 @@ class Reacting(Record):
         surface = freedom.posed(self.body, walls, flight.time)
         # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next
         # time.
-        r = contract.settle(surface, flight.r)
-        n, arm = contract.unit_normal(surface, r), freedom.arm(r)
+        r = surface.settle(flight.r)
+        n, arm = surface.unit_normal(r), freedom.arm(r)
         # J = (1 + e) n.(v - u)/(n^2/m + 1/M_n)
-        speed = dot(n, contract.velocity(surface, r))
+        speed = dot(n, surface.velocity(r))
         approach = dot(n, flight.v) - speed
         approach = select(approach > 0.0, approach, 0.0)
         give = freedom.mobility(n, arm)

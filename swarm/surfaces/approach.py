@@ -107,12 +107,12 @@ def place(gravity, r, v, t, last):
 @outlined
 def _first_hit(surface, gravity, r, v):
     """`first_hit` with or without gravity."""
-    t, last = contract.near(surface, gravity, r, v).first_step()
+    t, last = surface.near(gravity, r, v).first_step()
     for _step in range(_STEPS):
         if not under_way(t, last):
             break
         p, w = place(gravity, r, v, t, last)
-        t, last = contract.near(surface, gravity, p, w).next_step(t, last)
+        t, last = surface.near(gravity, p, w).next_step(t, last)
     return t, not under_way(t, last)
 
 
@@ -128,7 +128,7 @@ def _(surface, r, v, pull):
 
 @contract.near.implies(contract.safe_time)
 def _(surface, r, v, pull):
-    level = contract.near(surface, Gravity(pull.x, pull.y, pull.z), r, v)
+    level = surface.near(Gravity(pull.x, pull.y, pull.z), r, v)
     return select(level.c > 0.0, 0.0, level.first_step()[0])
 
 
@@ -140,7 +140,7 @@ contract.near.implies(flights.in_steps)(lambda surface: 1.0)
 @contract.near.implies(flights.begin_wall)
 def _(surface, gravity, course, row, lane, r, v):
     if _in_steps(surface, gravity):
-        level = contract.near(surface, gravity, r, v)
+        level = surface.near(gravity, r, v)
         course[row + flights.TIME, lane], course[row + flights.LAST, lane] = level.first_step()
     else:
         flights.begin_whole(gravity, surface, course, row, lane, r, v)
@@ -150,7 +150,7 @@ def _(surface, gravity, course, row, lane, r, v):
 def _(surface, gravity, course, row, lane, r, v):
     if _in_steps(surface, gravity):
         t, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
-        level = contract.near(surface, gravity, *place(gravity, r, v, t, last))
+        level = surface.near(gravity, *place(gravity, r, v, t, last))
         course[row + flights.TIME, lane], course[row + flights.LAST, lane] = level.next_step(t, last)
 
 

@@ -26,21 +26,21 @@ NEVER = Hit(math.inf, 0.0)
 
 def of_flights(falls):
     """What the free flights of a method ask of every wall, with gravity or without."""
-    return (contract.falling_hit if falls else contract.first_hit,)
+    return ("falling_hit" if falls else "first_hit",)
 
 
 def of_steps(falls):
     """The same for whole steps, some of which are jumped over."""
     # The loops of a fall are compiled for every method.
-    free = (contract.safe_time, contract.falling_hit) if falls else (contract.first_hit,)
-    return *free, contract.inner, contract.level_of
+    free = ("safe_time", "falling_hit") if falls else ("first_hit",)
+    return *free, "inner", "level_of"
 
 
 def hit(gravity, surface, r, v):
     """When the free flight leaves the admissible side of one wall: (time, whether it does then)."""
     if gravity is None:
-        return contract.first_hit(surface, r, v)
-    return contract.falling_hit(surface, r, v, as_vector(gravity))
+        return surface.first_hit(r, v)
+    return surface.falling_hit(r, v, as_vector(gravity))
 
 
 def first_hit(chain, gravity, r, v):
@@ -105,8 +105,8 @@ def begin_wall(surface, gravity, course, row, lane, r, v):
 
 def begin_whole(gravity, surface, course, row, lane, r, v):
     """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
-    if gravity is not None and contract.is_quartic(surface):
-        level = contract.course(surface, r, v, as_vector(gravity))
+    if gravity is not None and surface.is_quartic:
+        level = surface.course(r, v, as_vector(gravity))
         course[row, lane], course[row + 1, lane], course[row + 2, lane] = level.c, level.b, level.a2
         course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane] = level.a3, level.a4, level.window
         course[row + TIME, lane], course[row + LAST, lane] = leave(level)
@@ -125,13 +125,13 @@ def step(chain, gravity, course, row, lane, r, v):
 @by_type
 def step_wall(surface, gravity, course, row, lane, r, v):
     """The same of one wall: of one whose level along the flight is known as a whole, or whose hit is."""
-    if gravity is not None and contract.is_quartic(surface):
+    if gravity is not None and surface.is_quartic:
         level = Quartic(
             course[row, lane], course[row + 1, lane], course[row + 2, lane],
             course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane],
         )  # fmt: skip
         course[row + TIME, lane], course[row + LAST, lane] = safe_step(
-            contract.may_be_far(surface), level, course[row + _CLOSE, lane],
+            surface.may_be_far, level, course[row + _CLOSE, lane],
             course[row + TIME, lane], course[row + LAST, lane],
         )  # fmt: skip
 
@@ -167,7 +167,7 @@ def other_hit(chain, wall, r, v):
     first, links = NEVER, each(chain)
     # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
     for k, link in reversed(tuple(enumerate(links if len(links) > 1 else ()))):
-        time, _found = contract.first_hit(link.first, r, v)
+        time, _found = link.first.first_hit(r, v)
         use = (first.time < time) | (wall == k)
         first = Hit(select(use, first.time, time), select(use, first.wall + 1.0, 0.0))
     return first
@@ -187,6 +187,6 @@ def safe_time(chain, r, v, pull):
     """The smallest safe time of all walls."""
     shortest = math.inf
     for link in reversed(each(chain)):
-        time = contract.safe_time(link.first, r, v, pull)
+        time = link.first.safe_time(r, v, pull)
         shortest = select(shortest < time, shortest, time)
     return shortest

@@ -137,13 +137,13 @@ def shortest_pace(chain):
     """The shortest pace of all walls."""
     shortest = math.inf
     for link in reversed(each(chain)):
-        shortest = min(contract.pace(link.first), shortest)
+        shortest = min(link.first.pace(), shortest)
     return shortest
 
 
 def chord_sweeps(chain):
     """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
-    return max((0, *(contract.chord_sweeps(link.first) for link in each(chain))))
+    return max((0, *(link.first.chord_sweeps for link in each(chain))))
 
 
 def outside(chain, wall, r):
@@ -154,7 +154,7 @@ def outside(chain, wall, r):
             found = link.first.is_in_another(wall, r) | found
             wall = wall - count(link.first)
         else:
-            here = contract.level_of(link.first, contract.inner(link.first, r)) > 0.0
+            here = link.first.level_of(link.first.inner(r)) > 0.0
             found = (here & (wall != 0.0)) | found
             wall = wall - 1.0
     return found
@@ -164,7 +164,7 @@ def pushes(chain, wall, kappa):
     """Whether this wall can push with kappa: in its direction and short of the pole."""
     found = False
     for k, link in enumerate(each(chain)):
-        farthest = contract.farthest_push(link.first)
+        farthest = link.first.farthest_push()
         here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
         found = ((wall == k) & here) | found
     return found
@@ -181,8 +181,8 @@ def touched(chain, r, p):
     """The walls that a step with free displacement p is in contact with."""
     found = Touched(-1.0, 0.0)
     for link in reversed(each(chain)):
-        before = contract.level_of(link.first, contract.inner(link.first, r))
-        after = contract.level_of(link.first, contract.end_inner(link.first, r + p))
+        before = link.first.level_of(link.first.inner(r))
+        after = link.first.level_of(link.first.end_inner(r + p))
         contact = (before > 0.0) | (after > 0.0)
         later = select(found.number > 0.0, found.wall + 1.0, -1.0)
         found = Touched(select(contact, 0.0, later), found.number + select(contact, 1.0, 0.0))

@@ -52,7 +52,7 @@ def march(surface, r, v, pull):
             _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
             before, t = t, t + step
             continue
-        if not step < math.inf or (straight and contract.passed(surface, p, w)):
+        if not step < math.inf or (straight and surface.passed(p, w)):
             return math.inf, True
         before, t = t, t + step
         # At t = 0 the sign of the approach decides, which rise_time has seen to.
@@ -68,7 +68,7 @@ def bisected(surface, r, v, pull, low, high):
         t = 0.5 * (low + high)
         if not low < t < high:
             break
-        if contract.level_of(surface, contract.inner(surface, r + t * (v + (0.5 * t) * pull))) > 0.0:
+        if surface.level_of(surface.inner(r + t * (v + (0.5 * t) * pull))) > 0.0:
             high = t
         else:
             low = t
@@ -93,11 +93,11 @@ def _safe_step(surface, r, v, pull, slack):
 
     With a slack the level counts as so much below 0.
     """
-    n = contract.slope(surface, r)
-    side, level = surface.side, contract.level_of(surface, contract.inner(surface, r))
+    n = surface.slope(r)
+    side, level = surface.side, surface.level_of(surface.inner(r))
     level = select(slack > 0.0, min(level, -slack), level)
     half = 0.5 * side * dot(n, v)
-    most, magnitude, reach = contract.bend(surface, r)
+    most, magnitude, reach = surface.bend(r)
     speed2 = square(v)
     speed, g = math.sqrt(speed2), norm(pull)
     # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q turns by 2 H s at most
@@ -114,7 +114,7 @@ def _safe_step(surface, r, v, pull, slack):
         shorter = min(reach, max(2.0 * _travelled(speed, g, step), -0.5 * m0 / m1))
         within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), _time_to_travel(speed, g, shorter))
         step = max(step, within)
-    clear = contract.clearance(surface, r)
+    clear = surface.clearance(r)
     if clear > 0.0:
         step = max(step, _time_to_travel(speed, g, clear))
     return level, half, step, _travelled(speed, g, step), norm(n)

@@ -98,7 +98,7 @@ def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: floa
 
 def _may_stride(walls: list[Any]) -> bool:
     """Whether lanes can take the safe steps of the walls of a surface; of a spline each would look for its piece."""
-    return walls[0].drive.track is None and all(contract.has_levels(wall.body) for wall in walls)
+    return walls[0].drive.track is None and all(wall.body.has_levels for wall in walls)
 
 
 def walls_of(surface: Surface, moment: float) -> list[Any]:

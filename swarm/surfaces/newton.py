@@ -21,10 +21,10 @@ def _(surface, r0, p, kappa):
 def _(surface, r0, p, kappa):
     d = _moved(surface, r0, p, kappa)
     r1 = r0 + d
-    g = contract.inner_gradient(surface, r0, r1)
+    g = surface.inner_gradient(r0, r1)
     # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
     f = _unpushed(surface, r0 + 0.5 * d, kappa, g)
-    return dot(g, d), -dot(f, contract.slope(surface, r1))
+    return dot(g, d), -dot(f, surface.slope(r1))
 
 
 @outlined
@@ -33,7 +33,7 @@ def _moved(surface, r0, p, kappa):
     d = _unpushed(surface, r0, kappa, p)
     size, previous = largest(p), math.inf
     for _i in range(_ITERATIONS):
-        g = contract.inner_gradient(surface, r0, r0 + d)
+        g = surface.inner_gradient(r0, r0 + d)
         f = _unpushed(surface, r0 + 0.5 * d, kappa, d - p + kappa * g)
         d, change = d - f, largest(f)
         if _converged(change, previous, max(size, abs(kappa) * largest(g))):
@@ -52,7 +52,7 @@ def _resolved(surface, r, strength):
     """The s of `resolve`; NaN where it does not converge."""
     s, size, previous = r, largest(r), math.inf
     for _i in range(_ITERATIONS):
-        g = contract.slope(surface, s)
+        g = surface.slope(s)
         f = _unpushed(surface, s, 2.0 * strength, s - r + strength * g)
         s, change = s - f, largest(f)
         if _converged(change, previous, max(size, abs(strength) * largest(g))):
@@ -63,7 +63,7 @@ def _resolved(surface, r, strength):
 
 def _unpushed(surface, r, strength, f):
     """(I + strength H)^-1 f, H at a point, by the adjugate."""
-    h = contract.hessian(surface, r)
+    h = surface.hessian(r)
     a, b, c = 1.0 + strength * h.xx, 1.0 + strength * h.yy, 1.0 + strength * h.zz
     d, e, g = strength * h.xy, strength * h.yz, strength * h.zx
     aa, ab, ac = b * c - e * e, g * e - d * c, d * e - g * b

@@ -163,10 +163,10 @@ def outside(volume, r):
     if isinstance(volume, Field):
         return -volume.first.deepest_in_cell(r)
     if volume is not None and not isinstance(volume, Chain):
-        return -contract.distance(volume, r)
+        return -volume.distance(r)
     farthest = -math.inf
     for link in reversed(each(volume)):
-        here = contract.distance(link.first, r)
+        here = link.first.distance(r)
         farthest = select(here <= farthest, farthest, here)
     return farthest
 

@@ -11,7 +11,7 @@ from . import contract
 from .drive import Drive, Pose
 
 
-class Posed(Record):
+class Posed(contract.Smooth):
     """A wall at one instant, or over one step, or a field of them."""
 
     body: Any
@@ -84,6 +84,24 @@ class Posed(Record):
         """The middle of the step, from the end of the frame on."""
         return -0.5 * (self.left + self.after)
 
+    def settle(self, r):
+        return self.pose.place_out(self.drive.center, self.body.settle(self.own_place(r)))
+
+    def outward_acceleration(self, r, v, pull):
+        own_v, own_pull = self.own_velocity(r, v), self.own_pull(r, v, pull)
+        return self.body.outward_acceleration(self.own_place(r), own_v, own_pull)
+
+    def pace(self):
+        return self.drive.pace
+
+    def velocity(self, r):
+        moved, spin = self.pose.velocity, self.drive.spin
+        return moved if spin is None else moved + cross(spin, self.arm(r))
+
+    def acceleration(self, r):
+        moved, spin = self.pose.acceleration, self.drive.spin
+        return moved if spin is None else moved + cross(spin, cross(spin, self.arm(r)))
+
 
 class Drifting(Posed):
     """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
@@ -98,13 +116,24 @@ class Drifting(Posed):
     def until_next_cell(self, r, v):
         return self.body.until_next_cell(*self.own_flight(r, v))
 
+    @property
+    def is_quartic(self):
+        return self.body.is_quartic
+
+    @property
+    def may_be_far(self):
+        return self.body.may_be_far
+
+    def first_hit(self, r, v):
+        return self.body.first_hit(*self.own_flight(r, v))
+
 
 def straight_hit(surface, end, r0, r1):
     """When a straight way from r0 at one instant to r1 at another meets a wall, which is `end` there."""
     if not isinstance(surface, Posed):
-        return contract.first_hit(surface, r0, r1 - r0)
+        return surface.first_hit(r0, r1 - r0)
     own = surface.own_place(r0)
-    return contract.first_hit(surface.body, own, end.own_place(r1) - own)
+    return surface.body.first_hit(own, end.own_place(r1) - own)
 
 
 # --- Its functions ---------------------------------------------------------------------------------------
@@ -128,40 +157,11 @@ _of(
 )  # fmt: skip
 
 
-@contract.settle.register(Posed)
-def _(surface, r):
-    return surface.pose.place_out(surface.drive.center, contract.settle(surface.body, surface.own_place(r)))
-
-
-@contract.outward_acceleration.register(Posed)
-def _(surface, r, v, pull):
-    own_v, own_pull = surface.own_velocity(r, v), surface.own_pull(r, v, pull)
-    return contract.outward_acceleration(surface.body, surface.own_place(r), own_v, own_pull)
-
-
-contract.pace.register(Posed, lambda surface: surface.drive.pace)
-
-
 # A rotation that leaves the surface as it is turns what it is made of.
-
-
-@contract.velocity.register(Posed)
-def _(surface, r):
-    moved, spin = surface.pose.velocity, surface.drive.spin
-    return moved if spin is None else moved + cross(spin, surface.arm(r))
-
-
-@contract.acceleration.register(Posed)
-def _(surface, r):
-    moved, spin = surface.pose.acceleration, surface.drive.spin
-    return moved if spin is None else moved + cross(spin, cross(spin, surface.arm(r)))
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
-contract.is_quartic.register(Drifting, lambda surface: contract.is_quartic(surface.body))
-contract.may_be_far.register(Drifting, lambda surface: contract.may_be_far(surface.body))
-contract.first_hit.register(Drifting, lambda surface, r, v: contract.first_hit(surface.body, *surface.own_flight(r, v)))
 _of(
     lambda f: lambda surface, r, v, pull: f(surface.body, *surface.own_flight(r, v), pull),
     contract.falling_hit, contract.course, contract.safe_time, kind=Drifting,

@@ -80,7 +80,7 @@ def _asked_of(wall: Any, asked: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[An
 def _lacking(wall: Any, function: Any) -> Iterator[str]:
     """What must be registered before a function of a wall's numbers works."""
     definition = function.dispatch(type(wall))
-    if function is contract.falling_hit and contract.is_quartic(wall) and not _gives(wall, contract.course):
+    if function is contract.falling_hit and wall.is_quartic and not _gives(wall, contract.course):
         yield _named(contract.course)
     if definition.__module__ not in _OWN:
         return

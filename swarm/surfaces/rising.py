@@ -106,7 +106,7 @@ for _kind in _LEVELED:
     contract.has_levels.register(_kind, lambda surface: True)
 # Between its planes; of a solid there is one.
 contract.has_levels.register(SlabNumbers, lambda surface: surface.side > 0.0)
-contract.has_levels.register(Rotated, lambda surface: contract.has_levels(surface.body))
+contract.has_levels.register(Rotated, lambda surface: surface.body.has_levels)
 
 
 def needs_bend(body):
@@ -124,10 +124,10 @@ def safe_step(body, seen, longest):
         return _slab_step(body, seen, longest)
     if isinstance(body, _LEVELED):
         return _level_step(level_of(body, seen), body, seen, longest)
-    n, level = contract.slope(body, seen.r), contract.level_of(body, contract.inner(body, seen.r))
+    n, level = body.slope(seen.r), body.level_of(body.inner(seen.r))
     half = 0.5 * body.side * dot(n, seen.v)
-    most, magnitude, reach = contract.bend(body, seen.r)
-    bent = Bent(seen, level, half, norm(n), most, magnitude, reach, contract.clearance(body, seen.r))
+    most, magnitude, reach = body.bend(seen.r)
+    bent = Bent(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
     return Step(level, half, bent.longest(longest))
 
 
@@ -152,7 +152,7 @@ def _entry_step(body, seen, longest):
         part = link.first
         here = safe_step(part, seen, longest)
         # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
-        depth = contract.gap_of(part, contract.inner(part, seen.r))
+        depth = part.gap_of(part.inner(seen.r))
         time = select(depth > noise(part, body.extent, seen.r), 0.0, here.time)
         least = here.level < found.level
         level, half = select(least, here.level, found.level), select(least, here.half, found.half)
@@ -188,9 +188,9 @@ def level_of(body, seen):
         d = r - body.center
         q, bend = square(d), square(v) + dot(d, a)
         return Level(side * (q - body.radius2), side * dot(d, v), side * bend, 2.0 * math.sqrt(q), 1.0)
-    n, most = contract.slope(body, r), absolute(body.a)
+    n, most = body.slope(r), absolute(body.a)
     bend = form(body.a, v, v) + 0.5 * dot(n, a)
-    level = contract.level_of(body, contract.inner(body, r))
+    level = body.level_of(body.inner(r))
     return Level(level, 0.5 * side * dot(n, v), side * bend, norm(n), max(most.x, most.y, most.z))
 
 

@@ -39,16 +39,16 @@ def _(surface, r0, r1, h):
 # --- The step in its frame -------------------------------------------------------------------------------
 
 contract.way.register(Posed, lambda surface: surface.end.shift - surface.pose.shift)
-contract.end_inner.register(Posed, lambda surface, r: contract.inner(surface.body, surface.own_end(r)))
+contract.end_inner.register(Posed, lambda surface, r: surface.body.inner(surface.own_end(r)))
 
 
 @contract.gap_scale.register(Posed)
 def _(surface, r):
     # A place in the frame has the round-off of the displacement and of the time too.
     own = surface.own_place(r)
-    gradient, late = contract.gradient(surface.body, own), surface.drive.late
+    gradient, late = surface.body.gradient(own), surface.drive.late
     moved = total(absolute(times(gradient, surface.pose.shift))) + late * total(absolute(gradient))
-    return contract.gap_scale(surface.body, own) + moved
+    return surface.body.gap_scale(own) + moved
 
 
 def place_scale(surface, s):
@@ -63,7 +63,7 @@ def framed(surface, r, p):
     """What a step is asked of: the surface at rest in its frame, and the step's start and free displacement there."""
     if not isinstance(surface, Posed):
         return surface, r, p
-    return surface.body, surface.own_place(r), p - contract.way(surface)
+    return surface.body, surface.own_place(r), p - surface.way()
 
 
 @contract.push.register(Posed)
@@ -80,7 +80,7 @@ contract.chord_improve.register(
 
 @contract.resolve.register(Posed)
 def _(surface, r, strength):
-    return surface.pose.shift + contract.resolve(surface.body, surface.own_place(r), strength)
+    return surface.pose.shift + surface.body.resolve(surface.own_place(r), strength)
 
 
 def _halfway(surface, n):
@@ -98,10 +98,10 @@ def _halfway(surface, n):
 
 @contract.inner_gradient.register(Posed)
 def _(surface, r0, r1):
-    return _halfway(surface, contract.inner_gradient(surface.body, surface.own_place(r0), surface.own_end(r1)))
+    return _halfway(surface, surface.body.inner_gradient(surface.own_place(r0), surface.own_end(r1)))
 
 
 @contract.step_normal.register(Posed)
 def _(surface, r0, r1):
-    n = _halfway(surface, contract.step_normal(surface.body, surface.own_place(r0), surface.own_end(r1)))
+    n = _halfway(surface, surface.body.step_normal(surface.own_place(r0), surface.own_end(r1)))
     return n if surface.pose.turn is None else n / norm(n)

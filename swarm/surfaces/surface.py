@@ -159,14 +159,14 @@ class Surface:
         rows = self._own_rows(points, time)
         # Where a formula has no value it is NaN, which is outside.
         with np.errstate(all="ignore"):
-            return np.asarray(np.maximum.reduce([contract.phi(wall, rows) for wall in self.walls()]))
+            return np.asarray(np.maximum.reduce([wall.phi(rows) for wall in self.walls()]))
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
-            parts = [np.array(np.broadcast_arrays(*contract.gradient(wall, rows), rows.x)[:3]) for wall in self.walls()]
-            largest = np.argmax([contract.phi(wall, rows) for wall in self.walls()], axis=0)
+            parts = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in self.walls()]
+            largest = np.argmax([wall.phi(rows) for wall in self.walls()], axis=0)
         found = np.asarray(np.choose(largest, parts))
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 

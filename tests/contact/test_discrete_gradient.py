@@ -39,7 +39,7 @@ def vector(function, *arguments):
 def frame(surface, point, direction):
     """A point of the wall, its normal out of the admissible side and a unit tangent."""
     wall = wall_point(surface, point)
-    normal = vector(contract.unit_normal, surface, wall)
+    normal = vector(surface.unit_normal, wall)
     along = direction - (direction @ normal) * normal
     if np.linalg.norm(along) < 1e-3:
         along = np.cross(normal, [0.6, 0.0, 0.8])
@@ -58,7 +58,7 @@ def constraint(law, surface, point):
 
 def uncertainty(surface, *points):
     """How far gaps move when positions move by round-off."""
-    return 16 * EPSILON * max(call(contract.gap_scale, surface, point) for point in points)
+    return 16 * EPSILON * max(call(surface.gap_scale, point) for point in points)
 
 
 def steepest(law, surface, *points):
@@ -68,8 +68,8 @@ def steepest(law, surface, *points):
 
 def gap_gradient(surface, point):
     """The gradient of the gap."""
-    q = call(contract.inner, surface, point)
-    return call(contract.gap_slope, surface, q, q)[0] * vector(contract.inner_gradient, surface, point, point)
+    q = call(surface.inner, point)
+    return call(surface.gap_slope, q, q)[0] * vector(surface.inner_gradient, point, point)
 
 
 def size(vector):
@@ -260,14 +260,14 @@ def test_equal_levels_take_the_one_sided_limit(name, point, depth, direction):
     r0 = wall + depth * normal
     # Along a plane, else the mirror image in x.
     r1 = r0 + 0.2 * tangent if name == "plane" else np.array([2.0 * surface.center.x - r0[0], *r0[1:]])
-    outward = vector(contract.unit_normal, surface, wall_point(surface, r1))
-    q0 = call(contract.inner, surface, r0)
+    outward = vector(surface.unit_normal, wall_point(surface, r1))
+    q0 = call(surface.inner, r0)
     for law in LAWS.values():
-        slope = call(law.constraint_gradient, gap(surface, r0)) * call(contract.gap_slope, surface, q0, q0)[0]
+        slope = call(law.constraint_gradient, gap(surface, r0)) * call(surface.gap_slope, q0, q0)[0]
         for shift in (0.0, 1e-12, 1e-8, -1e-8, 1e-4, -1e-4):
             end = r1 + shift * outward
             d = vector(forms.composite, law, surface, r0, end)
-            level = vector(contract.inner_gradient, surface, r0, end)
+            level = vector(surface.inner_gradient, r0, end)
             # Phi'' Delta g relative to Phi' is (a - 1)/2 Delta g/g.
             slack = 1e-11 + 100.0 * abs(shift) * exponent_of(law) / gap(surface, r0)
             assert size(d - slope * level) <= slack * size(slope * level) + 1e-15, law
@@ -283,9 +283,9 @@ def test_on_the_surface_at_both_ends(law):
         (swarm.Plane((0.0, 1.0, 0.0)).numbers(), [0.5, 0.0, 0.0], [0.0, 0.0, 2.0]),
     ):
         r0, r1 = np.array(r0), np.array(r1)
-        q0 = call(contract.inner, surface, r0)
-        slope = call(contract.gap_slope, surface, q0, q0)[0] * (1.0 if exponent_of(law) == 1.0 else 0.0)
-        expected = slope * vector(contract.inner_gradient, surface, r0, r1)
+        q0 = call(surface.inner, r0)
+        slope = call(surface.gap_slope, q0, q0)[0] * (1.0 if exponent_of(law) == 1.0 else 0.0)
+        expected = slope * vector(surface.inner_gradient, r0, r1)
         assert vector(forms.composite, law, surface, r0, r1) == pytest.approx(expected, rel=8 * EPSILON, abs=0.0)
 
 
@@ -297,10 +297,10 @@ def test_one_point_inside_and_one_outside(name, point, direction, inside, outsid
     surface = numbers_of(name)
     r0, r1 = pair_of(surface, point, direction, -inside, outside, 0.02)
     assert gap(surface, r0) < 0.0 < gap(surface, r1)
-    rise = call(contract.inner, surface, r1) - call(contract.inner, surface, r0)
+    rise = call(surface.inner, r1) - call(surface.inner, r0)
     for law in LAWS.values():
         d = vector(forms.composite, law, surface, r0, r1)
-        expected = constraint(law, surface, r1) / rise * vector(contract.inner_gradient, surface, r0, r1)
+        expected = constraint(law, surface, r1) / rise * vector(surface.inner_gradient, r0, r1)
         assert d == pytest.approx(expected, rel=1e-12, abs=1e-12 * size(expected))
         assert vector(forms.composite, law, surface, r1, r0) == pytest.approx(d, rel=1e-12, abs=1e-12 * size(d))
 

@@ -41,7 +41,7 @@ class Contact:
     def __init__(self, name, law, point, direction, lean, depth, length, stiffness, reachable=False):
         self.law, self.surface = law, numbers_of(name)
         wall = wall_point(self.surface, point)
-        normal = np.array(call(contract.unit_normal, self.surface, wall))
+        normal = np.array(call(self.surface.unit_normal, wall))
         along = direction - (direction @ normal) * normal
         along /= max(np.linalg.norm(along), 1e-3)
         self.start = wall - depth * normal
@@ -55,10 +55,10 @@ class Contact:
             self.start = wall - depth * normal
 
     def inner_slope(self, point):
-        return call(contract.inner_gradient, self.surface, point, point)
+        return call(self.surface.inner_gradient, point, point)
 
     def gap(self, point):
-        return side_of(self.surface) * contract.phi(self.surface, vec(point))
+        return side_of(self.surface) * self.surface.phi(vec(point))
 
     def energy(self, point):
         """V with 50 digits; its exponent from the law."""
@@ -69,7 +69,7 @@ class Contact:
         """r1 = r0 + p - kappa D(r0, r1), from D alone: it is affine in r1, D0 + B r1."""
         start = exactly(self.start)
         corners = [Vec(*(mp.mpf(i == k) for i in range(3))) for k in range(-1, 3)]
-        zero, *along = (contract.inner_gradient(self.surface, start, corner) for corner in corners)
+        zero, *along = (self.surface.inner_gradient(start, corner) for corner in corners)
         matrix = mp.matrix(3, 3)
         for i, k in itertools.product(range(3), range(3)):
             matrix[i, k] = (i == k) + kappa * (along[k][i] - zero[i])
@@ -79,16 +79,14 @@ class Contact:
     def residual(self, kappa):
         """kappa - c (V1 - V0)/(q1 - q0)."""
         start, end = exactly(self.start), self.end(mp.mpf(float(kappa)))
-        q0, q1 = contract.inner(self.surface, start), contract.inner(self.surface, end)
+        q0, q1 = self.surface.inner(start), self.surface.inner(end)
         if q0 == q1:
             return mp.mpf(float(kappa))
         return mp.mpf(float(kappa)) - mp.mpf(self.c) * (self.energy(end) - self.energy(start)) / (q1 - q0)
 
     def slack(self):
         """How far kappa moves when positions move by round-off, in the stiffest place of the step."""
-        depth = max(
-            call(contract.gap_of, self.surface, call(contract.inner, self.surface, r)) for r in (self.start, self.far)
-        )
+        depth = max(call(self.surface.gap_of, call(self.surface.inner, r)) for r in (self.start, self.far))
         reach = np.linalg.norm(self.start) + np.linalg.norm(self.free) + 1.0
         force = self.c * call(self.law.stiffness, max(depth, 1e-3)) * 2.0
         return 64 * EPSILON * force * reach / np.linalg.norm(self.inner_slope(self.start))
@@ -183,7 +181,7 @@ def test_careful_solves_steps_across_the_cavity(name, law, **step):
     step = Contact(name, law, **step)
     kappa, solved = step.careful()
     assert solved
-    side, pole = side_of(step.surface), abs(contract.farthest_push(step.surface))
+    side, pole = side_of(step.surface), abs(step.surface.farthest_push())
     assert 0.0 <= kappa * side < pole
     # F changes its sign within the round-off of the positions.
     width = 1e-9 * abs(kappa) + step.slack()

@@ -85,7 +85,7 @@ def state_one(name, point, direction, lean, length):
     """A wall point of the surface, and a free displacement out of its admissible side."""
     surface = numbers_of(name)
     start = wall_point(surface, np.asarray(point))
-    normal = np.array(call(contract.unit_normal, surface, start))
+    normal = np.array(call(surface.unit_normal, start))
     along = direction - (direction @ normal) * normal
     along /= max(np.linalg.norm(along), 1e-3)
     return surface, start, length * (lean * normal + math.sqrt(1.0 - lean * lean) * along)
@@ -93,7 +93,7 @@ def state_one(name, point, direction, lean, length):
 
 def stiff(surface, start, times=1.0):
     """c for which a sweep takes 1/(1 + times) off the gap of the wall, were it flat."""
-    slope = np.linalg.norm(call(contract.gradient, surface, start))
+    slope = np.linalg.norm(call(surface.gradient, start))
     return times * C / slope**2
 
 
@@ -118,7 +118,7 @@ def test_the_limit_is_the_reflection(name, acceleration, **contact):
     if gap(surface, start + free) <= 1e-3 * contact["length"]:
         return
     kappa = chord_of(surface, start, free)
-    chord = np.array(call(contract.push, surface, start, free, kappa))
+    chord = np.array(call(surface.push, start, free, kappa))
     loop = Loop([Described(surface)], start, free, acceleration, c=stiff(surface, start, 10.0)).run()
     assert loop.converged
     assert loop.stored <= 1e-28
@@ -244,9 +244,9 @@ def test_the_reflection_multiplier_is_the_fixed_point():
         kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, step_of(start, free, c))
         assert kappa == pytest.approx(chord_of(surface, start, free), rel=1e-6)
         loop = Loop([Described(surface)], start, free, c=c).run()
-        gradient = call(contract.inner_gradient, surface, start, loop.end)
-        q = call(contract.inner, surface, start)
-        slope = call(contract.gap_slope, surface, q, q)[0]
+        gradient = call(surface.inner_gradient, start, loop.end)
+        q = call(surface.inner, start)
+        slope = call(surface.gap_slope, q, q)[0]
         assert multiplier * c * abs(slope) * np.linalg.norm(gradient) == pytest.approx(
             np.linalg.norm(loop.held), rel=1e-6
         )
@@ -325,7 +325,7 @@ def test_the_edge_of_a_sphere_and_a_plane(acceleration):
 def contact_on(name, depth, acceleration, exponent=1.0, tolerance=1e-10):
     """A step of 0.0125 that starts `depth` inside and meets the wall, 50 sweeps at most."""
     surface, start, free = state_one(name, [0.4, -0.7, 0.5], np.array([0.3, 0.5, -0.6]), 0.8, 0.0125)
-    start = start - depth * np.array(call(contract.unit_normal, surface, start))
+    start = start - depth * np.array(call(surface.unit_normal, start))
     # As stiff as a linear spring at the depth 0.01.
     c = stiff(surface, start, 3.0) * 0.01 ** (1.0 - exponent)
     return Loop([Described(surface)], start, free, acceleration, tolerance, 50, c, exponent).run()

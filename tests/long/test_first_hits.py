@@ -84,8 +84,8 @@ def _distance(surface, points):
     sign, off = -1.0 if surface.is_solid() else 1.0, -math.inf
     with np.errstate(all="ignore"):
         for wall in surface.walls():
-            slope = np.sqrt(square(contract.gradient(wall, vec(points))))
-            off = np.maximum(off, sign * contract.phi(wall, vec(points)) / slope)
+            slope = np.sqrt(square(wall.gradient(vec(points))))
+            off = np.maximum(off, sign * wall.phi(vec(points)) / slope)
     return off
 
 

@@ -45,25 +45,25 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
     numbers, chain, gravity = method.numbers(scene), scene.chain(), scene.pull()
     # Twice the energy scale per mass, as `observables.energy_scale` has it
     scale2 = velocity @ velocity + 2.0 * np.abs(scene.gravity or 0.0).sum() * scene.finite_size()
-    constants = call(contract.constants, numbers, mass, energy / mass, scale2)
-    own = call(contract.own, numbers, *map(float, constants))
+    constants = call(numbers.constants, mass, energy / mass, scale2)
+    own = call(numbers.own, *map(float, constants))
     lane = contract.Lane(vec(position), vec(velocity), np.float64(left), 1.0, own)
-    if contract.lands(numbers):
-        end = call(contract.land, numbers, chain, gravity, lane, call(flights.first_hit, chain, gravity, *lane[:2]))
+    if numbers.lands:
+        end = call(numbers.land, chain, gravity, lane, call(flights.first_hit, chain, gravity, *lane[:2]))
     else:
-        end = call(contract.flight, numbers, chain, gravity, lane)
+        end = call(numbers.flight, chain, gravity, lane)
     lane = contract.Lane(end.r, end.v, end.left, 1.0, own)
     kappa, unsolved = 0.0, False
-    if contract.most_sweeps(numbers, chain) > 0:
-        kappa, unsolved = call(contract.guess, numbers, chain, gravity, lane, end.wall)
-    for _ in range(contract.most_sweeps(numbers, chain)):
+    if numbers.most_sweeps(chain) > 0:
+        kappa, unsolved = call(numbers.guess, chain, gravity, lane, end.wall)
+    for _ in range(numbers.most_sweeps(chain)):
         solution = contract.Solution(kappa, unsolved, contract.NOT_TURNED)
-        kappa, unsolved, _record = call(contract.improve, numbers, chain, gravity, lane, end.wall, solution, 0.0)
+        kappa, unsolved, _record = call(numbers.improve, chain, gravity, lane, end.wall, solution, 0.0)
     turned = contract.NOT_TURNED
-    if contract.turns(numbers):
-        turned = call(contract.turn, numbers, chain, gravity, lane, end.wall, kappa)
+    if numbers.turns:
+        turned = call(numbers.turn, chain, gravity, lane, end.wall, kappa)
     solution = contract.Solution(kappa, unsolved, turned)
-    contact = call(contract.contact, numbers, chain, gravity, lane, end.wall, solution)
+    contact = call(numbers.contact, chain, gravity, lane, end.wall, solution)
     impulse, wall = np.zeros((len(scene.surfaces), 1)), contact.wall
     hard = wall <= contract.HARD or contact.lasts
     if contact.lasts:
@@ -73,7 +73,7 @@ def one_pass(method, scene, position, velocity, left, mass=1.0, energy=None):
         wall, lanes = contract.HARD - wall, _Lanes(impulse, np.zeros((uzawa.RECORDS, 1)))
         lane = contract.Lane(contact.r, contact.v, contact.left, 1.0, own)
         with np.errstate(all="ignore"):
-            contact, status = contract.hard_pass(numbers, chain, gravity, lane, wall, lanes, 0)
+            contact, status = numbers.hard_pass(chain, gravity, lane, wall, lanes, 0)
         assert status == Status.DONE, Status(status).name
     elif wall >= 0.0:
         impulse[int(wall), 0] += contact.impulse

@@ -54,7 +54,7 @@ def test_a_step_is_the_rule(rule, name, point, velocity, depth, mass, stiffness,
     method = RULES[rule](dt=0.02, penalty=stiffness * mass / 0.02**2, exponent=exponent)
     numbers = numbers_of(name)
     wall = wall_point(numbers, point)
-    start = wall - depth * np.array(call(surfaces.unit_normal, numbers, wall))
+    start = wall - depth * np.array(call(numbers.unit_normal, wall))
     before = one_pass(method, scene, start, velocity, 1.0, mass)._replace(position=start, velocity=velocity)
     after = one_pass(method, scene, start, velocity, 1.0, mass)
     assert after.left == 0.0

@@ -19,7 +19,7 @@ def approach(scene, point, direction, depth=0.1, lean=0.5):
     """A start `depth` away from the first wall, moving towards it with unit speed."""
     (numbers,) = scene.surfaces[0].walls()
     wall = wall_point(numbers, point)
-    normal = np.array(call(surfaces.unit_normal, numbers, wall))
+    normal = np.array(call(numbers.unit_normal, wall))
     along = direction - (direction @ normal) * normal
     along /= max(np.linalg.norm(along), 1e-3)
     return numbers, wall - depth * normal, lean * normal + math.sqrt(1.0 - lean * lean) * along / np.linalg.norm(along)
@@ -36,7 +36,7 @@ def test_a_pass_reflects_at_the_wall(name, point, direction, speed):
     assert after.surface == 0.0
     assert after.hits == 1.0
     assert abs(gap(numbers, after.position)) <= 64 * EPSILON
-    normal = np.array(call(surfaces.unit_normal, numbers, after.position))
+    normal = np.array(call(numbers.unit_normal, after.position))
     assert after.velocity == pytest.approx(velocity - 2 * (velocity @ normal) * normal, abs=8 * EPSILON * speed)
     assert np.linalg.norm(after.velocity) == pytest.approx(np.linalg.norm(velocity), rel=2 * EPSILON)
     assert after.impulse == pytest.approx([2.0 * velocity @ normal], rel=8 * EPSILON)
@@ -68,14 +68,12 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
     assert after.position - wall == pytest.approx(0.5 * used * (velocity + after.velocity), abs=100 * EPSILON)
     if used > 1e-12:
         # The start is off the wall by the round-off of its making, and the flight from there takes that over the lean.
-        off = abs(call(surfaces.distance, numbers, wall))
+        off = abs(call(numbers.distance, wall))
         assert used == pytest.approx(h, abs=(3.0 + 1.0 / lean) * EPSILON + off / lean)
-        normal = np.array(
-            call(surfaces.chord_normal, numbers, wall, h * velocity, chord_of(numbers, wall, h * velocity))
-        )
+        normal = np.array(call(numbers.chord_normal, wall, h * velocity, chord_of(numbers, wall, h * velocity)))
     else:
         assert side_of(numbers) < 0.0 or name == "plane"
-        normal = np.array(call(surfaces.unit_normal, numbers, wall))
+        normal = np.array(call(numbers.unit_normal, wall))
     assert after.velocity == pytest.approx(velocity - 2.0 * (velocity @ normal) * normal, abs=100 * EPSILON)
 
 

@@ -46,7 +46,7 @@ def test_a_step_conserves_energy(name, exponent, point, velocity, depth, mass, s
     method = swarm.Penalty(dt=0.02, penalty=stiffness * mass / 0.02**2, exponent=exponent)
     numbers = numbers_of(name)
     wall = wall_point(numbers, point)
-    start = wall - depth * np.array(call(surfaces.unit_normal, numbers, wall))
+    start = wall - depth * np.array(call(numbers.unit_normal, wall))
     before, *passes = run(method, scene, start, velocity, 12.0, mass, restores=False)
     first = energy_of(method, scene, before.position, before.velocity, mass)
     total_slack = 0.0
@@ -105,15 +105,15 @@ def test_a_step_is_the_papers(name, point, velocity, pull):
     scene, numbers, h, mass = scene_of(name, gravity=pull), numbers_of(name), 0.02, 2.0
     method = swarm.Penalty(dt=h, penalty=1e4)
     wall = wall_point(numbers, point)
-    normal = np.array(call(surfaces.unit_normal, numbers, wall))
+    normal = np.array(call(numbers.unit_normal, wall))
     start = wall + 2e-3 * normal
     after = one_pass(method, scene, start, velocity, 1.0, mass)
     assert after.left == 0.0
     assert after.position - start == pytest.approx(0.5 * h * (velocity + after.velocity), abs=256 * EPSILON)
     gravity = np.zeros(3) if pull is None else np.array(scene.gravity)
-    q0, q1 = (call(surfaces.inner, numbers, r) for r in (start, after.position))
+    q0, q1 = (call(numbers.inner, r) for r in (start, after.position))
     rise = np.subtract(*(call(contact_energy, method.law(), scene.chain(), 1.0, r) for r in (after.position, start)))
-    discrete = np.array(call(surfaces.inner_gradient, numbers, start, after.position))
+    discrete = np.array(call(numbers.inner_gradient, start, after.position))
     force = -rise / (q1 - q0) * discrete
     given_ = mass * (after.velocity - velocity - h * gravity)
     assert given_ == pytest.approx(h * force, abs=1e-8 * np.linalg.norm(given_))
@@ -127,7 +127,7 @@ def test_free_steps_are_jumped_over(name, point, velocity, pull):
     scene, numbers, h = scene_of(name, gravity=pull), numbers_of(name), 1e-3
     method = swarm.Penalty(dt=h, penalty=1e4)
     wall = wall_point(numbers, point)
-    start = wall - 0.05 * np.array(call(surfaces.unit_normal, numbers, wall))
+    start = wall - 0.05 * np.array(call(numbers.unit_normal, wall))
     after = one_pass(method, scene, start, velocity, 5.0)
     steps = 5.0 - after.left
     assert steps == round(steps) >= 1.0

@@ -65,7 +65,7 @@ def test_a_parabola_that_just_touches(name, off, scale):
     """Double roots, missed or crossed by a little: no hit is skipped, and none is invented."""
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * np.array([0.3, 0.5, -0.4]))
-    normal = np.array(call(contract.unit_normal, surface, wall))
+    normal = np.array(call(surface.unit_normal, wall))
     along = np.cross(normal, [0.3, -0.2, 0.5])
     along /= np.linalg.norm(along)
     # Thrown up along the wall: at its summit the parabola is `off` outside, and more curved than any wall.
@@ -85,11 +85,11 @@ def test_head_on_the_hit_is_at_depth_over_speed(name, scale, speed, depth):
     """No absolute threshold anywhere: the same flight at every scale and speed."""
     point, direction = np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0])
     surface, position, velocity = start(name, point, direction, depth, 1.0, scale, speed)
-    time, found = call(contract.first_hit, surface, position, velocity)
+    time, found = call(surface.first_hit, position, velocity)
     assert found
     assert time * speed == pytest.approx(depth, rel=1e-12, abs=1e-15)
     sideways = start(name, point, direction, depth, 0.0, scale, speed)[2]
-    grazing, _found = call(contract.first_hit, surface, position, 1e-4 * velocity + sideways)
+    grazing, _found = call(surface.first_hit, position, 1e-4 * velocity + sideways)
     assert grazing * speed >= 0.9 * depth
 
 
@@ -101,7 +101,7 @@ def test_head_on_the_hit_is_at_depth_over_speed(name, scale, speed, depth):
 def test_from_the_wall_the_direction_decides(name, depth):
     """Outward: now. Inward: not now, and not an instant after; gravity changes neither."""
     surface, position, velocity = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), depth, 0.6, 1.0, 1.0)
-    normal = np.array(call(contract.unit_normal, surface, position))
+    normal = np.array(call(surface.unit_normal, position))
     for ask, pull in ((straight, np.zeros(3)), (falling, 0.1 * normal), (falling, -0.1 * normal)):
         time, found = ask(surface, position, velocity, pull)
         assert found
@@ -113,20 +113,20 @@ def test_from_the_wall_the_direction_decides(name, depth):
 def test_at_rest_on_the_wall_gravity_decides(name):
     """It presses: a hit now, up to the fall through round-off. It pulls off the wall: no hit."""
     surface, position, _ = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), 0.0, 0.6, 1.0, 1.0)
-    normal, at_rest = np.array(call(contract.unit_normal, surface, position)), np.zeros(3)
-    position = np.array(call(contract.settle, surface, position))
-    time, found = call(contract.falling_hit, surface, position, at_rest, normal)
+    normal, at_rest = np.array(call(surface.unit_normal, position)), np.zeros(3)
+    position = np.array(call(surface.settle, position))
+    time, found = call(surface.falling_hit, position, at_rest, normal)
     assert found
     assert time <= 1e-7
-    assert call(contract.falling_hit, surface, position, at_rest, -normal)[0] > 0.1
+    assert call(surface.falling_hit, position, at_rest, -normal)[0] > 0.1
 
 
 @every_wall
 @given(point=directions, depth=depths)
 def test_at_rest_there_is_no_hit(name, point, depth):
     surface, position, _ = start(name, point, point, depth, 0.0, 1.0, 1.0)
-    assert call(contract.first_hit, surface, position, np.zeros(3)) == (math.inf, True)
-    assert call(contract.falling_hit, surface, position, np.zeros(3), np.zeros(3))[0] == math.inf
+    assert call(surface.first_hit, position, np.zeros(3)) == (math.inf, True)
+    assert call(surface.falling_hit, position, np.zeros(3), np.zeros(3))[0] == math.inf
 
 
 # --- Safe times ------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def test_at_rest_there_is_no_hit(name, point, depth):
 def test_safe_time_is_never_past_the_exit(name, point, direction, depth, lean, scale, speed, pull, heavy):
     surface, position, velocity = start(name, point, direction, depth, lean, scale, speed)
     pull = heavy * speed * speed * scale * (pull + 1e-3)
-    time = call(contract.safe_time, surface, position, velocity, pull)
+    time = call(surface.safe_time, position, velocity, pull)
     assert time >= 0.0
     if time > 0.0:
         until = min(time, 1e3 / (speed * math.sqrt(heavy)))
@@ -158,5 +158,5 @@ def test_safe_times_lead_to_the_exit(name, point, direction, pull, lean):
         if time == math.inf:
             break
         now = position + velocity * time + 0.5 * pull * time * time
-        time += call(contract.safe_time, surface, now, velocity + pull * time, pull)
+        time += call(surface.safe_time, now, velocity + pull * time, pull)
     assert time == pytest.approx(exits[0], rel=1e-12) if exits else time > 0.0

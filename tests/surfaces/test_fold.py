@@ -33,7 +33,7 @@ def both(names):
 
 def is_out(numbers, point):
     """Outside one surface, by its level."""
-    return call(contract.level_of, numbers, call(contract.inner, numbers, point)) > 0.0
+    return call(numbers.level_of, call(numbers.inner, point)) > 0.0
 
 
 def first_least(hits):
@@ -63,7 +63,7 @@ def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
 @given(point=vectors, velocity=directions)
 def test_other_hit_is_the_least_of_the_others(names, point, velocity):
     whole, single = both(names)
-    hits = [call(contract.first_hit, numbers, point, velocity) for numbers in single]
+    hits = [call(numbers.first_hit, point, velocity) for numbers in single]
     for index in range(len(hits)):
         others = [(math.inf, True) if i == index else hit for i, hit in enumerate(hits)]
         least, other = call(flights.other_hit, whole, index, point, velocity)
@@ -76,7 +76,7 @@ def test_other_hit_is_the_least_of_the_others(names, point, velocity):
 @given(point=vectors, velocity=directions, pull=directions)
 def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
     whole, single = both(names)
-    safe = [call(contract.safe_time, numbers, point, velocity, pull) for numbers in single]
+    safe = [call(numbers.safe_time, point, velocity, pull) for numbers in single]
     assert call(flights.safe_time, whole, point, velocity, pull) == min(safe, default=math.inf)
     assert call(flights.free_time, Gravity(*pull), whole, point, velocity) == min(safe, default=math.inf)
     free = call(flights.free_time, None, whole, point, velocity)

@@ -39,12 +39,12 @@ def test_derivatives(text):
     exact = sympy.sympify(text)
     at = {axis: sympy.Float(float(value), 40) for axis, value in zip(axes, point, strict=True)}
     value = lambda expression: float(expression.evalf(40, subs=at))  # noqa: E731
-    assert call(contract.phi, numbers, point) == pytest.approx(value(exact), rel=1e-13, abs=1e-14)
+    assert call(numbers.phi, point) == pytest.approx(value(exact), rel=1e-13, abs=1e-14)
     gradient = [value(exact.diff(axis)) for axis in axes]
-    assert call(contract.gradient, numbers, point) == pytest.approx(gradient, rel=1e-13, abs=1e-13)
+    assert call(numbers.gradient, point) == pytest.approx(gradient, rel=1e-13, abs=1e-13)
     x, y, z = axes
     seconds = [value(exact.diff(*pair)) / 2 for pair in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))]
-    assert call(contract.hessian, numbers, point) == pytest.approx(seconds, rel=1e-12, abs=1e-13)
+    assert call(numbers.hessian, point) == pytest.approx(seconds, rel=1e-12, abs=1e-13)
 
 
 def test_small_powers_are_products():
@@ -67,10 +67,10 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
     compared = 0
     while compared < 200:
         point, velocity = np.array(center) + random.uniform(-1.2, 1.2, 3), random.standard_normal(3)
-        if other.side * call(contract.phi, other, point) > -1e-6:
+        if other.side * call(other.phi, point) > -1e-6:
             continue
         compared += 1
-        (time, found), (expected, _) = (call(contract.first_hit, one, point, velocity) for one in (formula, other))
+        (time, found), (expected, _) = (call(one.first_hit, point, velocity) for one in (formula, other))
         assert found
         # A flight that nearly touches may hit one and miss the other.
         if math.isfinite(time) and math.isfinite(expected):
@@ -81,7 +81,7 @@ def test_first_hits_are_those_of_the_closed_form(text, other, side):
 
 def _grazes(surface, point, velocity, time):
     place = point + time * velocity
-    normal = np.array(call(contract.unit_normal, surface, place))
+    normal = np.array(call(surface.unit_normal, place))
     return abs(normal @ velocity) < 1e-6 * np.linalg.norm(velocity)
 
 
@@ -167,9 +167,9 @@ def test_the_bend_bounds_second_derivatives(text, side):
     numbers = form.numbers((0.0, 0.0, 0.0))
     low, high = np.array(form.box)
     for point in random.uniform(low, high, (200, 3)):
-        if numbers.side * call(contract.phi, numbers, point) > 0.0:
+        if numbers.side * call(numbers.phi, point) > 0.0:
             continue
-        xx, yy, zz, xy, yz, zx = (numbers.side * part for part in call(contract.hessian, numbers, point))
+        xx, yy, zz, xy, yz, zx = (numbers.side * part for part in call(numbers.hessian, point))
         matrix = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
         values = np.linalg.eigvalsh(matrix)
         assert form.bend.least <= values[0] + 1e-12
@@ -309,7 +309,7 @@ def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
     for point, velocity in zip(start.T, start.T[::-1] + 0.1, strict=True):
         (numbers,) = surface.walls()
         for _ in range(5):
-            time, found = call(contract.first_hit, numbers, point, velocity)
+            time, found = call(numbers.first_hit, point, velocity)
             if time == math.inf:
                 break
             along = point[:, None] + velocity[:, None] * time * np.linspace(0.0, 1.0, 50)
@@ -317,8 +317,8 @@ def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
             if not found:
                 point = along[:, -1]
                 continue
-            point = call(contract.settle, numbers, along[:, -1])
-            normal = np.array(call(contract.unit_normal, numbers, np.array(point)))
+            point = call(numbers.settle, along[:, -1])
+            normal = np.array(call(numbers.unit_normal, np.array(point)))
             point, velocity = np.array(point), velocity - 2.0 * (normal @ velocity) * normal
 
 

@@ -61,14 +61,14 @@ def test_the_same_surface_has_the_same_hits(name):
     seen = 0
     for _ in range(200):
         position, velocity, pull = random.normal(size=(3, 3)) * [[0.3], [1.0], [1.0]]
-        if call(contract.gap_of, other, call(contract.inner, other, position)) > -1e-6:
+        if call(other.gap_of, call(other.inner, position)) > -1e-6:
             continue
         seen += 1
-        time, found = call(contract.first_hit, one, position, velocity)
+        time, found = call(one.first_hit, position, velocity)
         assert found
-        assert time == pytest.approx(call(contract.first_hit, other, position, velocity)[0], rel=1e-11)
-        landed, there = call(contract.falling_hit, one, position, velocity, pull)
-        expected, there_too = call(contract.falling_hit, other, position, velocity, pull)
+        assert time == pytest.approx(call(other.first_hit, position, velocity)[0], rel=1e-11)
+        landed, there = call(one.falling_hit, position, velocity, pull)
+        expected, there_too = call(other.falling_hit, position, velocity, pull)
         if there and there_too:
             assert landed == pytest.approx(expected, rel=1e-9)
     assert seen > 20
@@ -87,41 +87,41 @@ def test_along_the_axis_of_a_cylinder_there_is_no_hit(side, speed, pull):
     (wall,) = swarm.Cylinder(0.5, side=side).walls()
     for x in (0.5, 0.3 if side == "inside" else 0.7):
         flight = np.array([x, 0.0, 0.0]), np.array([0.0, 0.0, speed])
-        assert call(contract.first_hit, wall, *flight) == (math.inf, True)
-        assert call(contract.falling_hit, wall, *flight, np.array([0.0, 0.0, pull])) == (math.inf, True)
-        assert call(contract.safe_time, wall, *flight, np.array([0.0, 0.0, pull])) == math.inf
+        assert call(wall.first_hit, *flight) == (math.inf, True)
+        assert call(wall.falling_hit, *flight, np.array([0.0, 0.0, pull])) == (math.inf, True)
+        assert call(wall.safe_time, *flight, np.array([0.0, 0.0, pull])) == math.inf
 
 
 def test_flights_of_lower_degree():
     """Along the axis of a bowl, along a generator of a cone: no square is left."""
     (bowl,) = swarm.Paraboloid(0.25).walls()
     down = np.array([0.0, 0.0, -2.0])
-    assert call(contract.first_hit, bowl, np.array([0.5, 0.0, 1.0]), down) == (0.375, True)
-    assert call(contract.first_hit, bowl, np.array([0.5, 0.0, 1.0]), -down) == (math.inf, True)
-    time, found = call(contract.falling_hit, bowl, np.array([0.5, 0.0, 1.0]), 0.0 * down, down)
+    assert call(bowl.first_hit, np.array([0.5, 0.0, 1.0]), down) == (0.375, True)
+    assert call(bowl.first_hit, np.array([0.5, 0.0, 1.0]), -down) == (math.inf, True)
+    time, found = call(bowl.falling_hit, np.array([0.5, 0.0, 1.0]), 0.0 * down, down)
     assert (time, found) == (pytest.approx(0.75**0.5, rel=1e-15), True)
     nappes = swarm.Quadric(((1, 0, 0), (0, 1, 0), (0, 0, -1))).walls()[0]
-    assert call(contract.first_hit, nappes, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 1.0])) == (math.inf, True)
-    assert call(contract.first_hit, nappes, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, -1.0])) == (0.5, True)
+    assert call(nappes.first_hit, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 1.0])) == (math.inf, True)
+    assert call(nappes.first_hit, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, -1.0])) == (0.5, True)
     # A ray within the cone's own angle never leaves.
-    assert call(contract.first_hit, nappes, np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.2, 1.0])) == (math.inf, True)
+    assert call(nappes.first_hit, np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.2, 1.0])) == (math.inf, True)
 
 
 def test_a_slab_is_met_on_the_side_ahead():
     between, plate = (swarm.Slab((0, 0, 1), 0.5, side=side).numbers() for side in ("inside", "outside"))
     up, on = np.array([0.3, 0.0, 2.0]), np.array([0.0, 0.0, 0.5])
-    assert call(contract.first_hit, between, 0.5 * on, up) == (0.125, True)
-    assert call(contract.first_hit, between, 0.5 * on, -up) == (0.375, True)
-    assert call(contract.first_hit, between, on, up)[0] == 0.0
-    assert call(contract.first_hit, between, on, -up)[0] == 0.5
-    assert call(contract.first_hit, between, (1 + 1e-15) * on, up)[0] == 0.0
-    assert call(contract.first_hit, between, on, np.array([1.0, 1.0, 0.0]))[0] == math.inf
-    assert call(contract.first_hit, plate, 2.0 * on, -up)[0] == 0.25
-    assert call(contract.first_hit, plate, 2.0 * on, up)[0] == math.inf
-    assert call(contract.first_hit, plate, on, up)[0] == math.inf
-    assert call(contract.first_hit, plate, on, -up)[0] == 0.0
-    assert call(contract.first_hit, plate, (1 - 1e-15) * on, -up)[0] == 0.0
-    assert call(contract.first_hit, plate, -2.0 * on, up)[0] == 0.25
+    assert call(between.first_hit, 0.5 * on, up) == (0.125, True)
+    assert call(between.first_hit, 0.5 * on, -up) == (0.375, True)
+    assert call(between.first_hit, on, up)[0] == 0.0
+    assert call(between.first_hit, on, -up)[0] == 0.5
+    assert call(between.first_hit, (1 + 1e-15) * on, up)[0] == 0.0
+    assert call(between.first_hit, on, np.array([1.0, 1.0, 0.0]))[0] == math.inf
+    assert call(plate.first_hit, 2.0 * on, -up)[0] == 0.25
+    assert call(plate.first_hit, 2.0 * on, up)[0] == math.inf
+    assert call(plate.first_hit, on, up)[0] == math.inf
+    assert call(plate.first_hit, on, -up)[0] == 0.0
+    assert call(plate.first_hit, (1 - 1e-15) * on, -up)[0] == 0.0
+    assert call(plate.first_hit, -2.0 * on, up)[0] == 0.25
 
 
 @pytest.mark.parametrize("name", ["cylinder", "bowl", "one sheet", "shifted egg", "slab"])
@@ -141,9 +141,9 @@ def test_a_rotated_surface_is_a_rotated_flight(name):
     for _ in range(50):
         position, velocity = 0.2 * random.normal(size=3), random.normal(size=3)
         there = center + matrix @ (position - center)
-        assert call(contract.phi, wall, there) == pytest.approx(call(contract.phi, plain, position), abs=2e-15)
-        expected = call(contract.first_hit, plain, position, velocity)
-        assert call(contract.first_hit, wall, there, matrix @ velocity) == pytest.approx(expected, rel=1e-11, abs=1e-14)
+        assert call(wall.phi, there) == pytest.approx(call(plain.phi, position), abs=2e-15)
+        expected = call(plain.first_hit, position, velocity)
+        assert call(wall.first_hit, there, matrix @ velocity) == pytest.approx(expected, rel=1e-11, abs=1e-14)
 
 
 # --- Contact ---------------------------------------------------------------------------------------------
@@ -156,8 +156,8 @@ def test_resolve_solves_its_equation(name, point, scale, strength):
     unit = 1.0 if name.startswith("slab") else scale * scale
     unit = scale if name.startswith(("cylinder", "pipe", "bowl")) else unit
     strength, point = side * strength * unit, scale * point
-    solved = np.array(call(contract.resolve, wall, point, strength))
-    slope = np.array(call(contract.inner_gradient, wall, solved, solved))
+    solved = np.array(call(wall.resolve, point, strength))
+    slope = np.array(call(wall.inner_gradient, solved, solved))
     assert solved + strength * slope == pytest.approx(point, abs=64 * EPSILON * scale)
 
 
@@ -165,7 +165,7 @@ def test_resolve_solves_its_equation(name, point, scale, strength):
 def test_the_farthest_push_is_before_the_first_pole(name):
     """1 + kappa A > 0 up to it."""
     wall, side = numbers_of(name), side_of(numbers_of(name))
-    farthest = call(contract.farthest_push, wall)
+    farthest = call(wall.farthest_push)
     assert farthest * side > 0.0
     body = body_of(wall)
     curvatures = list(body.a) if isinstance(body, QuadricNumbers) else [1.0]
@@ -177,14 +177,14 @@ def test_the_apex_of_a_cone_has_no_normal_and_no_nan():
     nappes = swarm.Quadric(((1, 0, 0), (0, 1, 0), (0, 0, -1)), center=(1, 2, 3)).walls()[0]
     apex = np.array([1.0, 2.0, 3.0])
     for answer in (
-        call(contract.unit_normal, nappes, apex),
-        call(contract.distance, nappes, apex),
-        np.array(call(contract.settle, nappes, apex)) - apex,
+        call(nappes.unit_normal, apex),
+        call(nappes.distance, apex),
+        np.array(call(nappes.settle, apex)) - apex,
     ):
         assert np.all(np.array(answer) == 0.0)
     for velocity in (np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])):
         for pull in (np.zeros(3), np.array([0.0, 0.0, -1.0])):
-            time, _found = call(contract.falling_hit, nappes, apex, velocity, pull)
+            time, _found = call(nappes.falling_hit, apex, velocity, pull)
             assert time >= 0.0
 
 

@@ -194,7 +194,7 @@ def test_without_gravity_it_is_not_asked():
 def test_without_a_safe_time_every_step_is_taken():
     """A lower bound that says nothing is 0, never infinity."""
     wall = ball_like(*LEVEL)().numbers()
-    assert call(contract.safe_time, wall, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
+    assert call(wall.safe_time, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
 
 
 @pytest.mark.parametrize("given", [contract.bend, contract.course], ids=["bend", "course"])
@@ -208,18 +208,14 @@ def test_flights_follow_from_what_is_given(given):
         assert sum_of_hits(mine, position, velocity, pull) == pytest.approx(
             sum_of_hits(shipped, position, velocity, pull), rel=1e-9
         )
-        assert (
-            0.0
-            < call(contract.safe_time, mine, position, velocity, pull)
-            <= sum_of_hits(mine, position, velocity, pull)
-        )
+        assert 0.0 < call(mine.safe_time, position, velocity, pull) <= sum_of_hits(mine, position, velocity, pull)
 
 
 def sum_of_hits(surface, position, velocity, pull):
     """The time of the first hit, in as many parts as it takes."""
     total = 0.0
     for _part in range(100):
-        time, found = call(contract.falling_hit, surface, position, velocity, pull)
+        time, found = call(surface.falling_hit, position, velocity, pull)
         total += time
         if found:
             return total
@@ -357,4 +353,4 @@ def test_registration_is_that_of_singledispatch():
 
     assert contract.phi.register(Numbers, right) is right
     assert contract.phi.registry[Numbers] is right
-    assert contract.phi(Numbers(1.0), ZERO) == 3.0
+    assert Numbers(1.0).phi(ZERO) == 3.0

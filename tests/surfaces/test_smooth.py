@@ -61,7 +61,7 @@ def test_the_level_is_nowhere_above_its_polynomial(name, gravity):
     pull, seen = np.zeros(3) if gravity is None else np.array(gravity), 0
     while seen < 40:
         position, velocity = rng.uniform(-1.2, 1.2, 3), rng.normal(size=3)
-        near = call(contract.near, surface, gravity, position, velocity)
+        near = call(surface.near, gravity, position, velocity)
 
         def level(t, r=position, v=velocity):
             return _level(surface, r + t * v + 0.5 * t * t * pull)
@@ -80,7 +80,7 @@ def test_the_level_is_nowhere_above_its_polynomial(name, gravity):
 def _level(surface, r):
     d = r - np.array(surface.center)
     if isinstance(surface, CapsuleNumbers):
-        return surface.side * (call(contract.inner, surface, r) - surface.radius2)
+        return surface.side * (call(surface.inner, r) - surface.radius2)
     both = d @ d + surface.major**2 - surface.radius2
     return surface.side * (both**2 - 4.0 * surface.major**2 * (d[0] ** 2 + d[1] ** 2))
 
@@ -93,14 +93,14 @@ def test_a_long_fall_does_not_outrun_its_clearance(name, speed):
     position, pull = np.array([0.5, 0.2, 40.0]), np.array([0.0, 0.0, -9.81])
     velocity, total = np.array([0.0, 0.0, -speed]), 0.0
     for _ask in range(50):
-        time, found = call(contract.falling_hit, surface, position, velocity, pull)
+        time, found = call(surface.falling_hit, position, velocity, pull)
         assert Flight([surface], position, velocity, pull).highest(time) <= TOUCH
         total += time
         position, velocity = position + time * velocity + 0.5 * time * time * pull, velocity + time * pull
         if found:
             break
     assert found
-    assert abs(call(contract.phi, surface, position)) <= 1e-14
+    assert abs(call(surface.phi, position)) <= 1e-14
 
 
 # --- The torus -------------------------------------------------------------------------------------------
@@ -113,9 +113,9 @@ def test_a_point_on_the_axis_is_admissible_outside_the_ring():
     assert (scene.gaps(swarm.fill(scene, 1000, speed=1.0).position) <= 0.0).all()
     # Straight through the hole, and against the inner side of the tube.
     numbers = ring.numbers()
-    through = call(contract.first_hit, numbers, np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
+    through = call(numbers.first_hit, np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
     assert through == (math.inf, True)
-    across, found = call(contract.first_hit, numbers, np.array([-0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    across, found = call(numbers.first_hit, np.array([-0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert found
     assert across == pytest.approx(1.25, rel=1e-14)
 
@@ -129,9 +129,9 @@ def test_the_closed_form_of_the_capsule_is_the_march(side):
     hits = 0
     for _ in range(500):
         position, velocity = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
-        if capsule.side * call(contract.phi, capsule, position) > 0.0:
+        if capsule.side * call(capsule.phi, position) > 0.0:
             continue
-        time, found = call(contract.first_hit, capsule, position, velocity)
+        time, found = call(capsule.first_hit, position, velocity)
         marched, _found = call(marches.march, capsule, position, velocity, np.zeros(3))
         assert found
         if time == math.inf:
@@ -150,13 +150,13 @@ def test_along_the_axis_of_a_capsule(scale):
         for sign in (1.0, -1.0):
             way = np.array([0.0, 0.0, sign])
             exact = 1.0 + math.sqrt((0.5 - off) * (0.5 + off))
-            time, _found = call(contract.first_hit, cavity, scale * np.array([off, 0.0, 0.0]), way)
+            time, _found = call(cavity.first_hit, scale * np.array([off, 0.0, 0.0]), way)
             assert time == pytest.approx(exact * scale, rel=1e-14, abs=1e-7 * scale * (off > 0.4))
     rod = cavity._replace(side=-1.0)
-    time, _found = call(contract.first_hit, rod, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
+    time, _found = call(rod.first_hit, scale * np.array([0.3, 0.0, -5.0]), np.array([0.0, 0.0, scale]))
     assert time == pytest.approx(4.0 - 0.4, rel=1e-14)
     for position in ([0.3, 0.0, 5.0], [0.6, 0.0, -5.0], [0.5 + 1e-12, 0.0, 0.0]):
-        assert call(contract.first_hit, rod, scale * np.array(position), np.array([0.0, 0.0, scale])) == (
+        assert call(rod.first_hit, scale * np.array(position), np.array([0.0, 0.0, scale])) == (
             math.inf,
             True,
         )
@@ -169,7 +169,7 @@ def test_a_capsule_of_no_length_is_a_sphere():
     assert capsule.phi(points) == pytest.approx(sphere.phi(points), abs=1e-15)
     for _ in range(50):
         position, velocity = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
-        times = [call(contract.first_hit, surface.numbers(), position, velocity)[0] for surface in (capsule, sphere)]
+        times = [call(surface.numbers().first_hit, position, velocity)[0] for surface in (capsule, sphere)]
         assert times[0] == pytest.approx(times[1], rel=1e-14)
 
 
@@ -192,7 +192,7 @@ def test_the_discrete_gradient_is_exact_across_the_end_of_the_cylinder():
     for step in (1e-12, 1e-6, 1e-2):
         first = np.array([0.3, 0.4, 0.5 - 0.5 * step])
         second = first + step * np.array([0.1, -0.2, 1.0])
-        discrete = np.array(call(contract.inner_gradient, capsule, first, second))
-        rise = call(contract.difference, capsule, first, second)
+        discrete = np.array(call(capsule.inner_gradient, first, second))
+        rise = call(capsule.difference, first, second)
         assert discrete @ (second - first) == pytest.approx(rise, abs=4 * EPSILON * step)
         assert discrete == pytest.approx([0.6, 0.8, 0.0], abs=2.0 * step + 1e-15)

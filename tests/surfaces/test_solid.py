@@ -53,10 +53,10 @@ def near_an_edge(parts, rng, count):
     """A point on this many of the parts at once."""
     point = rng.uniform(-0.5, 0.5, 3)
     chosen = [parts[i] for i in rng.permutation(len(parts))[:count]]
-    size = abs(call(contract.gradient, chosen[0], point)[0]) and 1.0
+    size = abs(call(chosen[0].gradient, point)[0]) and 1.0
     for _ in range(50):
-        rows = np.array([call(contract.gradient, part, point) for part in chosen])
-        point = point - size * np.linalg.pinv(rows) @ [call(contract.phi, part, point) for part in chosen]
+        rows = np.array([call(part.gradient, point) for part in chosen])
+        point = point - size * np.linalg.pinv(rows) @ [call(part.phi, point) for part in chosen]
     return point
 
 
@@ -73,17 +73,14 @@ def random_turn(rng):
 def test_phi_is_negative_inside_of_all_parts(name, scale):
     parts, rng = BODIES[name](scale), np.random.default_rng(1)
     solid, points = body(parts), scale * rng.uniform(-1.0, 1.0, (3, 300))
-    phi, gradient = contract.phi(solid, vec(points)), np.array(contract.gradient(solid, vec(points)))
-    gaps = np.array(
-        [[call(contract.gap_of, part, call(contract.inner, part, point)) for part in parts] for point in points.T]
-    )
+    phi, gradient = solid.phi(vec(points)), np.array(solid.gradient(vec(points)))
+    gaps = np.array([[call(part.gap_of, call(part.inner, point)) for part in parts] for point in points.T])
     assert phi == pytest.approx(-gaps.min(axis=1), rel=1e-14, abs=1e-15 * scale)
     for k in range(0, 300, 20):
-        assert call(contract.phi, solid, points[:, k]) == phi[k]
+        assert call(solid.phi, points[:, k]) == phi[k]
         step = 1e-7 * scale
         rise = [
-            call(contract.phi, solid, points[:, k] + step * axis)
-            - call(contract.phi, solid, points[:, k] - step * axis)
+            call(solid.phi, points[:, k] + step * axis) - call(solid.phi, points[:, k] - step * axis)
             for axis in np.eye(3)
         ]
         assert gradient[:, k] == pytest.approx(np.array(rise) / (2.0 * step), abs=1e-5 * np.linalg.norm(gradient[:, k]))
@@ -97,9 +94,9 @@ def test_the_normal_points_into_the_body(name, scale):
     solid = body(parts)
     for _ in range(50):
         point = wall_point(solid, scale * 0.5 * random_turn(rng))
-        normal = np.array(call(contract.unit_normal, solid, point))
+        normal = np.array(call(solid.unit_normal, point))
         assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
-        assert call(contract.phi, solid, point - 1e-6 * scale * normal) > 0.0
+        assert call(solid.phi, point - 1e-6 * scale * normal) > 0.0
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -148,21 +145,21 @@ def test_from_a_face_the_direction_decides(name, scale, lean):
     solid = body(parts)
     for _ in range(40):
         point = wall_point(solid, scale * random_turn(rng))
-        normal = np.array(call(contract.unit_normal, solid, point))
+        normal = np.array(call(solid.unit_normal, point))
         along = np.cross(normal, random_turn(rng))
         velocity = lean * normal + along
-        gaps = sorted(call(contract.distance, part, point) for part in parts)
+        gaps = sorted(call(part.distance, point) for part in parts)
         if gaps[1] < 1e-3 * scale:
             continue  # next to an edge
-        time, found = call(contract.first_hit, solid, point, velocity)
+        time, found = call(solid.first_hit, point, velocity)
         assert found
         assert time * np.linalg.norm(velocity) <= 1e-14 * scale / lean
         away = along - lean * normal
-        assert call(contract.first_hit, solid, point, away) == (math.inf, True)
+        assert call(solid.first_hit, point, away) == (math.inf, True)
         pull = 0.1 / scale * normal
-        time, found = call(contract.falling_hit, solid, point, away, pull)
+        time, found = call(solid.falling_hit, point, away, pull)
         assert time > 0.1 * min(1.0, lean) * scale
-        time, found = call(contract.falling_hit, solid, point, np.zeros(3), pull)
+        time, found = call(solid.falling_hit, point, np.zeros(3), pull)
         assert found
         assert time <= 1e-6 * scale
 
@@ -173,7 +170,7 @@ def test_a_flight_in_the_plane_of_a_face_never_tunnels():
         for scale in SCALES:
             solid = body(BODIES["cube"](scale))
             position, velocity = scale * np.array([-2.0, 0.5 - offset, 0.1]), np.array([scale, 0.0, 0.0])
-            time, found = call(contract.first_hit, solid, position, velocity)
+            time, found = call(solid.first_hit, position, velocity)
             assert found
             assert time == math.inf or time == pytest.approx(1.5, rel=1e-15)
             if offset == 1e-9:
@@ -188,12 +185,12 @@ def test_reflections_stay_outside(name):
     position, velocity = np.array([2.0, 1.0, 1.5]), random_turn(rng)
     deepest, hits = 0.0, 0
     for _ in range(600):
-        time, found = call(contract.first_hit, solid, position, velocity)
-        wall, _found = call(contract.first_hit, around, position, velocity)
+        time, found = call(solid.first_hit, position, velocity)
+        wall, _found = call(around.first_hit, position, velocity)
         assert found
         struck = solid if time < wall else around
         position = position + min(time, wall) * velocity
-        normal = np.array(call(contract.unit_normal, struck, position))
+        normal = np.array(call(struck.unit_normal, position))
         velocity = velocity - 2.0 * (velocity @ normal) * normal
         velocity /= np.linalg.norm(velocity)
         if struck is around:
@@ -201,7 +198,7 @@ def test_reflections_stay_outside(name):
             aim = near_an_edge(parts, rng, 2) if rng.random() < 0.33 else rng.uniform(-0.6, 0.6, 3)
             velocity = (aim - position) / np.linalg.norm(aim - position)
         hits += struck is solid
-        deepest = max(deepest, call(contract.distance, solid, position))
+        deepest = max(deepest, call(solid.distance, position))
     assert hits > 50
     assert deepest <= 1e-14
 
@@ -214,8 +211,8 @@ def test_safe_time_is_never_past_the_entry(name, heavy):
     for _ in range(40):
         position, velocity = rng.uniform(-1.0, 1.0, 3), random_turn(rng)
         pull = heavy * random_turn(rng)
-        time = call(contract.safe_time, solid, position, velocity, pull)
-        if call(contract.phi, solid, position) <= 0.0:
+        time = call(solid.safe_time, position, velocity, pull)
+        if call(solid.phi, position) <= 0.0:
             assert time == 0.0
             continue
         assert time > 0.0
@@ -233,21 +230,19 @@ def test_contact_functions_next_to_a_face(name):
     for _ in range(30):
         start = wall_point(solid, random_turn(rng))
         free = 0.01 * random_turn(rng)
-        if free @ np.array(call(contract.unit_normal, solid, start)) < 0.0:
+        if free @ np.array(call(solid.unit_normal, start)) < 0.0:
             free = -free
         end = start + free
-        discrete = np.array(call(contract.inner_gradient, solid, start, end))
-        assert discrete @ free == pytest.approx(
-            call(contract.phi, solid, end) - call(contract.phi, solid, start), abs=1e-15
-        )
-        if sorted(call(contract.distance, part, start) for part in parts)[1] < 0.1:
+        discrete = np.array(call(solid.inner_gradient, start, end))
+        assert discrete @ free == pytest.approx(call(solid.phi, end) - call(solid.phi, start), abs=1e-15)
+        if sorted(call(part.distance, start) for part in parts)[1] < 0.1:
             continue  # a step across an edge has a D that jumps
         kappa = -0.01
-        pushed = np.array(call(contract.push, solid, start, free, kappa))
-        discrete = np.array(call(contract.inner_gradient, solid, start, pushed))
+        pushed = np.array(call(solid.push, start, free, kappa))
+        discrete = np.array(call(solid.inner_gradient, start, pushed))
         assert pushed == pytest.approx(start + free - kappa * discrete, abs=1e-15)
-        rise, slope = call(contract.rise, solid, start, free, kappa)
-        assert rise == pytest.approx(call(contract.phi, solid, pushed) - call(contract.phi, solid, start), abs=1e-15)
+        rise, slope = call(solid.rise, start, free, kappa)
+        assert rise == pytest.approx(call(solid.phi, pushed) - call(solid.phi, start), abs=1e-15)
         assert slope < 0.0
         near = start + 1e-8 * random_turn(rng)
-        assert abs(call(contract.phi, solid, np.array(call(contract.settle, solid, near)))) <= 1e-14
+        assert abs(call(solid.phi, np.array(call(solid.settle, near)))) <= 1e-14

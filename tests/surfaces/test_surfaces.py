@@ -70,22 +70,22 @@ def test_arrays_agree_with_points(name):
     assert phi.shape == (7,)
     assert gradient.shape == (3, 7)
     for k in range(7):
-        assert phi[k] == pytest.approx(call(contract.phi, numbers, points[:, k]), rel=1e-14)
-        assert gradient[:, k] == pytest.approx(call(contract.gradient, numbers, points[:, k]), rel=1e-14)
+        assert phi[k] == pytest.approx(call(numbers.phi, points[:, k]), rel=1e-14)
+        assert gradient[:, k] == pytest.approx(call(numbers.gradient, points[:, k]), rel=1e-14)
 
 
 @every_wall
 @given(point=directions, scale=scales)
 def test_gradient_is_the_slope_of_phi(name, point, scale):
     surface, point = numbers_of(name, scale), scale * point
-    gradient = call(contract.gradient, surface, point)
+    gradient = call(surface.gradient, point)
     for axis, slope in enumerate(gradient):
         step = np.eye(3)[axis] * 1e-5 * scale
-        rise = call(contract.phi, surface, point + step) - call(contract.phi, surface, point - step)
+        rise = call(surface.phi, point + step) - call(surface.phi, point - step)
         assert rise / (2e-5 * scale) == pytest.approx(slope, abs=1e-6 * np.linalg.norm(gradient))
     if name in QUADRIC_WALLS:
         normal = side_of(surface) * np.array(gradient) / np.linalg.norm(gradient)
-        assert call(contract.unit_normal, surface, point) == pytest.approx(normal, abs=1e-14)
+        assert call(surface.unit_normal, point) == pytest.approx(normal, abs=1e-14)
 
 
 @every_wall
@@ -93,10 +93,10 @@ def test_gradient_is_the_slope_of_phi(name, point, scale):
 def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
     surface = numbers_of(name, scale)
     point = wall_point(surface, scale * point)
-    normal = np.array(call(contract.unit_normal, surface, point))
+    normal = np.array(call(surface.unit_normal, point))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
     assert gap(surface, point - 1e-6 * scale * normal) < 0.0 < gap(surface, point + 1e-6 * scale * normal)
-    gradient = np.array(call(contract.gradient, surface, point))
+    gradient = np.array(call(surface.gradient, point))
     side = side_of(surface)
     assert normal == pytest.approx(side * gradient / np.linalg.norm(gradient), abs=8 * EPSILON)
 
@@ -106,11 +106,11 @@ def test_normal_is_a_unit_vector_out_of_the_admissible_side(name, point, scale):
 def test_level_and_phi_have_the_sign_of_the_gap(name, point, scale):
     surface, point = numbers_of(name, scale), scale * point
     side = side_of(surface)
-    q = call(contract.inner, surface, point)
+    q = call(surface.inner, point)
     g = gap(surface, point)
-    assert side * call(contract.phi, surface, point) == pytest.approx(g, rel=1e-12, abs=1e-15 * scale)
+    assert side * call(surface.phi, point) == pytest.approx(g, rel=1e-12, abs=1e-15 * scale)
     if abs(g) > 1e-14 * scale:
-        assert np.sign(call(contract.level_of, surface, q)) == np.sign(g)
+        assert np.sign(call(surface.level_of, q)) == np.sign(g)
 
 
 @every_wall
@@ -118,9 +118,9 @@ def test_level_and_phi_have_the_sign_of_the_gap(name, point, scale):
 def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
-    near = wall + off * scale * np.array(call(contract.unit_normal, surface, wall))
-    settled = np.array(call(contract.settle, surface, near))
-    slope = np.linalg.norm(call(contract.gradient, surface, wall))
+    near = wall + off * scale * np.array(call(surface.unit_normal, wall))
+    settled = np.array(call(surface.settle, near))
+    slope = np.linalg.norm(call(surface.gradient, wall))
     assert abs(gap(surface, settled)) <= slope * scale * (20 * EPSILON + 10 * off**2)
     assert np.linalg.norm(settled - near) <= 1.001 * abs(off) * scale + 20 * EPSILON * scale
 
@@ -133,11 +133,11 @@ def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
 def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
     """D.(r1 - r0) = q1 - q0."""
     surface, first, second = numbers_of(name, scale), scale * first, scale * second
-    discrete = call(contract.inner_gradient, surface, first, second)
+    discrete = call(surface.inner_gradient, first, second)
     with mp.workdps(50):
         start, end, exact = (np.array([mp.mpf(float(part)) for part in row]) for row in (first, second, discrete))
-        rise = contract.inner(surface, vec(end)) - contract.inner(surface, vec(start))
-        slope = np.linalg.norm(call(contract.inner_gradient, surface, first, first)) + np.linalg.norm(discrete)
+        rise = surface.inner(vec(end)) - surface.inner(vec(start))
+        slope = np.linalg.norm(call(surface.inner_gradient, first, first)) + np.linalg.norm(discrete)
         assert abs(exact @ (end - start) - rise) <= 16 * EPSILON * slope * scale
 
 
@@ -145,13 +145,13 @@ def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
 @given(first=directions, second=directions, scale=scales)
 def test_gap_slope_is_the_divided_difference_of_the_gap(name, first, second, scale):
     surface = numbers_of(name, scale)
-    q0, q1 = (call(contract.inner, surface, scale * point) for point in (first, second))
-    g0, g1 = call(contract.gap_of, surface, q0), call(contract.gap_of, surface, q1)
-    slope, curvature = call(contract.gap_slope, surface, q0, q1)
-    round_off = 4 * EPSILON * (abs(g0) + abs(g1) + abs(contract.gap_of(surface, 0.0)))
+    q0, q1 = (call(surface.inner, scale * point) for point in (first, second))
+    g0, g1 = call(surface.gap_of, q0), call(surface.gap_of, q1)
+    slope, curvature = call(surface.gap_slope, q0, q1)
+    round_off = 4 * EPSILON * (abs(g0) + abs(g1) + abs(surface.gap_of(0.0)))
     assert slope * (q1 - q0) == pytest.approx(g1 - g0, rel=4 * EPSILON, abs=round_off)
     step = 1e-5 * abs(q1)
-    rise = call(contract.gap_slope, surface, q0, q1 + step)[0] - call(contract.gap_slope, surface, q0, q1 - step)[0]
+    rise = call(surface.gap_slope, q0, q1 + step)[0] - call(surface.gap_slope, q0, q1 - step)[0]
     assert rise / (2.0 * step) == pytest.approx(curvature, rel=1e-7, abs=1e-9 * abs(slope / q1))
 
 
@@ -160,10 +160,10 @@ def test_gap_slope_is_the_divided_difference_of_the_gap(name, first, second, sca
 def test_chain_rule_of_gap_and_inner(name, point, scale, near):
     """g[q, q] grad q = grad g, and no cancellation where q1 is next to q0."""
     surface, point = numbers_of(name, scale), scale * point
-    q = call(contract.inner, surface, point)
-    slope, _ = call(contract.gap_slope, surface, q, q * (1.0 + near))
-    gradient = side_of(surface) * np.array(call(contract.gradient, surface, point))
-    chained = slope * np.array(call(contract.inner_gradient, surface, point, point))
+    q = call(surface.inner, point)
+    slope, _ = call(surface.gap_slope, q, q * (1.0 + near))
+    gradient = side_of(surface) * np.array(call(surface.gradient, point))
+    chained = slope * np.array(call(surface.inner_gradient, point, point))
     assert chained == pytest.approx(gradient, abs=(abs(near) + 16 * EPSILON) * np.linalg.norm(gradient))
 
 
@@ -173,9 +173,9 @@ pushes = {"point": directions, "free": vectors, "strength": st.floats(-1.0, 1.0)
 
 def pushed_step(name, point, free, strength, scale):
     # What is found by iteration is found in the direction in which the surface pushes.
-    strength = strength if name not in ITERATED else math.copysign(strength, contract.farthest_push(numbers_of(name)))
+    strength = strength if name not in ITERATED else math.copysign(strength, numbers_of(name).farthest_push())
     surface, point = numbers_of(name, scale), scale * point
-    slope = np.linalg.norm(call(contract.inner_gradient, surface, point, point))
+    slope = np.linalg.norm(call(surface.inner_gradient, point, point))
     return surface, point, 0.5 * scale * free, 0.2 * strength * scale / slope
 
 
@@ -184,8 +184,8 @@ def pushed_step(name, point, free, strength, scale):
 def test_push_solves_its_equation(name, point, free, strength, scale):
     """r1 = r0 + p - kappa D(r0, r1)."""
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
-    end = np.array(call(contract.push, surface, point, free, kappa))
-    discrete = np.array(call(contract.inner_gradient, surface, point, end))
+    end = np.array(call(surface.push, point, free, kappa))
+    discrete = np.array(call(surface.inner_gradient, point, end))
     assert end == pytest.approx(point + free - kappa * discrete, abs=16 * EPSILON * scale)
 
 
@@ -194,12 +194,12 @@ def test_push_solves_its_equation(name, point, free, strength, scale):
 def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     """q1 - q0 = D.(r1 - r0), whose error is relative to D.p and not to q."""
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
-    rise, slope = call(contract.rise, surface, point, free, kappa)
-    end = np.array(call(contract.push, surface, point, free, kappa))
-    steep = np.linalg.norm(call(contract.inner_gradient, surface, end, end))
-    q0, q1 = call(contract.inner, surface, point), call(contract.inner, surface, end)
+    rise, slope = call(surface.rise, point, free, kappa)
+    end = np.array(call(surface.push, point, free, kappa))
+    steep = np.linalg.norm(call(surface.inner_gradient, end, end))
+    q0, q1 = call(surface.inner, point), call(surface.inner, end)
     assert rise == pytest.approx(q1 - q0, abs=32 * EPSILON * (abs(q0) + abs(q1) + steep * scale))
-    discrete = np.array(call(contract.inner_gradient, surface, point, end))
+    discrete = np.array(call(surface.inner_gradient, point, end))
     terms = abs(discrete) @ abs(free) + abs(kappa) * discrete @ discrete
     # The end has the round-off of its coordinates, by which D tilts.
     tilted = 64 * EPSILON * scale * np.abs(discrete).max() if name in QUADRIC_WALLS else 0.0
@@ -207,8 +207,8 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     if name in ITERATED:
         return  # there the derivative is that of a D that does not turn
     step = 1e-6 * scale / steep
-    change = call(contract.rise, surface, point, free, kappa + step)[0]
-    change -= call(contract.rise, surface, point, free, kappa - step)[0]
+    change = call(surface.rise, point, free, kappa + step)[0]
+    change -= call(surface.rise, point, free, kappa - step)[0]
     assert change / (2.0 * step) == pytest.approx(slope, rel=1e-6, abs=1e-6 * steep * steep)
 
 
@@ -224,15 +224,15 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
     size *= 0.5 if name == "long egg" else 1.0
     size *= 0.6 if name not in ITERATED else 0.3
     free = length * size * direction / np.linalg.norm(direction)
-    normal = np.array(call(contract.chord_normal, surface, wall, free, chord_of(surface, wall, free)))
+    normal = np.array(call(surface.chord_normal, wall, free, chord_of(surface, wall, free)))
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=8 * EPSILON)
     reflected = free - 2.0 * (free @ normal) * normal
     assert np.linalg.norm(reflected) == pytest.approx(np.linalg.norm(free), rel=8 * EPSILON)
     end = wall + 0.5 * (free + reflected)
-    slope = np.linalg.norm(call(contract.gradient, surface, wall))
+    slope = np.linalg.norm(call(surface.gradient, wall))
     # Where the chord crosses the end of a capsule's cylinder, H jumps and the iteration only creeps.
     round_off = 1e-12 if name in ("capsule", "rod") else 64 * EPSILON
-    assert abs(call(contract.phi, surface, end)) <= round_off * slope * scale
+    assert abs(call(surface.phi, end)) <= round_off * slope * scale
 
 
 @every_wall
@@ -240,5 +240,5 @@ def test_chord_normal_reflects_along_a_chord(name, point, direction, length, sca
 def test_chord_of_no_length_has_the_normal_of_the_wall(name, point, scale):
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
-    chord = call(contract.chord_normal, surface, wall, np.zeros(3), 0.0)
-    assert chord == pytest.approx(call(contract.unit_normal, surface, wall), abs=16 * EPSILON)
+    chord = call(surface.chord_normal, wall, np.zeros(3), 0.0)
+    assert chord == pytest.approx(call(surface.unit_normal, wall), abs=16 * EPSILON)

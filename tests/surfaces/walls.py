@@ -19,7 +19,7 @@ def start(name, point, direction, depth, lean, scale, speed):
     """A start near the wall: position, and velocity with this part along the normal."""
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
-    normal = np.array(call(contract.unit_normal, surface, wall))
+    normal = np.array(call(surface.unit_normal, wall))
     along = direction - (direction @ normal) * normal
     along /= max(np.linalg.norm(along), 1e-3)
     velocity = speed * scale * (lean * normal + math.sqrt(1.0 - lean * lean) * along)
@@ -64,9 +64,9 @@ def hit_of(ask, surface, position, velocity, pull, until, most=500):
 
 def straight(surface, position, velocity, _pull):
     """Ask for the hit of a straight flight."""
-    return call(contract.first_hit, surface, position, velocity)
+    return call(surface.first_hit, position, velocity)
 
 
 def falling(surface, position, velocity, pull):
     """Ask for the hit of a falling flight."""
-    return call(contract.falling_hit, surface, position, velocity, pull)
+    return call(surface.falling_hit, position, velocity, pull)

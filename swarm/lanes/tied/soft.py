@@ -33,12 +33,12 @@ class Soft(NamedTuple):
 
 
 def _normal_of(surface, r0, r1):
-    rise, _curvature = surfaces.gap_slope(surface, surfaces.inner(surface, r0), surfaces.inner(surface, r1))
-    return rise * surfaces.inner_gradient(surface, r0, r1)
+    rise, _curvature = surface.gap_slope(surface.inner(r0), surface.inner(r1))
+    return rise * surface.inner_gradient(r0, r1)
 
 
 def _gap_of(surface, r):
-    return surfaces.gap_of(surface, surfaces.inner(surface, r))
+    return surface.gap_of(surface.inner(r))
 
 
 # From this correction on the equations may be worse by the factor, in units of round-off.

@@ -196,7 +196,7 @@ def _is_in_another(members, number, r):
     for k in range(first, stop):
         m = members.grid.entries[k]
         body = member(members, index(m))
-        if contract.level_of(body, contract.inner(body, r)) > 0.0 and float(m) != number:
+        if body.level_of(body.inner(r)) > 0.0 and float(m) != number:
             return True
     return False
 
@@ -206,7 +206,7 @@ def _deepest(members, r):
     most = -math.inf
     first, stop = _entries_at(members.grid, r)
     for k in range(first, stop):
-        most = max(most, contract.distance(member(members, index(members.grid.entries[k])), r))
+        most = max(most, member(members, index(members.grid.entries[k])).distance(r))
     return most
 
 
@@ -245,7 +245,7 @@ def nearest(members, points, found):
             if phi < best:
                 best, which = phi, m + 1
             shell += 1.0
-        put(found, 0, i, contract.gradient(member(members, index(which - 1)), r))
+        put(found, 0, i, member(members, index(which - 1)).gradient(r))
         found[3, i] = best
 
 
@@ -265,7 +265,7 @@ def _least_in_shell(members, r, center, shell):
                 number = index(int((x * grid.shape.y + y) * grid.shape.z + z))
                 for k in range(grid.first[number], grid.first[number + 1]):
                     m = grid.entries[k]
-                    phi = contract.phi(member(members, index(m)), r)
+                    phi = member(members, index(m)).phi(r)
                     if phi < best:
                         best, which = phi, m
     return best, which

@@ -15,5 +15,5 @@ def within(members, points, found):
         r = column(points, 0, i)
         cell, inside = index(cell_of(grid, r).number), False
         for k in range(grid.first[cell], grid.first[cell + index(1)]):
-            inside = inside or contract.phi(member(members, index(grid.entries[k])), r) < 0.0
+            inside = inside or member(members, index(grid.entries[k])).phi(r) < 0.0
         found[i] = inside

@@ -156,12 +156,12 @@ class Form:
     def value(self, points: Floats) -> Floats:
         """phi at points (3, N) relative to the center."""
         with np.errstate(all="ignore"):
-            return np.broadcast_to(contract.phi(self.numbers((0.0, 0.0, 0.0)), vec(points)), points.shape[1:])
+            return np.broadcast_to(self.numbers((0.0, 0.0, 0.0)).phi(vec(points)), points.shape[1:])
 
     def slope(self, points: Floats) -> Floats:
         """Its gradient."""
         with np.errstate(all="ignore"):
-            parts = contract.gradient(self.numbers((0.0, 0.0, 0.0)), vec(points))
+            parts = self.numbers((0.0, 0.0, 0.0)).gradient(vec(points))
             return np.array(np.broadcast_arrays(*parts, points[0])[:3])
 
     def points(self, n: int) -> Floats:

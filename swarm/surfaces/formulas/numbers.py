@@ -46,7 +46,7 @@ class Bend(NamedTuple):
         return cls(least, most, Symmetric(*low.min(axis=1).tolist()), Symmetric(*high.max(axis=1).tolist()))
 
 
-class OwnNumbers(Record):
+class OwnNumbers(contract.Smooth):
     """The numbers of a surface by functions. The box is relative to the center."""
 
     center: Vec
@@ -61,38 +61,46 @@ class OwnNumbers(Record):
     margin: float
     parameters: Any
 
+    def hessian(self, r):
+        h = self.step
+        a = self.gradient(Vec(r.x + h, r.y, r.z))
+        b = self.gradient(Vec(r.x - h, r.y, r.z))
+        c = self.gradient(Vec(r.x, r.y + h, r.z))
+        d = self.gradient(Vec(r.x, r.y - h, r.z))
+        e = self.gradient(Vec(r.x, r.y, r.z + h))
+        f = self.gradient(Vec(r.x, r.y, r.z - h))
+        # Made symmetric
+        k = 0.25 / h
+        xy, yz, zx = a.y - b.y + c.x - d.x, c.z - d.z + e.y - f.y, e.x - f.x + a.z - b.z
+        return Symmetric(k * (a.x - b.x), k * (c.y - d.y), k * (e.z - f.z), 0.5 * k * xy, 0.5 * k * yz, 0.5 * k * zx)
 
-@contract.hessian.register(OwnNumbers)
-def _(surface, r):
-    h = surface.step
-    a = contract.gradient(surface, Vec(r.x + h, r.y, r.z))
-    b = contract.gradient(surface, Vec(r.x - h, r.y, r.z))
-    c = contract.gradient(surface, Vec(r.x, r.y + h, r.z))
-    d = contract.gradient(surface, Vec(r.x, r.y - h, r.z))
-    e = contract.gradient(surface, Vec(r.x, r.y, r.z + h))
-    f = contract.gradient(surface, Vec(r.x, r.y, r.z - h))
-    # Made symmetric
-    k = 0.25 / h
-    xy, yz, zx = a.y - b.y + c.x - d.x, c.z - d.z + e.y - f.y, e.x - f.x + a.z - b.z
-    return Symmetric(k * (a.x - b.x), k * (c.y - d.y), k * (e.z - f.z), 0.5 * k * xy, 0.5 * k * yz, 0.5 * k * zx)
+    def difference(self, r0, r1):
+        d = r1 - r0
+        if largest(d) > _SHORT * self.size:
+            return self.phi(r1) - self.phi(r0)
+        # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three points
+        m, e = 0.5 * (r0 + r1), _NODE * d
+        outer = self.gradient(m - e) + self.gradient(m + e)
+        return dot(5.0 * outer + 8.0 * self.gradient(m), d) / 18.0
 
+    def farthest_push(self):
+        # 1 + kappa H has its first pole at the least eigenvalue of side H.
+        least = self.bend.least
+        return self.side * (-1.0 / least if least < 0.0 else math.inf)
 
-@contract.difference.register(OwnNumbers)
-def _(surface, r0, r1):
-    d = r1 - r0
-    if largest(d) > _SHORT * surface.size:
-        return contract.phi(surface, r1) - contract.phi(surface, r0)
-    # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three points
-    m, e = 0.5 * (r0 + r1), _NODE * d
-    outer = contract.gradient(surface, m - e) + contract.gradient(surface, m + e)
-    return dot(5.0 * outer + 8.0 * contract.gradient(surface, m), d) / 18.0
+    def bend(self, r):
+        # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
+        most, magnitude = self.bend.most, max(abs(self.bend.least), abs(self.bend.most))
+        if self.closed == 0.0:
+            return most, magnitude, self.size
+        out = _outside(self, r)
+        return most, magnitude, select(out > 0.5 * self.margin, out, min(self.margin - out, self.size))
 
+    def clearance(self, r):
+        return select(self.closed > 0.0, max(_outside(self, r), 0.0), 0.0)
 
-@contract.farthest_push.register(OwnNumbers)
-def _(surface):
-    # 1 + kappa H has its first pole at the least eigenvalue of side H.
-    least = surface.bend.least
-    return surface.side * (-1.0 / least if least < 0.0 else math.inf)
+    def first_hit(self, r, v):
+        return _straight(self, r, v)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -104,26 +112,6 @@ def _outside(surface, r):
     across = max(surface.low.x - d.x, d.x - surface.high.x)
     across = max(across, surface.low.y - d.y, d.y - surface.high.y)
     return max(across, surface.low.z - d.z, d.z - surface.high.z)
-
-
-@contract.bend.register(OwnNumbers)
-def _(surface, r):
-    # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
-    most, magnitude = surface.bend.most, max(abs(surface.bend.least), abs(surface.bend.most))
-    if surface.closed == 0.0:
-        return most, magnitude, surface.size
-    out = _outside(surface, r)
-    return most, magnitude, select(out > 0.5 * surface.margin, out, min(surface.margin - out, surface.size))
-
-
-@contract.clearance.register(OwnNumbers)
-def _(surface, r):
-    return select(surface.closed > 0.0, max(_outside(surface, r), 0.0), 0.0)
-
-
-@contract.first_hit.register(OwnNumbers)
-def _(surface, r, v):
-    return _straight(surface, r, v)
 
 
 @outlined
@@ -145,8 +133,8 @@ def _straight(surface, r, v):
     before = t
     for i in range(_MARCH):
         p = r + t * v
-        level = surface.side * contract.phi(surface, p)
-        half = 0.5 * surface.side * dot(contract.gradient(surface, p), v)
+        level = surface.side * surface.phi(p)
+        half = 0.5 * surface.side * dot(surface.gradient(p), v)
         if level > 0.0 and half > 0.0 and i > 0:
             # Past the wall by round-off, or because the surface bends more than was said.
             return bisected(surface, r, v, ZERO, before, t), True

@@ -108,12 +108,12 @@ _WHERE = re.compile(
 
 @kernel
 def _compiled_phi(surface, r):
-    return contract.phi(surface, r) + 0.0
+    return surface.phi(r) + 0.0
 
 
 @kernel
 def _compiled_gradient(surface, r):
-    return total(contract.gradient(surface, r))
+    return total(surface.gradient(r))
 
 
 def require_compiled(surfaces: Sequence[Surface]) -> None:

@@ -75,6 +75,56 @@ class CapsuleNumbers(Distance):
     half: float  # of the length
     side: float
 
+    def inner(self, r):
+        return square(_from_segment(self, r))
+
+    def slope(self, r):
+        return 2.0 * _from_segment(self, r)
+
+    def hessian(self, r):
+        return Symmetric(1.0, 1.0, select(abs(r.z - self.center.z) > self.half, 1.0, 0.0), 0.0, 0.0, 0.0)
+
+    def difference(self, r0, r1):
+        w0, w1 = _from_segment(self, r0).z, _from_segment(self, r1).z
+        d, both = r1 - r0, r0 + r1 - 2.0 * self.center
+        # Beyond the same end w1 - w0 = z1 - z0, without the rounding of either.
+        rise = select(w0 * w1 > 0.0, d.z, w1 - w0)
+        return d.x * both.x + d.y * both.y + rise * (w0 + w1)
+
+    def first_hit(self, r, v):
+        d, side, half = r - self.center, self.side, self.half
+        tube = ball_rise_time(side, self.radius2, Vec(d.x, d.y, 0.0), Vec(v.x, v.y, 0.0))
+        # Where the flight meets the tube without ends decides: there, or at the sphere of that end. A flight towards a
+        # solid that is inside that tube already is before its end.
+        within = d.x * d.x + d.y * d.y < self.radius2
+        height = d.z + select((side < 0.0) & within, 0.0, v.z * tube)
+        from_end = Vec(d.x, d.y, d.z - select(height > 0.0, half, -half))
+        cap = ball_rise_time(side, self.radius2, from_end, v)
+        return select(abs(height) > half, cap, tube), True
+
+    def near(self, gravity, r, v):
+        # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by the
+        # square of the way beyond: higher than the tube's, lower than the sphere's.
+        g, side, e = as_vector(gravity), self.side, _from_segment(self, r)
+        past = abs(r.z - self.center.z) - self.half
+        in_tube, q = past <= 0.0, square(e)
+        speed, pull = select(in_tube, 0.0, v.z), select(in_tube, 0.0, g.z)
+        s2 = v.x * v.x + v.y * v.y + speed * speed + e.x * g.x + e.y * g.y + e.z * pull
+        s3, s4 = v.x * g.x + v.y * g.y + speed * pull, 0.25 * (g.x * g.x + g.y * g.y + pull * pull)
+        # From afar to a thicker one: of a small distance round-off leaves nothing.
+        far = q > _AFAR * self.radius2
+        radius2 = select(far, q * (1.0 / _AFAR), self.radius2)
+        size2 = select(q > radius2, q, radius2)
+        return Near(
+            side * (q - radius2), side * dot(e, v), side * s2, (side * s3, side * s4),
+            2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * self.radius2, not far,
+            Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
+        )  # fmt: skip
+
+    def bend(self, r):
+        # 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
+        return (select(self.side > 0.0, 1.0, 0.0), 1.0, self.radius)
+
 
 def _from_segment(surface, r):
     """The vector from the nearest point of the segment."""
@@ -84,64 +134,9 @@ def _from_segment(surface, r):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.inner.register(CapsuleNumbers, lambda surface, r: square(_from_segment(surface, r)))
-contract.slope.register(CapsuleNumbers, lambda surface, r: 2.0 * _from_segment(surface, r))
-
-
-@contract.hessian.register(CapsuleNumbers)
-def _(surface, r):
-    return Symmetric(1.0, 1.0, select(abs(r.z - surface.center.z) > surface.half, 1.0, 0.0), 0.0, 0.0, 0.0)
-
-
-@contract.difference.register(CapsuleNumbers)
-def _(surface, r0, r1):
-    w0, w1 = _from_segment(surface, r0).z, _from_segment(surface, r1).z
-    d, both = r1 - r0, r0 + r1 - 2.0 * surface.center
-    # Beyond the same end w1 - w0 = z1 - z0, without the rounding of either.
-    rise = select(w0 * w1 > 0.0, d.z, w1 - w0)
-    return d.x * both.x + d.y * both.y + rise * (w0 + w1)
-
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@contract.first_hit.register(CapsuleNumbers)
-def _(surface, r, v):
-    d, side, half = r - surface.center, surface.side, surface.half
-    tube = ball_rise_time(side, surface.radius2, Vec(d.x, d.y, 0.0), Vec(v.x, v.y, 0.0))
-    # Where the flight meets the tube without ends decides: there, or at the sphere of that end. A flight towards a
-    # solid that is inside that tube already is before its end.
-    within = d.x * d.x + d.y * d.y < surface.radius2
-    height = d.z + select((side < 0.0) & within, 0.0, v.z * tube)
-    from_end = Vec(d.x, d.y, d.z - select(height > 0.0, half, -half))
-    cap = ball_rise_time(side, surface.radius2, from_end, v)
-    return select(abs(height) > half, cap, tube), True
-
-
 # Without gravity the hit has a closed form.
 flights.in_steps.register(CapsuleNumbers, lambda surface: None)
-
-
-@contract.near.register(CapsuleNumbers)
-def _(surface, gravity, r, v):
-    # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by the
-    # square of the way beyond: higher than the tube's, lower than the sphere's.
-    g, side, e = as_vector(gravity), surface.side, _from_segment(surface, r)
-    past = abs(r.z - surface.center.z) - surface.half
-    in_tube, q = past <= 0.0, square(e)
-    speed, pull = select(in_tube, 0.0, v.z), select(in_tube, 0.0, g.z)
-    s2 = v.x * v.x + v.y * v.y + speed * speed + e.x * g.x + e.y * g.y + e.z * pull
-    s3, s4 = v.x * g.x + v.y * g.y + speed * pull, 0.25 * (g.x * g.x + g.y * g.y + pull * pull)
-    # From afar to a thicker one: of a small distance round-off leaves nothing.
-    far = q > _AFAR * surface.radius2
-    radius2 = select(far, q * (1.0 / _AFAR), surface.radius2)
-    size2 = select(q > radius2, q, radius2)
-    return Near(
-        side * (q - radius2), side * dot(e, v), side * s2, (side * s3, side * s4),
-        2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * surface.radius2, not far,
-        Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
-    )  # fmt: skip
-
-
-# 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
-contract.bend.register(CapsuleNumbers, lambda surface, r: (select(surface.side > 0.0, 1.0, 0.0), 1.0, surface.radius))

@@ -71,54 +71,43 @@ class EllipsoidNumbers(QuadricNumbers):
         size = 1.0 + select(c > 0.0, c, 0.0)
         return level_and_window(c, 1.0, size, form(self.a, v, v), form(self.a, pull, pull))
 
+    def unit_normal(self, r):
+        # Without the test for an apex, which was a sixth of the time of an impact
+        n = times(self.a, r - self.center)
+        return n * (self.side / norm(n))
+
+    def rise(self, r0, p, kappa):
+        # s = r0 + r1 = (2 r0 + p)/(1 + kappa A) and e = r1 - r0 = (p - 2 kappa A r0)/(1 + kappa A): q1 - q0 = s.A e
+        a, d, w = self.a, r0 - self.center, widths(self.a, kappa)
+        s, e = times(2.0 * d + p, w), times(p - times((2.0 * kappa) * a, d), w)
+        # dr1/dkappa = -A s/(1 + kappa A)
+        return form(a, s, e), -2.0 * form(a, d + e, times(times(a, s), w))
+
+    def chord_improve(self, r, p, kappa):
+        # With m = r0 + r1 = (2 r0 + p)/(1 + kappa A), q1 = q0 reads f(kappa) = m.A m - 2 r0.A m = 0.
+        a, d, w = self.a, r - self.center, widths(self.a, kappa)
+        m = times(2.0 * d + p, w)
+        # -f'(kappa)/2 = sum A^2 m (m - r0)/(1 + kappa A)
+        slope = total(times(times(times(times(a, a), m), m - d), w))
+        return -form(a, m, m - 2.0 * d) / (2.0 * slope)
+
+    def chord_normal(self, r, p, kappa):
+        # D(r0, r1) = A m
+        n = times(times(self.a, 2.0 * (r - self.center) + p), widths(self.a, kappa))
+        return n * (self.side / norm(n))
+
 
 class EllipsoidCavity(EllipsoidNumbers):
     """A cavity: every flight in it meets the wall."""
+
+    def first_hit(self, r, v):
+        c, b, a = parabola(self, r, v)
+        return rise_time_inside(c, b, a), True
+
+    may_be_far = False
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@contract.first_hit.register(EllipsoidCavity)
-def _(surface, r, v):
-    c, b, a = parabola(surface, r, v)
-    return rise_time_inside(c, b, a), True
-
-
-contract.may_be_far.register(EllipsoidCavity, lambda surface: False)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-
-@contract.unit_normal.register(EllipsoidNumbers)
-def _(surface, r):
-    # Without the test for an apex, which was a sixth of the time of an impact
-    n = times(surface.a, r - surface.center)
-    return n * (surface.side / norm(n))
-
-
-@contract.rise.register(EllipsoidNumbers)
-def _(surface, r0, p, kappa):
-    # s = r0 + r1 = (2 r0 + p)/(1 + kappa A) and e = r1 - r0 = (p - 2 kappa A r0)/(1 + kappa A): q1 - q0 = s.A e
-    a, d, w = surface.a, r0 - surface.center, widths(surface.a, kappa)
-    s, e = times(2.0 * d + p, w), times(p - times((2.0 * kappa) * a, d), w)
-    # dr1/dkappa = -A s/(1 + kappa A)
-    return form(a, s, e), -2.0 * form(a, d + e, times(times(a, s), w))
-
-
-@contract.chord_improve.register(EllipsoidNumbers)
-def _(surface, r, p, kappa):
-    # With m = r0 + r1 = (2 r0 + p)/(1 + kappa A), q1 = q0 reads f(kappa) = m.A m - 2 r0.A m = 0.
-    a, d, w = surface.a, r - surface.center, widths(surface.a, kappa)
-    m = times(2.0 * d + p, w)
-    # -f'(kappa)/2 = sum A^2 m (m - r0)/(1 + kappa A)
-    slope = total(times(times(times(times(a, a), m), m - d), w))
-    return -form(a, m, m - 2.0 * d) / (2.0 * slope)
-
-
-@contract.chord_normal.register(EllipsoidNumbers)
-def _(surface, r, p, kappa):
-    # D(r0, r1) = A m
-    n = times(times(surface.a, 2.0 * (r - surface.center) + p), widths(surface.a, kappa))
-    return n * (surface.side / norm(n))

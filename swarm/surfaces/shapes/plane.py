@@ -65,56 +65,77 @@ class PlaneNumbers(ExactChord):
     normal: Vec
     offset: float
 
+    def phi(self, r):
+        return self.inner(r) - self.offset
+
+    def gradient(self, r):
+        return self.normal
+
+    def slope(self, r):
+        return self.normal
+
+    def unit_normal(self, r):
+        return self.normal
+
+    def inner(self, r):
+        return dot(self.normal, r)
+
+    def gap_of(self, q):
+        return q - self.offset
+
+    def gap_slope(self, q0, q1):
+        return (1.0, 0.0)
+
+    def settle(self, r):
+        return r - (self.inner(r) - self.offset) * self.normal
+
+    def outward_acceleration(self, r, v, pull):
+        return dot(self.normal, pull)
+
+    flat = True
+
+    def first_hit(self, r, v):
+        approach = dot(self.normal, v)
+        time = (self.offset - self.inner(r)) / approach
+        return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
+
+    def falling_hit(self, r, v, pull):
+        c = self.inner(r) - self.offset
+        return rise_time(c, 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull)), True
+
+    def safe_time(self, r, v, pull):
+        time, _found = self.falling_hit(r, v, pull)
+        return select(self.inner(r) > self.offset, 0.0, time)
+
+    def inner_gradient(self, r0, r1):
+        return self.normal
+
+    def step_normal(self, r0, r1):
+        return self.normal
+
+    def push(self, r0, p, kappa):
+        return r0 + (p - kappa * self.normal)
+
+    def rise(self, r0, p, kappa):
+        return (dot(self.normal, p) - kappa, -1.0)
+
+    def resolve(self, r, strength):
+        return r - strength * self.normal
+
+    def farthest_push(self):
+        return math.inf
+
+    def chord_guess(self, r, p):
+        return dot(self.normal, p)
+
+    def chord_normal(self, r, p, kappa):
+        return self.normal
+
 
 # --- The level set ---------------------------------------------------------------------------------------
-
-contract.phi.register(PlaneNumbers, lambda surface, r: contract.inner(surface, r) - surface.offset)
-contract.gradient.register(PlaneNumbers, lambda surface, r: surface.normal)
-contract.slope.register(PlaneNumbers, lambda surface, r: surface.normal)
-contract.unit_normal.register(PlaneNumbers, lambda surface, r: surface.normal)
-contract.inner.register(PlaneNumbers, lambda surface, r: dot(surface.normal, r))
-contract.gap_of.register(PlaneNumbers, lambda surface, q: q - surface.offset)
-contract.gap_slope.register(PlaneNumbers, lambda surface, q0, q1: (1.0, 0.0))
-
-
-@contract.settle.register(PlaneNumbers)
-def _(surface, r):
-    return r - (contract.inner(surface, r) - surface.offset) * surface.normal
-
-
-contract.outward_acceleration.register(PlaneNumbers, lambda surface, r, v, pull: dot(surface.normal, pull))
-contract.flat.register(PlaneNumbers, lambda surface: True)
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@contract.first_hit.register(PlaneNumbers)
-def _(surface, r, v):
-    approach = dot(surface.normal, v)
-    time = (surface.offset - contract.inner(surface, r)) / approach
-    return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
-
-
-@contract.falling_hit.register(PlaneNumbers)
-def _(surface, r, v, pull):
-    c = contract.inner(surface, r) - surface.offset
-    return rise_time(c, 0.5 * dot(surface.normal, v), 0.5 * dot(surface.normal, pull)), True
-
-
-@contract.safe_time.register(PlaneNumbers)
-def _(surface, r, v, pull):
-    time, _found = contract.falling_hit(surface, r, v, pull)
-    return select(contract.inner(surface, r) > surface.offset, 0.0, time)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-contract.inner_gradient.register(PlaneNumbers, lambda surface, r0, r1: surface.normal)
-contract.step_normal.register(PlaneNumbers, lambda surface, r0, r1: surface.normal)
-contract.push.register(PlaneNumbers, lambda surface, r0, p, kappa: r0 + (p - kappa * surface.normal))
-contract.rise.register(PlaneNumbers, lambda surface, r0, p, kappa: (dot(surface.normal, p) - kappa, -1.0))
-contract.resolve.register(PlaneNumbers, lambda surface, r, strength: r - strength * surface.normal)
-contract.farthest_push.register(PlaneNumbers, lambda surface: math.inf)
-contract.chord_guess.register(PlaneNumbers, lambda surface, r, p: dot(surface.normal, p))
-contract.chord_normal.register(PlaneNumbers, lambda surface, r, p, kappa: surface.normal)

@@ -21,7 +21,7 @@ _CHORD_SWEEPS = 12
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class QuadricNumbers(Record):
+class QuadricNumbers(contract.Smooth):
     """What kernels know of a quadric; it, or its waist, may be small compared with the distance of a flight from it."""
 
     center: Vec
@@ -74,9 +74,105 @@ class QuadricNumbers(Record):
         window = select(abs(window) > 0.0, window, 1.0)
         return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
+    def phi(self, r):
+        return self.inner(r) - self.level
+
+    def gradient(self, r):
+        return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
+
+    def slope(self, r):
+        return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
+
+    def inner(self, r):
+        d = r - self.center
+        return form(self.a, d, d) + self.linear(d)
+
+    def gap_of(self, q):
+        return self.side * (q - self.level)
+
+    def distance(self, r):
+        g2 = square(self.gradient(r))
+        return self.gap_of(self.inner(r)) / math.sqrt(select(g2 > _TINY, g2, _TINY))
+
+    def unit_normal(self, r):
+        return _unit(self, self.gradient(r))
+
+    def settle(self, r):
+        g = self.gradient(r)
+        g2 = square(g)
+        return r - (self.phi(r) / select(g2 > _TINY, g2, 1.0)) * g
+
+    def outward_acceleration(self, r, v, pull):
+        # (2 v.A v + grad q.G)/|grad q|
+        g = self.gradient(r)
+        g2 = square(g)
+        return self.side * (2.0 * form(self.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > _TINY, g2, 1.0))
+
+    def first_hit(self, r, v):
+        c, b, a = parabola(self, r, v)
+        d = self.discriminant(r - self.center, v, c, b, a)
+        return rise_time_by(self.side * c, self.side * b, self.side * a, d), True
+
+    def course(self, r, v, pull):
+        # phi(r + v t + G t^2/2), a quartic in t
+        d, side = r - self.center, self.side
+        c, b, a = parabola(self, r, v)
+        a2 = a + form(self.a, d, pull) + 0.5 * self.linear(pull)
+        a3, a4 = form(self.a, v, pull), 0.25 * form(self.a, pull, pull)
+        c, window = self.level_window(c, d, v, pull)
+        # What is left of a3 where G A G is below the smallest number would be infinite after an infinite time.
+        curved = side * select(window < math.inf, 1.0, 0.0)
+        return Quartic(side * c, side * b, side * a2, curved * a3, curved * a4, window)
+
+    def gap_slope(self, q0, q1):
+        return (self.side, 0.0)
+
+    def inner_gradient(self, r0, r1):
+        # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
+        return self.tilted(times(self.a, r0 + r1 - 2.0 * self.center), 1.0)
+
+    def step_normal(self, r0, r1):
+        return _unit(self, self.inner_gradient(r0, r1))
+
+    def push(self, r0, p, kappa):
+        a, d, f = self.a, r0 - self.center, self.tilted(p, -kappa)
+        moved = Vec(_pushed(a.x, d.x, f.x, kappa), _pushed(a.y, d.y, f.y, kappa), _pushed(a.z, d.z, f.z, kappa))
+        return self.center + moved
+
+    def resolve(self, r, strength):
+        # (1 + 2 strength A) s = r - strength b
+        moved = self.tilted(r - self.center, -strength)
+        return self.center + times(widths(self.a, 2.0 * strength), moved)
+
+    def rise(self, r0, p, kappa):
+        n, e, w = _step(self, r0, p, kappa)
+        # dr1/dkappa = -D/(1 + kappa A), and grad q(r1) = D + A (r1 - r0)
+        return dot(n, e), -total(times(times(n + times(self.a, e), n), w))
+
+    def farthest_push(self):
+        # The first pole of 1/(1 + kappa A) on the side to which the surface pushes
+        side, a = self.side, self.a
+        steepest = max(-side * a.x, -side * a.y, -side * a.z)
+        return side * select(steepest > 0.0, 1.0 / select(steepest > 0.0, steepest, 1.0), math.inf)
+
+    chord_sweeps = _CHORD_SWEEPS
+
+    def chord_normal(self, r, p, kappa):
+        n, _moved, _widths = _step(self, r, p, kappa)
+        return _unit(self, n)
+
+    def bend(self, r):
+        # For walls that move other than uniformly
+        a, side = self.a, self.side
+        return max(side * a.x, side * a.y, side * a.z), largest(a), math.inf
+
 
 class ConvexQuadric(QuadricNumbers):
     """A convex cavity: the level along a straight flight has no maximum."""
+
+    def first_hit(self, r, v):
+        c, b, a = parabola(self, r, v)
+        return rise_time_inside(self.side * c, self.side * b, self.side * a), True
 
 
 def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, side: str) -> QuadricNumbers:
@@ -109,47 +205,6 @@ def _unit(surface, n):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.phi.register(QuadricNumbers, lambda surface, r: contract.inner(surface, r) - surface.level)
-
-
-@contract.gradient.register(QuadricNumbers)
-@contract.slope.register(QuadricNumbers)
-def _(surface, r):
-    return surface.tilted(times(2.0 * surface.a, r - surface.center), 1.0)
-
-
-@contract.inner.register(QuadricNumbers)
-def _(surface, r):
-    d = r - surface.center
-    return form(surface.a, d, d) + surface.linear(d)
-
-
-contract.gap_of.register(QuadricNumbers, lambda surface, q: surface.side * (q - surface.level))
-
-
-@contract.distance.register(QuadricNumbers)
-def _(surface, r):
-    g2 = square(contract.gradient(surface, r))
-    return contract.gap_of(surface, contract.inner(surface, r)) / math.sqrt(select(g2 > _TINY, g2, _TINY))
-
-
-contract.unit_normal.register(QuadricNumbers, lambda surface, r: _unit(surface, contract.gradient(surface, r)))
-
-
-@contract.settle.register(QuadricNumbers)
-def _(surface, r):
-    g = contract.gradient(surface, r)
-    g2 = square(g)
-    return r - (contract.phi(surface, r) / select(g2 > _TINY, g2, 1.0)) * g
-
-
-@contract.outward_acceleration.register(QuadricNumbers)
-def _(surface, r, v, pull):
-    # (2 v.A v + grad q.G)/|grad q|
-    g = contract.gradient(surface, r)
-    g2 = square(g)
-    return surface.side * (2.0 * form(surface.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > _TINY, g2, 1.0))
-
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
@@ -157,20 +212,7 @@ def _(surface, r, v, pull):
 def parabola(surface, r, v):
     """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
     b = form(surface.a, r - surface.center, v) + 0.5 * surface.linear(v)
-    return contract.phi(surface, r), b, form(surface.a, v, v)
-
-
-@contract.first_hit.register(ConvexQuadric)
-def _(surface, r, v):
-    c, b, a = parabola(surface, r, v)
-    return rise_time_inside(surface.side * c, surface.side * b, surface.side * a), True
-
-
-@contract.first_hit.register(QuadricNumbers)
-def _(surface, r, v):
-    c, b, a = parabola(surface, r, v)
-    d = surface.discriminant(r - surface.center, v, c, b, a)
-    return rise_time_by(surface.side * c, surface.side * b, surface.side * a, d), True
+    return surface.phi(r), b, form(surface.a, v, v)
 
 
 def turning(a, w):
@@ -178,40 +220,7 @@ def turning(a, w):
     return times(times(Vec(a.y * a.z, a.x * a.z, a.x * a.y), w), w)
 
 
-@contract.course.register(QuadricNumbers)
-def _(surface, r, v, pull):
-    # phi(r + v t + G t^2/2), a quartic in t
-    d, side = r - surface.center, surface.side
-    c, b, a = parabola(surface, r, v)
-    a2 = a + form(surface.a, d, pull) + 0.5 * surface.linear(pull)
-    a3, a4 = form(surface.a, v, pull), 0.25 * form(surface.a, pull, pull)
-    c, window = surface.level_window(c, d, v, pull)
-    # What is left of a3 where G A G is below the smallest number would be infinite after an infinite time.
-    curved = side * select(window < math.inf, 1.0, 0.0)
-    return Quartic(side * c, side * b, side * a2, curved * a3, curved * a4, window)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-contract.gap_slope.register(QuadricNumbers, lambda surface, q0, q1: (surface.side, 0.0))
-
-
-@contract.inner_gradient.register(QuadricNumbers)
-def _(surface, r0, r1):
-    # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    return surface.tilted(times(surface.a, r0 + r1 - 2.0 * surface.center), 1.0)
-
-
-@contract.step_normal.register(QuadricNumbers)
-def _(surface, r0, r1):
-    return _unit(surface, contract.inner_gradient(surface, r0, r1))
-
-
-@contract.push.register(QuadricNumbers)
-def _(surface, r0, p, kappa):
-    a, d, f = surface.a, r0 - surface.center, surface.tilted(p, -kappa)
-    moved = Vec(_pushed(a.x, d.x, f.x, kappa), _pushed(a.y, d.y, f.y, kappa), _pushed(a.z, d.z, f.z, kappa))
-    return surface.center + moved
 
 
 def _pushed(a, d, f, kappa):
@@ -219,48 +228,10 @@ def _pushed(a, d, f, kappa):
     return ((1.0 - kappa * a) * d + f) / (1.0 + kappa * a)
 
 
-@contract.resolve.register(QuadricNumbers)
-def _(surface, r, strength):
-    # (1 + 2 strength A) s = r - strength b
-    moved = surface.tilted(r - surface.center, -strength)
-    return surface.center + times(widths(surface.a, 2.0 * strength), moved)
-
-
 def _step(surface, r0, p, kappa):
     """D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
 
     With G = grad q(r0): D = (G + A p)/(1 + kappa A) and r1 - r0 = (p - kappa G)/(1 + kappa A).
     """
-    g, w = contract.gradient(surface, r0), widths(surface.a, kappa)
+    g, w = surface.gradient(r0), widths(surface.a, kappa)
     return times(g + times(surface.a, p), w), times(p - kappa * g, w), w
-
-
-@contract.rise.register(QuadricNumbers)
-def _(surface, r0, p, kappa):
-    n, e, w = _step(surface, r0, p, kappa)
-    # dr1/dkappa = -D/(1 + kappa A), and grad q(r1) = D + A (r1 - r0)
-    return dot(n, e), -total(times(times(n + times(surface.a, e), n), w))
-
-
-@contract.farthest_push.register(QuadricNumbers)
-def _(surface):
-    # The first pole of 1/(1 + kappa A) on the side to which the surface pushes
-    side, a = surface.side, surface.a
-    steepest = max(-side * a.x, -side * a.y, -side * a.z)
-    return side * select(steepest > 0.0, 1.0 / select(steepest > 0.0, steepest, 1.0), math.inf)
-
-
-contract.chord_sweeps.register(QuadricNumbers, lambda surface: _CHORD_SWEEPS)
-
-
-@contract.chord_normal.register(QuadricNumbers)
-def _(surface, r, p, kappa):
-    n, _moved, _widths = _step(surface, r, p, kappa)
-    return _unit(surface, n)
-
-
-@contract.bend.register(QuadricNumbers)
-def _(surface, r):
-    # For walls that move other than uniformly
-    a, side = surface.a, surface.side
-    return max(side * a.x, side * a.y, side * a.z), largest(a), math.inf

@@ -151,6 +151,84 @@ class SlabNumbers(Distance, ExactChord):
     radius2: float
     side: float
 
+    def gradient(self, r):
+        return scaled(self.normal, np.copysign(1.0, _off(self, r)))
+
+    def inner(self, r):
+        d = _off(self, r)
+        return d * d
+
+    def slope(self, r):
+        return scaled(self.normal, 2.0 * _off(self, r))
+
+    def unit_normal(self, r):
+        return scaled(self.normal, math.copysign(1.0, self.side * _off(self, r)))
+
+    def settle(self, r):
+        d = _off(self, r)
+        return r - scaled(self.normal, d - math.copysign(self.radius, d))
+
+    def outward_acceleration(self, r, v, pull):
+        return dot(self.unit_normal(r), pull)
+
+    flat = True
+
+    def first_hit(self, r, v):
+        d, u = _off(self, r), along(self.normal, v)
+        # Between the walls the one ahead, outside of them the one on the side where the flight comes from
+        time = (self.side * math.copysign(self.radius, u) - d) / u
+        meets = select(self.side > 0.0, abs(u), -d * u) > 0.0
+        return select(meets, select(time > 0.0, time, 0.0), math.inf), True
+
+    def falling_hit(self, r, v, pull):
+        near = near_face_hit(self, r, v, pull)
+        d = _off(self, r)
+        sign = math.copysign(0.5, d)
+        b, a = sign * along(self.normal, v), sign * along(self.normal, pull)
+        # Between them the far one too
+        far = rise_time(-abs(d) - self.radius, -b, -a)
+        return select((self.side > 0.0) & (far < near), far, near), True
+
+    def safe_time(self, r, v, pull):
+        time, _found = self.falling_hit(r, v, pull)
+        return select(self.distance(r) > 0.0, 0.0, time)
+
+    def inner_gradient(self, r0, r1):
+        # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
+        return scaled(self.normal, _off(self, r0) + _off(self, r1))
+
+    def step_normal(self, r0, r1):
+        return self.unit_normal(r0)
+
+    def push(self, r0, p, kappa):
+        # r1 = r0 + p - kappa (s0 + s1) n
+        k = kappa * (2.0 * _off(self, r0) + along(self.normal, p)) / (1.0 + kappa)
+        return r0 + (p - scaled(self.normal, k))
+
+    def rise(self, r0, p, kappa):
+        # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
+        d, u = _off(self, r0), along(self.normal, p)
+        w = 1.0 / (1.0 + kappa)
+        both, change = (2.0 * d + u) * w, (u - 2.0 * kappa * d) * w
+        risen = both * change
+        # q1 >= 0, even by round-off.
+        return select(risen > -d * d, risen, -d * d), -2.0 * (d + change) * both * w
+
+    def resolve(self, r, strength):
+        return r - scaled(self.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(self, r))
+
+    def chord_guess(self, r, p):
+        # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
+        return 0.5 * along(self.normal, p) / _off(self, r)
+
+    def chord_normal(self, r, p, kappa):
+        d = 2.0 * _off(self, r) + along(self.normal, p)
+        return scaled(self.normal, math.copysign(1.0, self.side * d))
+
+    def bend(self, r):
+        # H = n n^T: for walls that move other than uniformly
+        return (select(self.side > 0.0, 1.0, 0.0), 1.0, math.inf)
+
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
     """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
@@ -165,47 +243,8 @@ def _off(surface, r):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.gradient.register(SlabNumbers, lambda surface, r: scaled(surface.normal, np.copysign(1.0, _off(surface, r))))
-
-
-@contract.inner.register(SlabNumbers)
-def _(surface, r):
-    d = _off(surface, r)
-    return d * d
-
-
-contract.slope.register(SlabNumbers, lambda surface, r: scaled(surface.normal, 2.0 * _off(surface, r)))
-
-
-@contract.unit_normal.register(SlabNumbers)
-def _(surface, r):
-    return scaled(surface.normal, math.copysign(1.0, surface.side * _off(surface, r)))
-
-
-@contract.settle.register(SlabNumbers)
-def _(surface, r):
-    d = _off(surface, r)
-    return r - scaled(surface.normal, d - math.copysign(surface.radius, d))
-
-
-@contract.outward_acceleration.register(SlabNumbers)
-def _(surface, r, v, pull):
-    return dot(contract.unit_normal(surface, r), pull)
-
-
-contract.flat.register(SlabNumbers, lambda surface: True)
-
 
 # --- Flight ----------------------------------------------------------------------------------------------
-
-
-@contract.first_hit.register(SlabNumbers)
-def _(surface, r, v):
-    d, u = _off(surface, r), along(surface.normal, v)
-    # Between the walls the one ahead, outside of them the one on the side where the flight comes from
-    time = (surface.side * math.copysign(surface.radius, u) - d) / u
-    meets = select(surface.side > 0.0, abs(u), -d * u) > 0.0
-    return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
 
 def near_face_hit(surface, r, v, pull):
@@ -216,67 +255,4 @@ def near_face_hit(surface, r, v, pull):
     return rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
 
 
-@contract.falling_hit.register(SlabNumbers)
-def _(surface, r, v, pull):
-    near = near_face_hit(surface, r, v, pull)
-    d = _off(surface, r)
-    sign = math.copysign(0.5, d)
-    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
-    # Between them the far one too
-    far = rise_time(-abs(d) - surface.radius, -b, -a)
-    return select((surface.side > 0.0) & (far < near), far, near), True
-
-
-@contract.safe_time.register(SlabNumbers)
-def _(surface, r, v, pull):
-    time, _found = contract.falling_hit(surface, r, v, pull)
-    return select(contract.distance(surface, r) > 0.0, 0.0, time)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-
-@contract.inner_gradient.register(SlabNumbers)
-def _(surface, r0, r1):
-    # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-    return scaled(surface.normal, _off(surface, r0) + _off(surface, r1))
-
-
-contract.step_normal.register(SlabNumbers, lambda surface, r0, r1: contract.unit_normal(surface, r0))
-
-
-@contract.push.register(SlabNumbers)
-def _(surface, r0, p, kappa):
-    # r1 = r0 + p - kappa (s0 + s1) n
-    k = kappa * (2.0 * _off(surface, r0) + along(surface.normal, p)) / (1.0 + kappa)
-    return r0 + (p - scaled(surface.normal, k))
-
-
-@contract.rise.register(SlabNumbers)
-def _(surface, r0, p, kappa):
-    # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
-    d, u = _off(surface, r0), along(surface.normal, p)
-    w = 1.0 / (1.0 + kappa)
-    both, change = (2.0 * d + u) * w, (u - 2.0 * kappa * d) * w
-    risen = both * change
-    # q1 >= 0, even by round-off.
-    return select(risen > -d * d, risen, -d * d), -2.0 * (d + change) * both * w
-
-
-@contract.resolve.register(SlabNumbers)
-def _(surface, r, strength):
-    return r - scaled(surface.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(surface, r))
-
-
-# q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-contract.chord_guess.register(SlabNumbers, lambda surface, r, p: 0.5 * along(surface.normal, p) / _off(surface, r))
-
-
-@contract.chord_normal.register(SlabNumbers)
-def _(surface, r, p, kappa):
-    d = 2.0 * _off(surface, r) + along(surface.normal, p)
-    return scaled(surface.normal, math.copysign(1.0, surface.side * d))
-
-
-# H = n n^T: for walls that move other than uniformly
-contract.bend.register(SlabNumbers, lambda surface, r: (select(surface.side > 0.0, 1.0, 0.0), 1.0, math.inf))

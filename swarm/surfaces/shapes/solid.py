@@ -33,12 +33,48 @@ _ENTRIES = 100
 _SPACING = 6e-6
 
 
-class SolidNumbers(Record):
+class SolidNumbers(contract.Smooth):
     """What kernels know of a body: its parts, and a length that bounds the round-off of their coordinates."""
 
     parts: Any  # Chain or None
     side: float
     extent: float
+
+    def phi(self, r):
+        return _largest(self.parts, r)[0]
+
+    def gradient(self, r):
+        return _largest(self.parts, r)[1]
+
+    def hessian(self, r):
+        h = _SPACING * (total(absolute(r)) + self.extent) + np.finfo(np.float64).tiny
+        return _bend_of_largest(self.parts, r, h)[1]
+
+    def first_hit(self, r, v):
+        return _entry(self, None, r, v)
+
+    def falling_hit(self, r, v, pull):
+        return _entry(self, Gravity(pull.x, pull.y, pull.z), r, v)
+
+    def safe_time(self, r, v, pull):
+        # Outside of one part is outside of the body.
+        longest = 0.0
+        for link in reversed(each(self.parts)):
+            longest = max(link.first.safe_time(r, v, pull), longest)
+        return longest
+
+    def unit_normal(self, r):
+        # That of the part which the point is least deep in
+        least, normal = math.inf, ZERO
+        for link in reversed(each(self.parts)):
+            depth = link.first.distance(r)
+            if not depth > least:
+                least, normal = depth, link.first.unit_normal(r)
+        return normal
+
+    def farthest_push(self):
+        # phi is about the distance, whose faces are flat or wide: no pole within a push.
+        return -math.inf
 
 
 def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
@@ -59,27 +95,18 @@ def _sign(part):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.phi.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r)[0])
-contract.gradient.register(SolidNumbers, lambda surface, r: _largest(surface.parts, r)[1])
-
 
 def _largest(parts, r):
     """The largest phi of the parts, and its gradient."""
     most, gradient = -math.inf, ZERO
     for link in reversed(each(parts)):
         sign = _sign(link.first)
-        here = sign * contract.phi(link.first, r)
+        here = sign * link.first.phi(r)
         # No select: these may be arrays.
         use = 1.0 * (here >= most)
         most = np.maximum(here, most)
-        gradient = (use * sign) * contract.gradient(link.first, r) + (1.0 - use) * gradient
+        gradient = (use * sign) * link.first.gradient(r) + (1.0 - use) * gradient
     return most, gradient
-
-
-@contract.hessian.register(SolidNumbers)
-def _(surface, r):
-    h = _SPACING * (total(absolute(r)) + surface.extent) + np.finfo(np.float64).tiny
-    return _bend_of_largest(surface.parts, r, h)[1]
 
 
 def _bend_of_largest(parts, r, h):
@@ -87,7 +114,7 @@ def _bend_of_largest(parts, r, h):
     most, bend = -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for link in reversed(each(parts)):
         sign = _sign(link.first)
-        here = sign * contract.phi(link.first, r)
+        here = sign * link.first.phi(r)
         if not here < most:
             f = 0.25 * sign / h
             x, y = _turn(link.first, r, Vec(h, 0.0, 0.0), f), _turn(link.first, r, Vec(0.0, h, 0.0), f)
@@ -97,7 +124,7 @@ def _bend_of_largest(parts, r, h):
 
 
 def _turn(part, r, step, f):
-    return f * (contract.gradient(part, r + step) - contract.gradient(part, r - step))
+    return f * (part.gradient(r + step) - part.gradient(r - step))
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -116,14 +143,6 @@ def _(surface, gravity, course, row, lane, r, v):
     time, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
     time, last = _entry_step(surface, gravity, r, v, time, last)
     course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
-
-
-contract.first_hit.register(SolidNumbers, lambda surface, r, v: _entry(surface, None, r, v))
-
-
-@contract.falling_hit.register(SolidNumbers)
-def _(surface, r, v, pull):
-    return _entry(surface, Gravity(pull.x, pull.y, pull.z), r, v)
 
 
 @outlined
@@ -159,7 +178,7 @@ def _last_entry(parts, gravity, extent, r, v):
     for link in reversed(each(parts)):
         here, found_here = _entry_of(link.first, gravity, r, v)
         # On the face of a part, which is left or entered now, the sign of the approach decides.
-        depth = contract.gap_of(link.first, contract.inner(link.first, r))
+        depth = link.first.gap_of(link.first.inner(r))
         later = (here > time) & (not (depth > noise(link.first, extent, r)))
         time, found = select(later, here, time), select(later, found_here, found)
     return time, found
@@ -168,44 +187,20 @@ def _last_entry(parts, gravity, extent, r, v):
 def _entry_of(part, gravity, r, v):
     """A time until which a flight surely does not enter a part: (time, whether it does then)."""
     if gravity is None:
-        return contract.first_hit(part, r, v)
+        return part.first_hit(r, v)
     pull = as_vector(gravity)
     if isinstance(part, SlabNumbers):
         return near_face_hit(part, r, v, pull), True
-    if contract.is_quartic(part):
-        return rise_near(contract.course(part, r, v, pull))
-    return contract.falling_hit(part, r, v, pull)
+    if part.is_quartic:
+        return rise_near(part.course(r, v, pull))
+    return part.falling_hit(r, v, pull)
 
 
 def noise(part, extent, r):
     """The round-off of the gap of a part."""
-    gradient = total(absolute(contract.gradient(part, r)))
-    terms = contract.gap_scale(part, r) + extent * gradient + abs(contract.gap_of(part, 0.0))
+    gradient = total(absolute(part.gradient(r)))
+    terms = part.gap_scale(r) + extent * gradient + abs(part.gap_of(0.0))
     return _ULPS * _EPSILON * terms
 
 
-@contract.safe_time.register(SolidNumbers)
-def _(surface, r, v, pull):
-    # Outside of one part is outside of the body.
-    longest = 0.0
-    for link in reversed(each(surface.parts)):
-        longest = max(contract.safe_time(link.first, r, v, pull), longest)
-    return longest
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-
-@contract.unit_normal.register(SolidNumbers)
-def _(surface, r):
-    # That of the part which the point is least deep in
-    least, normal = math.inf, ZERO
-    for link in reversed(each(surface.parts)):
-        depth = contract.distance(link.first, r)
-        if not depth > least:
-            least, normal = depth, contract.unit_normal(link.first, r)
-    return normal
-
-
-# phi is about the distance, whose faces are flat or wide: no pole within a push.
-contract.farthest_push.register(SolidNumbers, lambda surface: -math.inf)

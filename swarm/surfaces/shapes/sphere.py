@@ -66,9 +66,92 @@ class SphereNumbers(Distance, ExactChord):
     curvature: float  # side/R
     side: float
 
+    def inner(self, r):
+        return square(r - self.center)
+
+    def slope(self, r):
+        return 2.0 * (r - self.center)
+
+    def unit_normal(self, r):
+        return (r - self.center) * self.curvature
+
+    def gap_scale(self, r):
+        # |grad g| = 1
+        return total(absolute(r))
+
+    def settle(self, r):
+        d = r - self.center
+        # 1/(2 R^2)
+        k = 0.5 * self.curvature * self.curvature
+        return r - ((square(d) - self.radius2) * k) * d
+
+    def outward_acceleration(self, r, v, pull):
+        # |v|^2/R + n.G
+        return self.curvature * (square(v) + dot(r - self.center, pull))
+
+    def first_hit(self, r, v):
+        return ball_rise_time(self.side, self.radius2, r - self.center, v), True
+
+    def course(self, r, v, pull):
+        # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
+        d, side = r - self.center, self.side
+        c, b, a, gg = square(d) - self.radius2, dot(d, v), square(v), square(pull)
+        a2 = a + d.x * pull.x + d.y * pull.y + d.z * pull.z
+        # Outside, the size is that of the distance: the flight may begin far from a ball.
+        size = self.radius2 + select(c > 0.0, c, 0.0)
+        c, window = level_and_window(c, self.radius2, size, a, gg)
+        return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
+
+    def inner_gradient(self, r0, r1):
+        # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
+        return r0 + r1 - 2.0 * self.center
+
+    def push(self, r0, p, kappa):
+        # r1 = [(1 - kappa) r0 + p]/(1 + kappa), relative to the centre
+        w = 1.0 / (1.0 + kappa)
+        u = (1.0 - kappa) * w
+        return self.center + ((r0 - self.center) * u + p * w)
+
+    def rise(self, r0, p, kappa):
+        # r0 + r1 = (2 r0 + p)/(1 + kappa) and r1 - r0 = (p - 2 kappa r0)/(1 + kappa), relative to the centre, so
+        # q1 - q0 = [2 r0.p + p.p - kappa (4 q0 + 2 r0.p)]/(1 + kappa)^2
+        d = r0 - self.center
+        q0 = square(d)
+        dp, free = _risen(d, p)
+        fall = 4.0 * q0 + dp
+        w = 1.0 / (1.0 + kappa)
+        risen = (free - kappa * fall) * w * w
+        # q1 >= 0, even by round-off.
+        return select(risen > -q0, risen, -q0), -w * (2.0 * risen + w * fall)
+
+    def resolve(self, r, strength):
+        w = 1.0 / (1.0 + 2.0 * strength)
+        return self.center + w * (r - self.center)
+
+    def chord_guess(self, r, p):
+        # q1 = q0 is linear in kappa: kappa = (2 r0.p + p.p)/(4 q0 + 2 r0.p)
+        dp, free = _risen(r - self.center, p)
+        return free / (4.0 * self.radius2 + dp)
+
+    def chord_normal(self, r, p, kappa):
+        # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
+        n = 2.0 * (r - self.center) + p
+        return n * (self.side / norm(n))
+
+    def bend(self, r):
+        # H = 1: for walls that move other than uniformly
+        return (self.side, 1.0, math.inf)
+
 
 class SphereCavity(SphereNumbers):
     """A cavity: every flight in it meets the wall."""
+
+    def first_hit(self, r, v):
+        # |d + v t|^2 - R^2 = c + 2 b t + |v|^2 t^2
+        d = r - self.center
+        return rise_time_inside(square(d) - self.radius2, dot(d, v), square(v)), True
+
+    may_be_far = False
 
 
 def ball(center, radius):
@@ -78,110 +161,14 @@ def ball(center, radius):
 
 # --- The level set ---------------------------------------------------------------------------------------
 
-contract.inner.register(SphereNumbers, lambda surface, r: square(r - surface.center))
-contract.slope.register(SphereNumbers, lambda surface, r: 2.0 * (r - surface.center))
-contract.unit_normal.register(SphereNumbers, lambda surface, r: (r - surface.center) * surface.curvature)
-# |grad g| = 1
-contract.gap_scale.register(SphereNumbers, lambda surface, r: total(absolute(r)))
-
-
-@contract.settle.register(SphereNumbers)
-def _(surface, r):
-    d = r - surface.center
-    # 1/(2 R^2)
-    k = 0.5 * surface.curvature * surface.curvature
-    return r - ((square(d) - surface.radius2) * k) * d
-
-
-@contract.outward_acceleration.register(SphereNumbers)
-def _(surface, r, v, pull):
-    # |v|^2/R + n.G
-    return surface.curvature * (square(v) + dot(r - surface.center, pull))
-
 
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@contract.first_hit.register(SphereNumbers)
-def _(surface, r, v):
-    return ball_rise_time(surface.side, surface.radius2, r - surface.center, v), True
-
-
-@contract.first_hit.register(SphereCavity)
-def _(surface, r, v):
-    # |d + v t|^2 - R^2 = c + 2 b t + |v|^2 t^2
-    d = r - surface.center
-    return rise_time_inside(square(d) - surface.radius2, dot(d, v), square(v)), True
-
-
-@contract.course.register(SphereNumbers)
-def _(surface, r, v, pull):
-    # |r + v t + G t^2/2 - c|^2 - R^2, a quartic in t
-    d, side = r - surface.center, surface.side
-    c, b, a, gg = square(d) - surface.radius2, dot(d, v), square(v), square(pull)
-    a2 = a + d.x * pull.x + d.y * pull.y + d.z * pull.z
-    # Outside, the size is that of the distance: the flight may begin far from a ball.
-    size = surface.radius2 + select(c > 0.0, c, 0.0)
-    c, window = level_and_window(c, surface.radius2, size, a, gg)
-    return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
-
-
-contract.may_be_far.register(SphereCavity, lambda surface: False)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-# q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-contract.inner_gradient.register(SphereNumbers, lambda surface, r0, r1: r0 + r1 - 2.0 * surface.center)
 
 
 def _risen(d, p):
     """2 d.p, and |d + p|^2 - |d|^2."""
     dp = 2.0 * dot(d, p)
     return dp, dp + p.x * p.x + p.y * p.y + p.z * p.z
-
-
-@contract.push.register(SphereNumbers)
-def _(surface, r0, p, kappa):
-    # r1 = [(1 - kappa) r0 + p]/(1 + kappa), relative to the centre
-    w = 1.0 / (1.0 + kappa)
-    u = (1.0 - kappa) * w
-    return surface.center + ((r0 - surface.center) * u + p * w)
-
-
-@contract.rise.register(SphereNumbers)
-def _(surface, r0, p, kappa):
-    # r0 + r1 = (2 r0 + p)/(1 + kappa) and r1 - r0 = (p - 2 kappa r0)/(1 + kappa), relative to the centre, so
-    # q1 - q0 = [2 r0.p + p.p - kappa (4 q0 + 2 r0.p)]/(1 + kappa)^2
-    d = r0 - surface.center
-    q0 = square(d)
-    dp, free = _risen(d, p)
-    fall = 4.0 * q0 + dp
-    w = 1.0 / (1.0 + kappa)
-    risen = (free - kappa * fall) * w * w
-    # q1 >= 0, even by round-off.
-    return select(risen > -q0, risen, -q0), -w * (2.0 * risen + w * fall)
-
-
-@contract.resolve.register(SphereNumbers)
-def _(surface, r, strength):
-    w = 1.0 / (1.0 + 2.0 * strength)
-    return surface.center + w * (r - surface.center)
-
-
-@contract.chord_guess.register(SphereNumbers)
-def _(surface, r, p):
-    # q1 = q0 is linear in kappa: kappa = (2 r0.p + p.p)/(4 q0 + 2 r0.p)
-    dp, free = _risen(r - surface.center, p)
-    return free / (4.0 * surface.radius2 + dp)
-
-
-@contract.chord_normal.register(SphereNumbers)
-def _(surface, r, p, kappa):
-    # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
-    n = 2.0 * (r - surface.center) + p
-    return n * (surface.side / norm(n))
-
-
-# H = 1: for walls that move other than uniformly
-contract.bend.register(SphereNumbers, lambda surface, r: (surface.side, 1.0, math.inf))

@@ -83,6 +83,43 @@ class TorusNumbers(Distance):
     radius2: float
     side: float
 
+    def inner(self, r):
+        across, dz = _from_axis(self, r) - self.major, r.z - self.center.z
+        return across * across + dz * dz
+
+    def slope(self, r):
+        d, f = r - self.center, 2.0 - 2.0 * self.major / _from_axis(self, r)
+        return Vec(f * d.x, f * d.y, 2.0 * d.z)
+
+    def hessian(self, r):
+        # 1 across the tube, 1 - R/rho along it: I - (R/rho) e e^T
+        d, rho = r - self.center, _from_axis(self, r)
+        ex, ey, f = -d.y / rho, d.x / rho, self.major / rho
+        return Symmetric(1.0 - f * ex * ex, 1.0 - f * ey * ey, 1.0, -f * ex * ey, 0.0, 0.0)
+
+    def difference(self, r0, r1):
+        rho0, rho1 = _from_axis(self, r0), _from_axis(self, r1)
+        d, both = r1 - r0, r0 + r1 - 2.0 * self.center
+        across = d.x * both.x + d.y * both.y
+        return across * (1.0 - 2.0 * self.major / (rho0 + rho1)) + d.z * both.z
+
+    def near(self, gravity, r, v):
+        return _near(self, r, v) if gravity is None else _near_of_fall(self, as_vector(gravity), r, v)
+
+    def bend(self, r):
+        # Half way to the axis at most, where 1 - R/rho is largest.
+        rho = _from_axis(self, r)
+        along = 2.0 * self.major / rho
+        return select(self.side > 0.0, 1.0, along - 1.0), 1.0 + along, 0.5 * rho
+
+    def passed(self, r, v):
+        d, wide = r - self.center, self.major + self.radius
+        return (self.side < 0.0) & (dot(d, v) >= 0.0) & (square(d) > wide * wide)
+
+    def farthest_push(self):
+        # Where I + kappa H has its first pole: along the inner equator of a cavity, across the tube of a solid.
+        return select(self.side > 0.0, self.major / self.radius - 1.0, -1.0)
+
 
 def _from_axis(surface, r):
     """rho, never 0: on the axis the direction to the tube is not defined."""
@@ -93,43 +130,10 @@ def _from_axis(surface, r):
 # --- The level set ---------------------------------------------------------------------------------------
 
 
-@contract.inner.register(TorusNumbers)
-def _(surface, r):
-    across, dz = _from_axis(surface, r) - surface.major, r.z - surface.center.z
-    return across * across + dz * dz
-
-
-@contract.slope.register(TorusNumbers)
-def _(surface, r):
-    d, f = r - surface.center, 2.0 - 2.0 * surface.major / _from_axis(surface, r)
-    return Vec(f * d.x, f * d.y, 2.0 * d.z)
-
-
-@contract.hessian.register(TorusNumbers)
-def _(surface, r):
-    # 1 across the tube, 1 - R/rho along it: I - (R/rho) e e^T
-    d, rho = r - surface.center, _from_axis(surface, r)
-    ex, ey, f = -d.y / rho, d.x / rho, surface.major / rho
-    return Symmetric(1.0 - f * ex * ex, 1.0 - f * ey * ey, 1.0, -f * ex * ey, 0.0, 0.0)
-
-
-@contract.difference.register(TorusNumbers)
-def _(surface, r0, r1):
-    rho0, rho1 = _from_axis(surface, r0), _from_axis(surface, r1)
-    d, both = r1 - r0, r0 + r1 - 2.0 * surface.center
-    across = d.x * both.x + d.y * both.y
-    return across * (1.0 - 2.0 * surface.major / (rho0 + rho1)) + d.z * both.z
-
-
 # --- Flight ----------------------------------------------------------------------------------------------
 #
 # Of the same sign as the gap is F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho), along a flight
 # a polynomial of degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without what cancels on the wall.
-
-
-@contract.near.register(TorusNumbers)
-def _(surface, gravity, r, v):
-    return _near(surface, r, v) if gravity is None else _near_of_fall(surface, as_vector(gravity), r, v)
 
 
 def _tube2(surface, q):
@@ -208,24 +212,4 @@ def _ball(surface, d2):
     return (surface.side < 0.0) & (d2 > _OUTER * wide2), ball2
 
 
-@contract.bend.register(TorusNumbers)
-def _(surface, r):
-    # Half way to the axis at most, where 1 - R/rho is largest.
-    rho = _from_axis(surface, r)
-    along = 2.0 * surface.major / rho
-    return select(surface.side > 0.0, 1.0, along - 1.0), 1.0 + along, 0.5 * rho
-
-
-@contract.passed.register(TorusNumbers)
-def _(surface, r, v):
-    d, wide = r - surface.center, surface.major + surface.radius
-    return (surface.side < 0.0) & (dot(d, v) >= 0.0) & (square(d) > wide * wide)
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-
-@contract.farthest_push.register(TorusNumbers)
-def _(surface):
-    # Where I + kappa H has its first pole: along the inner equator of a cavity, across the tube of a solid.
-    return select(surface.side > 0.0, surface.major / surface.radius - 1.0, -1.0)

@@ -60,7 +60,7 @@ def test_no_hit_is_missed(make, side, pull):
         t, time, hits = 0.0, np.inf, False
         while not hits and t < 4.0:
             r = start + velocity * t + 0.5 * np.array(pull) * t * t
-            time, hits = call(contract.falling_hit, wall, r, velocity + np.array(pull) * t, Vec(*pull))
+            time, hits = call(wall.falling_hit, r, velocity + np.array(pull) * t, Vec(*pull))
             t += time
         if expected < 4.0:
             found += 1
@@ -80,17 +80,17 @@ def test_a_flight_from_the_wall_does_not_hit_it_at_once(side):
         for _ in range(8):
             slope = surface.gradient(point)
             point = point - surface.phi(point) / (slope @ slope) * slope
-        normal = np.array(call(contract.unit_normal, wall, point))
+        normal = np.array(call(wall.unit_normal, point))
         velocity = random.normal(size=3)
         velocity -= 2.0 * max(velocity @ normal, 0.0) * normal
         if abs(surface.phi(point)) > 1e-12:
             continue
-        time, hits = call(contract.first_hit, wall, point, velocity)
+        time, hits = call(wall.first_hit, point, velocity)
         assert hits
         assert time > 1e-6
         root = first_root(surface, point, velocity, (0.0, 0.0, 0.0), min(time + 1e-3, 5.0))
         assert time == pytest.approx(root, abs=1e-9)
-        time, hits = call(contract.first_hit, wall, point, -velocity)
+        time, hits = call(wall.first_hit, point, -velocity)
         assert hits
         assert time * np.abs(velocity).max() < 1e-13
 
@@ -98,8 +98,8 @@ def test_a_flight_from_the_wall_does_not_hit_it_at_once(side):
 def test_one_that_never_comes_to_the_grid_never_hits():
     (wall,) = ball(side="outside").walls()
     for r, v, pull in (((3.0, 0.0, 0.0), (1.0, 0.0, 0.0), ZERO), ((3.0, 0.0, 0.0), (-1.0, 0.5, 0.0), ZERO)):
-        assert call(contract.falling_hit, wall, np.array(r), np.array(v), pull) == (np.inf, True)
-    time, hits = call(contract.first_hit, wall, np.array((3.0, 0.0, 0.0)), np.array((-1.0, 0.0, 0.0)))
+        assert call(wall.falling_hit, np.array(r), np.array(v), pull) == (np.inf, True)
+    time, hits = call(wall.first_hit, np.array((3.0, 0.0, 0.0)), np.array((-1.0, 0.0, 0.0)))
     assert hits
     assert time == pytest.approx(2.5, abs=1e-5)
 
@@ -142,7 +142,7 @@ def test_a_hit_at_the_origin_is_found(pull):
     moved = swarm.Sampled(surface.values, surface.spacing, np.add(surface.origin, (0.0, 0.0, 0.5)))
     (wall,) = moved.walls()
     for x in (0.0, 1e-3, 1e-9):
-        time, hits = call(contract.falling_hit, wall, np.array((x, x, 0.3)), np.array((0.0, 0.0, -1.0)), pull)
+        time, hits = call(wall.falling_hit, np.array((x, x, 0.3)), np.array((0.0, 0.0, -1.0)), pull)
         assert hits
         place = np.array((x, x, 0.3 - time + 0.5 * pull.z * time * time))
         assert abs(moved.phi(place)) < 1e-14

@@ -73,9 +73,9 @@ def test_derivatives_are_those_of_phi():
     for point in points_in(surface, 20).T * 0.98:
         shifts = step * np.eye(3)
         differences = [(surface.phi(point + one) - surface.phi(point - one)) / (2.0 * step) for one in shifts]
-        assert np.allclose(call(contract.gradient, numbers, point), differences, atol=1e-8)
+        assert np.allclose(call(numbers.gradient, point), differences, atol=1e-8)
         rows = [(surface.gradient(point + one) - surface.gradient(point - one)) / (4.0 * step) for one in shifts]
-        h = call(contract.hessian, numbers, point)
+        h = call(numbers.hessian, point)
         assert np.allclose([[h.xx, h.xy, h.zx], [h.xy, h.yy, h.yz], [h.zx, h.yz, h.zz]], rows, atol=1e-6)
 
 
@@ -87,7 +87,7 @@ def test_differences_do_not_cancel(length):
     low, inverse = np.array(numbers.spline.low), np.array(numbers.spline.inverse)
     for point in points_in(surface, 20).T * 0.5:
         other = point + length * RANDOM.normal(size=3)
-        error = abs(float(call(contract.difference, numbers, point, other) - (exactly(other) - exactly(point))))
+        error = abs(float(call(numbers.difference, point, other) - (exactly(other) - exactly(point))))
         crosses = (np.floor((point - low) * inverse) != np.floor((other - low) * inverse)).any()
         assert error <= 4.0 * EPSILON * (1.0 if crosses else 20.0 * np.abs(other - point).max())
 
