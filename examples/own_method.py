@@ -7,7 +7,6 @@ that grazes its wall takes as many impacts as that takes. swarm/methods/contract
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import swarm
 from swarm.kernel.gravity import accelerated, displacement
@@ -16,7 +15,6 @@ from swarm.kernel.vector import dot
 from swarm.methods import contract
 from swarm.methods.base import Method
 from swarm.status import Status
-from swarm.surfaces import contract as surfaces
 from swarm.surfaces import flights, fold
 
 

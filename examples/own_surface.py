@@ -1,25 +1,57 @@
 """Add a surface of your own: a superellipsoid, |x/a|^n + |y/b|^n + |z/c|^n = 1 with an even n.
 
-1. A named tuple of numbers is what kernels take in place of the surface. Its field `side` is +1 for a cavity.
-2. Functions of these numbers are registered with `swarm.surfaces.contract`, which describes all that there are. Five
-   serve every method: `phi`, `gradient`, `hessian`, `bend` and `farthest_push`. The first hit is then found by safe
-   steps. What a method lacks is an error in one sentence.
-3. A dataclass derived from `Surface` is what scenes take: it makes the numbers and says how large the surface is.
+1. A record derived from `Smooth` is what kernels take in place of the surface: numbers, and methods of them. Its field
+   `side` is +1 for a cavity. swarm/surfaces/contract.py describes all methods that there are. Five serve every method of
+   simulation: `phi`, `gradient`, `hessian`, `bend` and `farthest_push`. The first hit is then found by safe steps. What
+   is missing is an error in one sentence.
+2. A dataclass derived from `Surface` is what scenes take: it makes the numbers and says how large the surface is.
 
-The same functions run in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. Where
+The same methods run in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. Where
 only phi and its gradient are known, `swarm.OwnSurface(parameters, phi, gradient, size=..., bounds=...)` finds the rest.
 """
 
 import math
-from collections import namedtuple
 from dataclasses import dataclass
 
 import swarm
-from swarm.kernel.jit import inlined
 from swarm.kernel.vector import Symmetric, Vec, absolute, total
-from swarm.surfaces import Surface, contract
+from swarm.surfaces import Surface
+from swarm.surfaces.contract import Smooth
 
-SuperellipsoidNumbers = namedtuple("SuperellipsoidNumbers", "a n side")
+
+class SuperellipsoidNumbers(Smooth):
+    """What kernels take of it."""
+
+    a: Vec  # the semi-axes
+    n: float
+    side: float
+
+    def powers(self, r, k):
+        """(x/a)^(n - k)/a^k, the k-th derivative of (x/a)^n but for a constant; likewise of y and z."""
+        a, p = self.a, self.n - k
+        return Vec((r.x / a.x) ** p / a.x**k, (r.y / a.y) ** p / a.y**k, (r.z / a.z) ** p / a.z**k)
+
+    def phi(self, r):
+        """Below 0 inside."""
+        return total(self.powers(r, 0.0)) - 1.0
+
+    def gradient(self, r):
+        """Its gradient."""
+        return self.n * self.powers(r, 1.0)
+
+    def hessian(self, r):
+        """Half the second derivatives."""
+        h = 0.5 * self.n * (self.n - 1.0) * self.powers(r, 2.0)
+        return Symmetric(h.x, h.y, h.z, 0.0, 0.0, 0.0)
+
+    def bend(self, r):
+        """The second derivatives are largest at the farthest corner of a box around r, with the semi-axes of the cavity."""
+        h = self.hessian(absolute(r) + self.a)
+        return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(self.a.x, self.a.y, self.a.z)
+
+    def farthest_push(self):
+        """A step in contact may push as far as it needs to."""
+        return math.inf
 
 
 @dataclass(frozen=True)
@@ -44,32 +76,6 @@ class Superellipsoid(Surface):
     def bounds(self):
         """A box around the cavity, however it is rotated: its lower and its upper corner."""
         return (-self.extent(),) * 3, (self.extent(),) * 3
-
-
-@inlined
-def _powers(surface, r, k):
-    """(x/a)^(n - k)/a^k, the k-th derivative of (x/a)^n but for a constant; likewise of y and z."""
-    a, p = surface.a, surface.n - k
-    return Vec((r.x / a.x) ** p / a.x**k, (r.y / a.y) ** p / a.y**k, (r.z / a.z) ** p / a.z**k)
-
-
-contract.phi.register(SuperellipsoidNumbers, lambda surface, r: total(_powers(surface, r, 0.0)) - 1.0)
-contract.gradient.register(SuperellipsoidNumbers, lambda surface, r: surface.n * _powers(surface, r, 1.0))
-contract.farthest_push.register(SuperellipsoidNumbers, lambda surface: math.inf)
-
-
-@contract.hessian.register(SuperellipsoidNumbers)
-def _(surface, r):
-    """Half the second derivatives."""
-    h = 0.5 * surface.n * (surface.n - 1.0) * _powers(surface, r, 2.0)
-    return Symmetric(h.x, h.y, h.z, 0.0, 0.0, 0.0)
-
-
-@contract.bend.register(SuperellipsoidNumbers)
-def _(surface, r):
-    """The second derivatives are largest at the farthest corner of a box around r, with the semi-axes of the cavity."""
-    h = surface.hessian(absolute(r) + surface.a)
-    return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(surface.a.x, surface.a.y, surface.a.z)
 
 
 if __name__ == "__main__":

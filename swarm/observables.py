@@ -13,7 +13,6 @@ from .kernel.jit import kernel, scratch, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .particles import Floats, State, has_escaped
 from .scene import Scene
-from .surfaces import contract as surfaces
 from .surfaces import flights
 from .surfaces.fold import Field, each
 from .surfaces.moving import at

@@ -15,7 +15,6 @@ from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
 from swarm.kernel.vector import Vec, vec
 from swarm.run import ledger, tiers
-from swarm.surfaces import contract
 from swarm.surfaces.fold import Chain
 from swarm.surfaces.rotation import Rotated
 

@@ -14,10 +14,8 @@ import numpy as np
 from numba.extending import register_jitable
 
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
-from swarm.surfaces.shapes.rotated import own
 from swarm.surfaces.shapes.solid import SolidNumbers
 from swarm.surfaces.shapes.torus import TorusNumbers
 
@@ -95,7 +93,7 @@ def levels(walls, kind, position, velocity, half_pull=None):
             parts, rest = [*parts, rest.first.level_of(rest.first.inner(path))], rest.rest
         return 1, parts
     if isinstance(body, (TorusNumbers, CapsuleNumbers)):
-        path = own(wall, path) if isinstance(wall, Rotated) else path
+        path = wall.vector_in(path) if isinstance(wall, Rotated) else path
         return (_torus if isinstance(body, TorusNumbers) else _capsule)(body, *(path - body.center))
     return 0, [wall.level_of(wall.inner(path)) for wall in walls]
 

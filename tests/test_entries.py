@@ -14,19 +14,17 @@ from swarm.kernel import cache, jit
 from swarm.kernel.entries import key_of
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import Vec
-from swarm.surfaces import contract
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing compiles")
 ROOT = Path(swarm.__file__).parents[1]
 CELL = """
-from typing import NamedTuple
 from swarm.kernel.jit import inlined
+from swarm.kernel.record import Record
 from swarm.kernel.vector import dot
-from swarm.surfaces import contract
 
 FACTOR = 2.0
 
-class Pair(NamedTuple):
+class Pair(Record):
     one: float
     other: float = 3.0
 
@@ -34,18 +32,18 @@ class Pair(NamedTuple):
 def scaled(x):
     return FACTOR * x
 
-class Parent(NamedTuple):
+class Parent(Record):
     radius: float
 
+    def phi(self, r):
+        return scaled(dot(r, r)) - Pair(self.radius, 3.0).one
+
+    def inner(self, r):
+        return 1.0
+
 class Mine(Parent):
-    __slots__ = ()
-
-@contract.phi.register(Parent)
-def _(surface, r):
-    return scaled(dot(r, r)) - Pair(surface.radius, 3.0).one
-
-contract.inner.register(Parent, lambda surface, r: 1.0)
-contract.level_of.register(Mine, lambda surface, q: 1.0)
+    def level_of(self, q):
+        return 1.0
 """
 
 
@@ -80,11 +78,17 @@ def test_the_same_cell_has_the_same_key():
         ("other: float = 3.0", "another: float = 3.0"),
         ("other: float = 3.0", "other: float = 4.0"),
         ("    radius: float", "    size: float"),
-        ("contract.inner.register(Parent", "contract.settle.register(Parent"),
-        ("contract.inner.register(Parent", "contract.inner.register(Mine"),
-        ("contract.level_of.register(Mine, lambda surface, q: 1.0)", ""),
-        ("class Mine(Parent)", "class Other(Parent): __slots__ = ()\nclass Mine(Other)"),
-        ("lambda surface, q: 1.0", "lambda surface, q: 1.0 + 0.0 * FACTOR"),
+        ("def inner(self, r)", "def settle(self, r)"),
+        (
+            "    def inner(self, r):\n        return 1.0\n\nclass Mine(Parent):",
+            "class Mine(Parent):\n    def inner(self, r):\n        return 1.0\n",
+        ),
+        ("    def level_of(self, q):\n        return 1.0", "    pass"),
+        ("class Mine(Parent)", "class Other(Parent): pass\nclass Mine(Other)"),
+        (
+            "    def level_of(self, q):\n        return 1.0",
+            "    def level_of(self, q):\n        return 1.0 + 0.0 * FACTOR",
+        ),
     ],
 )
 def test_what_makes_another_key(old, new):
@@ -102,21 +106,6 @@ def test_classes_of_other_modules_and_other_types_have_other_keys():
 def test_a_definition_of_an_object_that_is_not_known_is_never_found():
     made = cell("FACTOR = 2.0", "FACTOR = object()")["Mine"]
     assert key(made) != key(made)
-
-
-@jit.by_type
-def of_the_user(thing):
-    return 0.0
-
-
-def test_a_family_of_the_user_counts_for_its_callers_alone():
-    before, kinds = key(cell()["Mine"]), [numba.typeof((Gravity(0.0, 0.0, 1.0), None, 1.0))]
-    others = key_of(kinds).text, key_of(kinds, of_the_user).text
-    for one in (Gravity, type(None), float):
-        of_the_user.register(one, lambda thing: 1.0)
-    assert key(cell()["Mine"]) == before
-    assert key_of(kinds).text == others[0]
-    assert key_of(kinds, of_the_user).text != others[1]
 
 
 def shifted(x):
@@ -167,15 +156,25 @@ def test_a_cell_that_is_run_again_compiles_nothing(tmp_path, monkeypatch):
     assert found == [0, 1, 0, 1]
 
 
+class Twice:
+    def __call__(self, x):
+        return 2.0 * x
+
+
+twice = Twice()
+
+
+def twice_the_radius(surface):
+    return twice(surface.radius)
+
+
 @compiled_only
 def test_what_is_never_found_is_not_written(tmp_path, monkeypatch):
     """Each start would add a file."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    scope = cell("FACTOR * x", "family(x) * x")
-    scope["family"] = jit.by_type(lambda thing: 2.0)
-    kernel, surface = jit.kernel(phi_of), scope["Mine"](0.5)
-    assert kernel(surface, Vec(1.0, 0.0, 0.0)) == 1.5
-    assert cache.is_compiled(kernel, (surface, Vec(1.0, 0.0, 0.0)))
+    kernel, surface = jit.kernel(twice_the_radius), cell()["Mine"](0.5)
+    assert kernel(surface) == 1.0
+    assert cache.is_compiled(kernel, (surface,))
     assert not list(tmp_path.rglob("*.nb?"))
 
 

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import numba
 import pytest
@@ -185,17 +184,19 @@ def test_the_method_runs_in_every_scene(mirror, name, case):
 
 
 def test_what_a_surface_lacks_for_the_method_is_one_sentence(mirror):
-    class Numbers(NamedTuple):
+    class Numbers(contract.Smooth):
         side: float
+
+        def phi(self, r):
+            return r.x
+
+        def gradient(self, r):
+            return Vec(1.0, 0.0, 0.0)
 
     class Half(swarm.Sphere):
         def walls(self):
             return (Numbers(1.0),)
 
-    contract.phi.register(Numbers, lambda surface, r: r.x)
-    contract.gradient.register(Numbers, lambda surface, r: Vec(1.0, 0.0, 0.0))
     scene = swarm.Scene([Half(1.0)])
-    with pytest.raises(
-        swarm.SceneError, match=r"what Mirror without gravity needs, .*Numbers without contract\.first_hit"
-    ):
+    with pytest.raises(swarm.SceneError, match=r"what Mirror without gravity needs, .*Numbers without first_hit\(\)"):
         swarm.simulate(scene, swarm.Particles((-0.5, 0, 0), (0, 0, 0)), mirror, until=1.0)

@@ -33,7 +33,7 @@ from swarm.kernel.parts import _DEEPEST, deep
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.run.engine import Run
 from swarm.scene import MOST_WALLS
-from swarm.surfaces import contract, flights
+from swarm.surfaces import flights
 from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent

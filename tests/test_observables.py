@@ -9,7 +9,6 @@ from swarm import observables
 from swarm.contact import events
 from swarm.contact.regularisation import regularisation
 from swarm.particles import Contacts, State
-from swarm.surfaces import contract
 
 # Not a whole number of chunks, nor of the columns of a chunk.
 N = observables.CHUNK + 301

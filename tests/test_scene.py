@@ -10,7 +10,7 @@ from conftest import SURFACES, scene_of
 from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract, polyhedron
+from swarm.surfaces import polyhedron
 
 
 def cube(half=1.0):

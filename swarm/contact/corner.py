@@ -6,7 +6,6 @@ Each wall is solved with the reactions of the others held, until the end of the 
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, largest, norm
-from ..surfaces import contract
 from ..surfaces.fold import each
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction

@@ -6,12 +6,11 @@ from typing import Any
 from ..kernel.jit import index, outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, square
-from ..surfaces import contract
 from ..surfaces import fold as walls
 from ..surfaces.fields.grid import block_of, in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried, at
-from ..surfaces.posed import Posed, straight_hit
+from ..surfaces.posed import Posed
 
 _EPSILON = 2.220446049250313e-16
 # Of a length, the part that is none.
@@ -114,7 +113,7 @@ def _on_line(surface, end, r0, r1):
     """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
     if surface.is_quartic or surface.flat:
         return False
-    time, _found = straight_hit(surface, end, r0, r1)
+    time, _found = surface.straight_hit(end, r0, r1)
     return time < 1.0
 
 

@@ -16,8 +16,6 @@ from typing import Any, NamedTuple
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot
-from ..surfaces import contract
-from ..surfaces.stroke import framed
 from . import impulse
 from .records import Step
 
@@ -114,7 +112,7 @@ class MeanValue(NamedTuple):
 
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""
-        body, r0, p = framed(surface, step.r, step.p)
+        body, r0, p = surface.framed(step.r, step.p)
         own = Step(r0, p, step.c)
         # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
         low, high = 0.0, 0.0

@@ -4,9 +4,7 @@ from ..kernel.gravity import potential, weight
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, dot, square, total
-from ..surfaces import contract
 from ..surfaces.fold import each
-from ..surfaces.stroke import place_scale
 
 # Units of round-off by which a contact that is solved may miss its energy.
 _ROUND_OFF = 64.0 * 2.220446049250313e-16
@@ -50,7 +48,7 @@ def energy_uncertainty(chain, law, over_mass, r, s):
         g = surface.gap_of(surface.inner(r))
         # 2 V/g, which is the force up to the factor (a + 1)/2
         force = law.stiffness(g) * select(g > 0.0, g, 0.0) * over_mass
-        found = force * dot(absolute(surface.gradient(r)), place_scale(surface, s)) + found
+        found = force * dot(absolute(surface.gradient(r)), surface.place_scale(s)) + found
     return found
 
 

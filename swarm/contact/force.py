@@ -2,7 +2,6 @@
 
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, dot, norm
-from ..surfaces import contract
 from ..surfaces.fold import each, length
 
 # The force needs these of every wall.

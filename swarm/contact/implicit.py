@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, square
-from ..surfaces import contract
 from ..surfaces.fold import of_wall
 from .discrete_gradient import Reaction, illinois, narrowed
 from .force import NEEDS as FORCE_NEEDS

@@ -12,7 +12,6 @@ import math
 
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from ..surfaces import contract
 from ..surfaces.fold import of_wall
 
 # A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of

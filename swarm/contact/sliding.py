@@ -14,7 +14,6 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
-from ..surfaces import contract
 from ..surfaces import fold as walls
 from . import laws as wall_laws
 from .hold import Two, mean_drift

@@ -13,7 +13,7 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined, scratch
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
-from ..surfaces import contract, flights
+from ..surfaces import flights
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near, until_others

@@ -17,7 +17,6 @@ import numpy as np
 from ..kernel.jit import outlined, scratch, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec
-from ..surfaces import contract
 from ..surfaces import fold as walls
 from . import corner, impulse
 

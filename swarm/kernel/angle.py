@@ -1,6 +1,6 @@
 """The sine and the versine of an angle, of sums and products alone: a library's sine ends a lane loop."""
 
-from .jit import inlined, select
+from .jit import select
 
 # The sum with it, less it again, is the nearest whole number.
 _WHOLE = 6755399441055744.0  # 1.5 2^52
@@ -19,7 +19,6 @@ _COSINE = (
 )  # fmt: skip
 
 
-@inlined
 def sine_and_versine(angle):
     """(sin a, 1 - cos a), the second without cancellation."""
     # a = n pi + 2 y: sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd

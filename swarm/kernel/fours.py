@@ -10,7 +10,6 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 
-from .jit import inlined
 from .trace.calls import operation
 
 
@@ -23,7 +22,6 @@ class Four(NamedTuple):
     d: Any
 
 
-@inlined
 def sum_of(w, c):
     """The sum of the products."""
     return (w.a * c.a + w.b * c.b) + (w.c * c.c + w.d * c.d)

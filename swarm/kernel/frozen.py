@@ -5,6 +5,7 @@ when a global changes, the digest differs.
 """
 
 import builtins
+import collections
 import contextlib
 import dis
 import hashlib
@@ -28,17 +29,9 @@ _CODE = operator.attrgetter(
 )  # fmt: skip
 # Other classes that functions are chosen by.
 _DISPATCHED = (type(None), float, object)
-# The definitions that code outside of this package has registered, by their class: each with the name of its family.
-_outside: dict[type, list[tuple[str, Function]]] = {}
 
 
-def registered(family: Function, made: Any, definition: Function) -> None:
-    """Record a definition for a class: the cache folder is named by the code of this package alone.
-
-    Of a family that is not of this package it is known to who calls it, and no other kernel has it.
-    """
-    if _root(family) == "swarm" != _root(definition):
-        _outside.setdefault(made, []).append((f"{family.__module__}.{family.__qualname__}", definition))
+_NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))  # noqa: PYI024
 
 
 class Frozen:
@@ -116,17 +109,25 @@ class Frozen:
         return value
 
     def _class(self, made: type) -> None:
-        """Of a class Numba takes the fields, and `by_type` what is defined for it and its parents."""
+        """Of a class Numba takes the fields, and traces what is defined in it and its parents."""
         if made in self._classes:
             return self.add("class again", self._classes.index(made))
         self._classes.append(made)
         for parent in made.__mro__:
             self.add("class", parent.__module__, parent.__qualname__, getattr(parent, "_fields", None))
             self.value(tuple(getattr(parent, "_field_defaults", {}).values()))
-            for family, definition in _outside.get(parent, ()):
-                self.add("definition", family)
-                self.value(definition)
+            # Those of this package are in its code.
+            if _root(parent) not in _VERSIONS:
+                for name, definition in sorted(vars(parent).items()):
+                    self._member(name, definition)
         return None
+
+    def _member(self, name: str, definition: Any) -> None:
+        """A method, property or constant of a class."""
+        given = getattr(definition, "fget", None) or getattr(definition, "__func__", definition)
+        if name not in _NAMED_TUPLE and isinstance(given, (types.FunctionType, *_PLAIN)):
+            self.add("definition", name)
+            self.value(given)
 
     def _module(self, module: types.ModuleType, code: types.CodeType) -> types.ModuleType:
         copy = types.ModuleType(module.__name__)

@@ -6,7 +6,7 @@ the first item is the same.
 
 from typing import NamedTuple
 
-from .jit import Array, index, inlined, select
+from .jit import Array, index, select
 
 # Children of a node: half as many levels as two, and the children are beside one another in memory.
 _CHILDREN = 4
@@ -20,19 +20,16 @@ class Heap(NamedTuple):
     place: Array  # (N,) the node of each item
 
 
-@inlined
 def _comes_before(heap, item, other):
     one, two = heap.key[index(item)], heap.key[index(other)]
     return (one < two) | ((one == two) & (item < other))
 
 
-@inlined
 def _put(heap, node, item):
     heap.item[index(node)] = item
     heap.place[index(item)] = node
 
 
-@inlined
 def _least_child(heap, node):
     """The child node whose item comes first, or -1 where there is none."""
     first = _CHILDREN * node + 1
@@ -43,7 +40,6 @@ def _least_child(heap, node):
     return select(first < end, least, -1)
 
 
-@inlined
 def sink(heap, node):
     """Order a heap where the key of the item at this node has grown."""
     item = heap.item[index(node)]
@@ -56,7 +52,6 @@ def sink(heap, node):
     _put(heap, node, item)
 
 
-@inlined
 def rise(heap, node):
     """Order a heap where the key of the item at this node has become less."""
     item = heap.item[index(node)]
@@ -69,14 +64,12 @@ def rise(heap, node):
     _put(heap, node, item)
 
 
-@inlined
 def build(heap):
     """Order a heap whatever its keys are."""
     for node in range((heap.item.size - 2) // _CHILDREN, -1, -1):
         sink(heap, node)
 
 
-@inlined
 def change(heap, item, key):
     """Give an item another key."""
     heap.key[index(item)] = key

@@ -1,18 +1,16 @@
-"""The one place for compiler flags and dispatch on the type of a parameter tuple.
+"""The one place for the compiler's flags, and what kernels have beyond Python.
 
-Kernels are plain functions of numbers. `kernel` compiles a loop over them, `by_type` makes a family of
-functions that is chosen by the type of its first argument: at compile time inside kernels, at run time in
-plain Python, from the same definitions.
+A kernel is a plain function, and whatever it calls is traced into it: functions and methods of records, from the same
+definitions that plain Python runs.
 """
 
 import functools
 import importlib
 import importlib.util
-import inspect
 import math
 import threading
 from collections.abc import Callable
-from types import FunctionType, UnionType
+from types import FunctionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,10 +25,9 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
-from .frozen import registered
 from .parts import KernelCompiler, LongKernelCompiler, PartCompiler
 from .trace import calls
-from .trace.helpers import prepare
+from .trace.helpers import leaving, prepare
 from .trace.selection import select as select
 
 Array = NDArray[np.generic]
@@ -48,6 +45,8 @@ _KERNEL: Any = {"no_cfunc_wrapper": True, **_FLAGS}
 # Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
 _OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
+# What of a user's functions cannot be traced.
+calls.leave = leaving({**_INLINE, "_nrt": True})
 
 
 def _find_scipy_only() -> None:
@@ -95,74 +94,15 @@ def _kernel(function: F, compiler: Any) -> F:
 
 
 def outlined(function: F) -> F:
-    """Compile a helper that is rare and long: inlining it would only cost compile time."""
+    """A function of its own in a kernel, for a helper that is rare and long: to inline it would only cost compile time."""
     prepare(function, _OUTLINE, outlined=True)
     return function
 
 
 def inlined(function: F) -> F:
-    """Compile a helper that is always inlined into the kernel that calls it, so that its loop vectorises."""
+    """A helper that functions may call which Numba compiles because they cannot be traced: see `trace/helpers.py`."""
     prepare(function, _INLINE, outlined=False)
     return function
-
-
-def by_type(function: Callable[..., Any]) -> Any:
-    """A function dispatched on the type of its first argument, in Python and inside kernels alike; always inlined.
-
-    Register a definition with `@name.register(Class)`, where Class is a NamedTuple of numbers, or
-    `type(None)` for "the scene has none". Registered functions carry no annotations and the same argument
-    names, because Numba compares signatures. `@name.implies(other)` registers a definition of `other` for every class
-    that `name` is registered for, unless that has one.
-
-    Raises:
-        SceneError: a definition is registered whose arguments have other names.
-    """
-    return _dispatched(function, _INLINE)
-
-
-def by_type_outlined(function: Callable[..., Any]) -> Any:
-    """`by_type` for what is rare and long: inlining it would only cost compile time."""
-    return _dispatched(function, _OUTLINE)
-
-
-def _dispatched(function: Callable[..., Any], options: Any) -> Any:
-    generic: Any = functools.singledispatch(function)
-    known, names, implied = generic.register, _arguments(function), list[tuple[Any, Callable[..., Any]]]()
-
-    def register(kind: Any, definition: Any = None) -> Any:
-        if definition is None and isinstance(kind, (type, UnionType)):
-            return functools.partial(register, kind)
-        made = kind if definition is None else definition
-        if _arguments(made) != names:
-            from ..errors import SceneError  # only here: the cache folder is asked of this file alone
-
-            raise SceneError(
-                f"a definition of {function.__module__}.{function.__name__} must be a function of "
-                f"({', '.join(names)}), got {getattr(made, '__name__', made)}({', '.join(_arguments(made))}) for "
-                f"{getattr(kind, '__name__', kind)}: kernels know arguments by their names"
-            )
-        known(kind, definition)
-        registered(function, kind, made)
-        for other, derived in implied:
-            if kind is not object and other.dispatch(kind) is other.dispatch(object):
-                other.register(kind, derived)
-        return made
-
-    def implies(other: Any) -> Any:
-        def add(definition: Any) -> Any:
-            implied.append((other, definition))
-            return definition
-
-        return add
-
-    generic.register, generic.implies = register, implies
-
-    prepare(generic, options, options is _OUTLINE, generic.dispatch)
-    return generic
-
-
-def _arguments(function: Any) -> list[str]:
-    return list(inspect.signature(function).parameters)
 
 
 def spaced(stride: int) -> Callable[[Any], Any]:

@@ -7,7 +7,7 @@ bits. No branches, and loops of fixed length: a lane loop vectorises.
 import math
 from typing import Any, NamedTuple
 
-from .jit import inlined, select
+from .jit import select
 from .vector import Vec
 
 # Philox4x32-10 of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
@@ -39,7 +39,6 @@ class Uniforms(NamedTuple):
     choice: Any
 
 
-@inlined
 def philox(counter, key):
     """The four 32-bit words of Philox4x32-10 at a counter of four words and a key of two.
 
@@ -56,13 +55,11 @@ def philox(counter, key):
     return a, b, c, d
 
 
-@inlined
 def _fraction(high, low):
     """(k + 1/2)/2^52 of the upper 20 bits of one word and another word: exact, and never 0 or 1."""
     return ((high >> 12) * 2.0**32 + low + 0.5) * 2.0**-52
 
 
-@inlined
 def uniforms(seed, particle, number):
     """The random numbers of one event of a particle.
 
@@ -76,7 +73,6 @@ def uniforms(seed, particle, number):
     return Uniforms(_fraction(a, b), _fraction(c, d), _fraction(e, f), _fraction(g, h))
 
 
-@inlined
 def logarithm(u):
     """ln u for u in [2^-63, 1], to one unit in the last place.
 
@@ -98,7 +94,6 @@ def logarithm(u):
     return e * _LN2_HIGH - ((s * (f - rest) - e * _LN2_LOW) - f)
 
 
-@inlined
 def circle(u):
     """cos(2 pi u) and sin(2 pi u) for u in [0, 1], to two units in the last place.
 
@@ -120,7 +115,6 @@ def circle(u):
     return select((n == 1.0) | (n == 2.0), -x, x), select((n == 2.0) | (n == 3.0), -y, y)
 
 
-@inlined
 def flux_maxwellian(n, speed2, u):
     """The velocity with which a particle leaves a diffuse wall with the unit normal n, against n.
 

@@ -7,7 +7,7 @@ import numpy as np
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from .jit import Array, inlined, select
+from .jit import Array, select
 
 
 class Vec(NamedTuple):
@@ -95,86 +95,72 @@ _emitted(operator.mul, "fmul", types.Float, types.BaseNamedTuple)
 _emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)
 
 
-@inlined
 def dot(a, b):
     """a.b"""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
-@inlined
 def square(a):
     """|a|^2"""
     return a.x * a.x + a.y * a.y + a.z * a.z
 
 
-@inlined
 def norm(a):
     """|a|"""
     # Of NumPy, so that in plain Python too 1/|0| is an infinity.
     return np.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
 
 
-@inlined
 def times(a, b):
     """The products of the components: the diagonal matrix a times b."""
     return Vec(a.x * b.x, a.y * b.y, a.z * b.z)
 
 
-@inlined
 def cross(a, b):
     """a x b"""
     return Vec(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
-@inlined
 def absolute(a):
     """The magnitudes of the components."""
     return Vec(abs(a.x), abs(a.y), abs(a.z))
 
 
-@inlined
 def total(a):
     """The sum of the components."""
     return a.x + a.y + a.z
 
 
-@inlined
 def largest(a):
     """The largest magnitude of a component."""
     return max(abs(a.x), abs(a.y), abs(a.z))
 
 
-@inlined
 def lowest(a, b):
     """The smaller one of each two components."""
     return Vec(min(a.x, b.x), min(a.y, b.y), min(a.z, b.z))
 
 
-@inlined
 def highest(a, b):
     """The larger one of each two components."""
     return Vec(max(a.x, b.x), max(a.y, b.y), max(a.z, b.z))
 
 
-@inlined
 def either(condition, a, b):
     """`select` of vectors."""
     return Vec(select(condition, a.x, b.x), select(condition, a.y, b.y), select(condition, a.z, b.z))
 
 
-@inlined
 def moves(a):
     """Whether a vector is not 0."""
     return a.x != 0.0 or a.y != 0.0 or a.z != 0.0
 
 
-@inlined
 def column(rows: Array, row, i):
     """The vector in three rows of a column."""
     return Vec(rows[row, i], rows[row + 1, i], rows[row + 2, i])
 
 
-@inlined
 def put(rows: Array, row, i, a):
     """Store a vector into three rows of a column."""
     rows[row, i], rows[row + 1, i], rows[row + 2, i] = a.x, a.y, a.z

@@ -12,7 +12,6 @@ from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at, during
 from ..surfaces.period import is_beyond

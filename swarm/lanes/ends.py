@@ -11,7 +11,6 @@ from ..contact.passing import part_until_open
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.period import part_until

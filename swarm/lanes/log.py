@@ -12,7 +12,6 @@ from ..contact.reflection import relative, wall_velocity
 from ..kernel.jit import Array, index, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from .table import LANES, Rows

@@ -11,7 +11,6 @@ from ..contact.reflection import given, wall_velocity
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined, scratch
 from ..kernel.vector import ZERO, column, put, square
-from ..methods import contract as methods
 from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at

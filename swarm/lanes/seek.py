@@ -9,7 +9,7 @@ import numpy as np
 from ..kernel.jit import Array, copy_row, index, outlined, select, unwritten
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces import contract, flights, fold
+from ..surfaces import flights, fold
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, gathered, member, width

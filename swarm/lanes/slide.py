@@ -13,7 +13,6 @@ from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
 from ..kernel.jit import index, long_kernel, outlined
 from ..kernel.vector import column, put
-from ..methods import contract as methods
 from ..status import Status
 from ..surfaces.moving import at
 from .arrays import following_particle, goes_on_by, speed2_scale

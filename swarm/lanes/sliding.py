@@ -9,7 +9,6 @@ from ..contact import laws as wall_laws
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from .table import STRIDE, Rows, copy_lane, table
 

@@ -12,7 +12,6 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, norm, square
-from ..methods import contract as methods
 from ..surfaces import fold as walls
 from ..surfaces.moving import at, during
 from .compose import SLOWEST

@@ -3,30 +3,18 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from .. import checks
-from ..contact import corner, uzawa
-from ..contact import energy as energies
-from ..contact import impulse as contact_impulse
+from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
-from ..contact.records import Step
 from ..contact.reflection import CHORD_NEEDS
 from ..contact.regularisation import regularisation
 from ..contact.touching import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
-from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, scratch, select
-from ..kernel.vector import norm
 from ..particles import Particles
 from ..scene import Scene
-from ..status import Status
-from ..surfaces import contract as surfaces
-from ..surfaces import fold as walls
-from . import base, contract, fixed_step, steps
+from . import base, fixed_step, steps
 
-RAISE, COUNT, IMPACT = 0, 1, 2
-_POLICIES = {"raise": RAISE, "count": COUNT, "impact": IMPACT}
+_POLICIES = {"raise": steps.RAISE, "count": steps.COUNT, "impact": steps.IMPACT}
 _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
 
 
@@ -174,121 +162,3 @@ class AugmentedLagrangian(base.Method):
             f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. The loop converges for exponent = 1 from the "
             f'surface: use {hint}, or on_unconverged="count" or "impact"'
         )
-
-
-# --- One pass --------------------------------------------------------------------------------------------
-
-
-@contract.most_sweeps.register(steps.Numbers)
-def _(method, chain):
-    return contact_impulse.NEWTON_STEPS
-
-
-def _free_step(gravity, lane, h):
-    """The step without walls: r0, p and c = h^2/(2m)."""
-    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
-
-
-@contract.guess.register(steps.Numbers)
-def _(method, chain, gravity, lane, wall):
-    cut, over = method.cut(lane.left), method.over(chain, lane.left)
-    kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
-    touching = wall >= 0.0
-    return select(touching, kappa, 0.0), touching
-
-
-@contract.improve.register(steps.Numbers)
-def _(method, chain, gravity, lane, wall, solution, multiplier):
-    cut, over, kappa = method.cut(lane.left), method.over(chain, lane.left), solution.kappa
-    newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
-    return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
-
-
-@contract.multiplier_sweeps.register(steps.Numbers)
-def _(method):
-    return method.max_sweeps
-
-
-@contract.first_multiplier.register(steps.Numbers)
-def _(method, chain, gravity, lane, wall, kappa):
-    cut, over = method.cut(lane.left), method.over(chain, lane.left)
-    better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
-    use = (method.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-    limited = uzawa.has_limit(over, wall, cut.law, lane.r)
-    return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, method.acceleration, uzawa.PLAIN)
-
-
-@contract.next_multiplier.register(steps.Numbers)
-def _(method, left, acceleration, multiplier, record, before):
-    miss = method.cut(left).law.alpha * record.mean
-    following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
-    return following, miss, not (record.stored <= method.tolerance)
-
-
-@contract.contact.register(steps.Numbers)
-def _(method, chain, gravity, lane, wall, solution):
-    # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
-    cut, kappa = method.cut(lane.left), solution.kappa
-    over, after = method.over(chain, lane.left), method.after(chain, lane.left)
-    h, p = cut.h, displacement(gravity, lane.v, cut.h)
-    r1 = walls.push(over, wall, lane.r, p, kappa)
-    g = walls.inner_gradient(over, wall, lane.r, r1)
-    f = 2.0 / h * kappa
-    work = contract.work_along(method.moving, over, wall, -f / h * g)
-    v1 = accelerated(gravity, lane.v, h) - f * g
-    given = abs(f) * norm(g)
-
-    alone = method.is_alone(after, wall, lane.r, r1, kappa)
-    solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
-    touching = wall >= 0.0
-    step = (lane.left > 0.0) & touching & solved
-    budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
-    factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
-    new = step & method.is_new(over, lane.r)
-    work = select(step, work, 0.0)
-    # A step without contact: only fixed steps end here that way, just before one.
-    loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
-    return contract.Contact(
-        select(step, r1, select(loose, lane.r + p, kept(lane.r))),
-        select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
-        lane.left - select(step | loose, cut.used, 0.0),
-        select(touching & (not solved), contract.HARD - wall, wall),
-        select(step, given, 0.0),
-        select(new, 1.0, 0.0),
-        lane.own.twice_energy + 2.0 * work,
-        False,
-        work,
-    )
-
-
-# --- Several walls, nested solves, and loops that do not converge ----------------------------------------
-
-
-@contract.hard_pass.register(steps.Numbers)
-def _(method, chain, gravity, lane, wall, lanes, i):
-    cut, record = method.cut(lane.left), lanes.record
-    h, over, after = cut.h, method.over(chain, lane.left), method.after(chain, lane.left)
-    if method.is_blocked(chain, wall, lane.r, h * lane.v):
-        record[uzawa.SWEEPS, i] = 0.0
-        return method.as_impacts(chain, lane, cut, wall, lanes, i)
-    free = _free_step(gravity, lane, h)
-    if method.is_too_fast(free.p):
-        return fixed_step.refused(lane, Status.TOO_FAST.value)
-    reactions = scratch((walls.length(chain), 4), np.float64)
-    end = uzawa.loop(method, cut.law, over, free, reactions)
-    record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
-    record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
-    if not end.converged and method.policy == IMPACT:
-        return method.as_impacts(chain, lane, cut, wall, lanes, i)
-    if not end.converged and (method.policy == RAISE or not end.solved):
-        return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
-    new = 1.0 if method.is_new(over, lane.r) else 0.0
-    reaction = corner.total(reactions)
-    v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
-    corner.add_impulses(reactions, h, lanes.impulse, i)
-    work = corner.add_works(method.moving, over, -2.0 / (h * h), reactions, lanes.impulse, i)
-    force = 1.0 / h * (2.0 / h * norm(reaction))
-    budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, force)
-    factor, _balanced = energies.restored(method.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h))
-    left, twice_energy = lane.left - cut.used, lane.own.twice_energy + 2.0 * work
-    return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, twice_energy, False), Status.DONE.value

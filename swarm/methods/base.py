@@ -7,7 +7,6 @@ from typing import Any
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import contract as surfaces
 from ..surfaces import required, safe
 from ..surfaces.drive import drive_of
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
 from ..contact.reflection import Turned
-from ..kernel.jit import by_type, by_type_outlined
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
 from ..surfaces import fold as walls

@@ -11,8 +11,7 @@ from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, select
-from ..kernel.record import Record
+from ..kernel.jit import kept, outlined, select
 from ..kernel.vector import Vec, square
 from ..particles import Particles
 from ..scene import Scene
@@ -197,22 +196,7 @@ class Steps(contract.MethodNumbers):
         # Of all walls: each part of a step asks for those that it needs.
         return chain
 
-
-class Numbers(Steps):
-    """A method with soft walls as kernels know it; each method has its own subclass."""
-
-    dt: float
-    law: Any
-    longest: Any  # step that jumps over no solid [m], None where there is none
-    factor: float  # of 1/mass in what a lane keeps
-    form: Any  # of the discrete gradient, or None
-    moving: Any  # None, or `Moves` where a wall moves
-
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
-        raise NotImplementedError
-
-    def flight(self, chain, gravity, lane):
+    def flight(self: Any, chain, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
         dt = self.dt
         # One too many by round-off starts a contact 1e-16 deep: harmless.
@@ -231,6 +215,22 @@ class Numbers(Steps):
         wall = select(self.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
         return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
 
+
+class Numbers(Steps):
+    """A method with soft walls as kernels know it; each method has its own subclass."""
+
+    dt: float
+    law: Any
+    longest: Any  # step that jumps over no solid [m], None where there is none
+    factor: float  # of 1/mass in what a lane keeps
+    form: Any  # of the discrete gradient, or None
+    moving: Any  # None, or `Moves` where a wall moves
+
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
+        raise NotImplementedError
+
+    @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
             return refused(lane, Status.TOO_FAST.value)
@@ -247,9 +247,6 @@ class Own(NamedTuple):
     twice_energy: float  # per mass, at the start, and with the work of walls since
     over_mass: float  # the method's factor over the mass
     unused: float
-
-
-# --- The way to a contact --------------------------------------------------------------------------------
 
 
 # --- The contact -----------------------------------------------------------------------------------------

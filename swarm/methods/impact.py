@@ -4,31 +4,25 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from .. import checks
 from ..contact import laws as wall_laws
 from ..contact import sliding, touching
-from ..contact.reflection import CHORD_NEEDS, Energy, exact
+from ..contact.reflection import CHORD_NEEDS, exact
 from ..errors import SceneError
-from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import kept, select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
-from ..surfaces.contract import flat
 from ..surfaces.surface import Surface
 from . import base, contract
-from .chord import Chord
+from .chord import Chord, Instants
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
 # Of what is slow, the impulse that is round-off of a particle at its wall: to count it would count by chance. Those of
 # particles that a wall lets go are 1e-16 to 1e-14 of the speed, what is slow 1e-4.
 _NO_IMPACT = 1e-8
-# A particle gets nowhere in this part of a crossing.
-_INSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -175,7 +169,7 @@ class Lasting(NamedTuple):
     sliding_tolerance: float  # a crossing
 
 
-class Reflection(contract.MethodNumbers):
+class Reflection(Instants):
     """What kernels know of the method with the exact reflection: `Lasting` and the laws of the walls."""
 
     size: float
@@ -186,27 +180,9 @@ class Reflection(contract.MethodNumbers):
     sliding_tolerance: float
     laws: Any  # None or `Laws`
 
-    def constants(self, mass, energy, scale2):
-        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
-        # its velocity at the start of the frame, on whose ends no contact may depend
-        twice_energy = 2.0 * energy
-        moving = twice_energy > 0.0
-        half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
-        slow = (self.shortest_flight * scale2 + self.shortest_length * math.sqrt(scale2)) / self.size
-        return twice_energy, half_inverse, slow
-
-    def own(self, first, second, third):
-        return ImpactOwn(Energy(first, second), third)
-
     @property
     def dissipates(self):
         return self.laws is not None
-
-    def instant(self, v):
-        speed2 = square(v) + self.fall2
-        return _INSTANT * self.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
-
-    holds = True
 
     @property
     def friction(self):
@@ -215,15 +191,6 @@ class Reflection(contract.MethodNumbers):
     @property
     def thermal(self):
         return wall_laws.thermal(self.laws)
-
-    def land(self, chain, gravity, lane, hit):
-        t = select(hit.time < lane.left, hit.time, lane.left)
-        return contract.Flight(
-            lane.r + displacement(gravity, lane.v, t),
-            accelerated(gravity, lane.v, t),
-            lane.left - t,
-            select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
-        )
 
     def contact(self, chain, gravity, lane, wall, solution):
         bounce = exact(self.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
@@ -242,18 +209,7 @@ class Reflection(contract.MethodNumbers):
         )
 
 
-class ImpactOwn(NamedTuple):
-    """What a lane keeps: its energy, and twice the speed [m/s] away from a wall below which a contact may last."""
-
-    energy: Energy
-    slow: float
-
-
 # --- One pass --------------------------------------------------------------------------------------------
-
-
-contract.holds.register(Chord, lambda method: True)
-contract.sliding_tolerance.register(Chord, lambda method: method.sliding_tolerance)
 
 
 # A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.

@@ -7,17 +7,24 @@ exact impacts replace it.
 import math
 from typing import Any, NamedTuple
 
-from ..contact import uzawa
+import numpy as np
+
+from ..contact import corner, uzawa
+from ..contact import energy as energies
+from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import MeanValue
+from ..contact.records import Step
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
-from ..kernel.jit import outlined, select
-from ..kernel.vector import square
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import kept, outlined, scratch, select
+from ..kernel.vector import norm, square
 from ..status import Status
 from ..surfaces import flights
 from ..surfaces import fold as walls
 from . import contract, fixed_step
 
+RAISE, COUNT, IMPACT = 0, 1, 2
 # A second wall nearer than this part of the shortest flight is met in the same instant.
 _SAME_INSTANT = 1e-6
 # Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
@@ -70,6 +77,107 @@ class Numbers(fixed_step.Steps):
         """The contact as exact impacts: the result of `hard_pass`."""
         raise NotImplementedError
 
+    # --- One pass ---
+
+    def most_sweeps(self, chain):
+        return contact_impulse.NEWTON_STEPS
+
+    def guess(self, chain, gravity, lane, wall):
+        cut, over = self.cut(lane.left), self.over(chain, lane.left)
+        kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        touching = wall >= 0.0
+        return select(touching, kappa, 0.0), touching
+
+    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+        cut, over, kappa = self.cut(lane.left), self.over(chain, lane.left), solution.kappa
+        newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
+        return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
+
+    # --- Uzawa's loop (8) ---
+
+    @property
+    def multiplier_sweeps(self):
+        return self.max_sweeps
+
+    def first_multiplier(self, chain, gravity, lane, wall, kappa):
+        cut, over = self.cut(lane.left), self.over(chain, lane.left)
+        better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
+        limited = uzawa.has_limit(over, wall, cut.law, lane.r)
+        return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
+
+    def next_multiplier(self, left, acceleration, multiplier, record, before):
+        miss = self.cut(left).law.alpha * record.mean
+        following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
+        return following, miss, not (record.stored <= self.tolerance)
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
+        cut, kappa = self.cut(lane.left), solution.kappa
+        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        h, p = cut.h, displacement(gravity, lane.v, cut.h)
+        r1 = walls.push(over, wall, lane.r, p, kappa)
+        g = walls.inner_gradient(over, wall, lane.r, r1)
+        f = 2.0 / h * kappa
+        work = contract.work_along(self.moving, over, wall, -f / h * g)
+        v1 = accelerated(gravity, lane.v, h) - f * g
+        given = abs(f) * norm(g)
+
+        alone = self.is_alone(after, wall, lane.r, r1, kappa)
+        solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
+        touching = wall >= 0.0
+        step = (lane.left > 0.0) & touching & solved
+        budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
+        factor, _balanced = energies.restored(self.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
+        new = step & self.is_new(over, lane.r)
+        work = select(step, work, 0.0)
+        # A step without contact: only fixed steps end here that way, just before one.
+        loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
+        return contract.Contact(
+            select(step, r1, select(loose, lane.r + p, kept(lane.r))),
+            select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
+            lane.left - select(step | loose, cut.used, 0.0),
+            select(touching & (not solved), contract.HARD - wall, wall),
+            select(step, given, 0.0),
+            select(new, 1.0, 0.0),
+            lane.own.twice_energy + 2.0 * work,
+            False,
+            work,
+        )
+
+    # --- Several walls, nested solves, and loops that do not converge ---
+
+    @outlined
+    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+        cut, record = self.cut(lane.left), lanes.record
+        h, over, after = cut.h, self.over(chain, lane.left), self.after(chain, lane.left)
+        if self.is_blocked(chain, wall, lane.r, h * lane.v):
+            record[uzawa.SWEEPS, i] = 0.0
+            return self.as_impacts(chain, lane, cut, wall, lanes, i)
+        free = _free_step(gravity, lane, h)
+        if self.is_too_fast(free.p):
+            return fixed_step.refused(lane, Status.TOO_FAST.value)
+        reactions = scratch((walls.length(chain), 4), np.float64)
+        end = uzawa.loop(self, cut.law, over, free, reactions)
+        record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
+        record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
+        if not end.converged and self.policy == IMPACT:
+            return self.as_impacts(chain, lane, cut, wall, lanes, i)
+        if not end.converged and (self.policy == RAISE or not end.solved):
+            return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
+        new = 1.0 if self.is_new(over, lane.r) else 0.0
+        reaction = corner.total(reactions)
+        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
+        corner.add_impulses(reactions, h, lanes.impulse, i)
+        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, lanes.impulse, i)
+        force = 1.0 / h * (2.0 / h * norm(reaction))
+        budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, force)
+        factor, _balanced = energies.restored(
+            self.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h)
+        )
+        left, twice_energy = lane.left - cut.used, lane.own.twice_energy + 2.0 * work
+        return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, twice_energy, False), Status.DONE.value
+
 
 @outlined
 def _first_energy(lane):
@@ -77,6 +185,11 @@ def _first_energy(lane):
     now, first = square(lane.v), lane.own.twice_energy
     speed2 = first if abs(first - now) <= _ROUND_OFF * now else now
     return Energy(speed2, 0.5 / speed2)
+
+
+def _free_step(gravity, lane, h):
+    """The step without walls: r0, p and c = h^2/(2m)."""
+    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
 
 def _after(r, v, left, hits):
@@ -162,6 +275,3 @@ class CutSteps(Numbers):
         met = met & (hit.wall >= 0.0) & (left > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
         return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
-
-
-contract.flight.register(FixedSteps, fixed_step.flight)

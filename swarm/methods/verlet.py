@@ -9,7 +9,7 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
 from ..surfaces import fold as walls
-from . import contract, fixed_step
+from . import fixed_step
 
 
 @dataclass(frozen=True)

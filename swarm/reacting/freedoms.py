@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 from ..kernel.jit import Array, index, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
-from ..surfaces import contract, flights, safe
+from ..surfaces import flights, safe
 from ..surfaces.drive import Drive, Pose, Swing
 from ..surfaces.fold import Chain
 from ..surfaces.moving import Moving

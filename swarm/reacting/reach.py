@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 
 from ..kernel.jit import select
 from ..kernel.vector import Vec, dot, norm, square
-from ..surfaces import contract
 from ..surfaces.course import rise_time
 from ..surfaces.fold import each
 from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
-from ..surfaces.shapes.rotated import own as rotated_own
 from ..surfaces.shapes.slab import SlabNumbers, along
 from ..surfaces.shapes.solid import SolidNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
@@ -38,7 +36,7 @@ class Seen(NamedTuple):
 def clear_of(body, r):
     """A lower bound of the distance to the wall."""
     if isinstance(body, Rotated):
-        return clear_of(body.body, rotated_own(body, r))
+        return clear_of(body.body, body.vector_in(r))
     if isinstance(body, SolidNumbers):
         # How far the point is out of the part that it is farthest from.
         clear = 0.0
@@ -51,7 +49,7 @@ def clear_of(body, r):
 def _out_of(part, r):
     """How far a point is out of a part at least; below 0 inside."""
     if isinstance(part, Rotated):
-        return _out_of(part.body, rotated_own(part, r))
+        return _out_of(part.body, part.vector_in(r))
     if isinstance(part, (PlaneNumbers, SlabNumbers, SphereNumbers)):
         return -part.gap_of(part.inner(r))
     if isinstance(part, QuadricNumbers):
@@ -66,8 +64,8 @@ def _out_of(part, r):
 def reach_of(body, seen):
     """A time during which a particle surely does not meet a wall that does not turn."""
     if isinstance(body, Rotated):
-        r, v, pull = (rotated_own(body, a) for a in (seen.r, seen.v, seen.pull))
-        axis = None if seen.axis is None else rotated_own(body, seen.axis)
+        r, v, pull = (body.vector_in(a) for a in (seen.r, seen.v, seen.pull))
+        axis = None if seen.axis is None else body.vector_in(seen.axis)
         return reach_of(body.body, Seen(r, v, pull, seen.width, axis, seen.longest))
     if isinstance(body, PlaneNumbers):
         return _reach_of_plane(body, seen)

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
-from ..surfaces import contract
 from ..surfaces.flights import NEVER, sooner
 from ..surfaces.fold import each
 

@@ -21,7 +21,6 @@ from .fields.many import Many
 from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
-from .shapes import rotated as _rotated  # noqa: F401
 from .shapes.box import Box
 from .shapes.capsule import Capsule
 from .shapes.cone import Cone

@@ -11,7 +11,7 @@ from typing import Any
 from ..kernel.gravity import Gravity, accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from . import contract, flights
+from . import flights
 from .course import Majorant, positive, rise_by
 
 # Steps of a flight that is asked for alone; what is not found by then goes on in the next pass.
@@ -105,7 +105,7 @@ def place(gravity, r, v, t, last):
 
 
 @outlined
-def _first_hit(surface, gravity, r, v):
+def first_hit(surface, gravity, r, v):
     """`first_hit` with or without gravity."""
     t, last = surface.near(gravity, r, v).first_step()
     for _step in range(_STEPS):
@@ -116,29 +116,21 @@ def _first_hit(surface, gravity, r, v):
     return t, not under_way(t, last)
 
 
-@contract.near.implies(contract.first_hit)
-def _(surface, r, v):
-    return _first_hit(surface, None, r, v)
+def falling_hit(surface, r, v, pull):
+    """The same under gravity, which is a vector like any other here."""
+    return first_hit(surface, Gravity(pull.x, pull.y, pull.z), r, v)
 
 
-@contract.near.implies(contract.falling_hit)
-def _(surface, r, v, pull):
-    return _first_hit(surface, Gravity(pull.x, pull.y, pull.z), r, v)
-
-
-@contract.near.implies(contract.safe_time)
-def _(surface, r, v, pull):
+def safe_time(surface, r, v, pull):
     level = surface.near(Gravity(pull.x, pull.y, pull.z), r, v)
     return select(level.c > 0.0, 0.0, level.first_step()[0])
 
 
 # --- In lanes --------------------------------------------------------------------------------------------
 
-contract.near.implies(flights.in_steps)(lambda surface: 1.0)
 
-
-@contract.near.implies(flights.begin_wall)
-def _(surface, gravity, course, row, lane, r, v):
+def begin(surface, gravity, course, row, lane, r, v):
+    """The start of a flight into course[row:, lane]."""
     if _in_steps(surface, gravity):
         level = surface.near(gravity, r, v)
         course[row + flights.TIME, lane], course[row + flights.LAST, lane] = level.first_step()
@@ -146,8 +138,8 @@ def _(surface, gravity, course, row, lane, r, v):
         flights.begin_whole(gravity, surface, course, row, lane, r, v)
 
 
-@contract.near.implies(flights.step_wall)
-def _(surface, gravity, course, row, lane, r, v):
+def step(surface, gravity, course, row, lane, r, v):
+    """One safe step of it."""
     if _in_steps(surface, gravity):
         t, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
         level = surface.near(gravity, *place(gravity, r, v, t, last))
@@ -156,4 +148,4 @@ def _(surface, gravity, course, row, lane, r, v):
 
 def _in_steps(surface, gravity):
     """Whether a flight takes steps: a constant for the compiler."""
-    return gravity is not None or flights.in_steps(surface) is not None
+    return gravity is not None or surface.in_steps is not None

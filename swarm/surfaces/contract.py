@@ -15,8 +15,8 @@ import math
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
-from . import approach, march, newton
-from .course import Quartic, first_rise, safe_rise_time
+from . import approach, flights, march, newton
+from .course import first_rise, safe_rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
@@ -140,6 +140,14 @@ class Smooth(Record):
         """The inner function at the end of a step, where the wall may be elsewhere."""
         return self.inner(r)
 
+    def place_scale(self, s):
+        """The scale of the round-off of a place in the frame of a wall, from that of its coordinates."""
+        return s
+
+    def framed(self, r, p):
+        """What a step is asked of: the surface at rest in its frame, and the step's start and free displacement there."""
+        return self, r, p
+
     def pace(self):
         """A time in which the motion of the wall changes little [s]; infinite where it does not change."""
         return math.inf
@@ -179,6 +187,10 @@ class Smooth(Record):
             return approach.safe_time(self, r, v, pull)
         return march.safe_time(self, r, v, pull) if self.gives("bend") else 0.0
 
+    def straight_hit(self, end, r0, r1):
+        """`first_hit` of a straight way from r0 at one instant to r1 at another, where the surface is `end`."""
+        return self.first_hit(r0, r1 - r0)
+
     def course(self, r, v, pull):
         """The level along that parabola as a `Quartic`."""
         raise NotImplementedError
@@ -194,9 +206,28 @@ class Smooth(Record):
     def near(self, gravity, r, v):
         """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
 
-        A `Near` or `NearFall` of approach.py; `gravity` is None where the flight is straight.
+        A `Near` of approach.py; `gravity` is None where the flight is straight.
         """
         raise NotImplementedError
+
+    @property
+    def in_steps(self):
+        """A number where a straight flight takes steps in lanes; None where its hit is asked for as a whole."""
+        return 1.0 if self.gives("near") else None
+
+    def begin_flight(self, gravity, course, row, lane, r, v):
+        """The start of a flight in lanes into course[row:, lane]."""
+        if self.gives("near"):
+            approach.begin(self, gravity, course, row, lane, r, v)
+        else:
+            flights.begin_whole(gravity, self, course, row, lane, r, v)
+
+    def step_flight(self, gravity, course, row, lane, r, v):
+        """One safe step of it, where it takes steps."""
+        if self.gives("near"):
+            approach.step(self, gravity, course, row, lane, r, v)
+        else:
+            flights.step_whole(gravity, self, course, row, lane)
 
     def clearance(self, r):
         """Lower bound of the distance to the wall; 0 if unknown."""

@@ -4,10 +4,9 @@ import math
 from typing import NamedTuple
 
 from ..kernel.gravity import as_vector
-from ..kernel.jit import by_type, select
-from . import contract
+from ..kernel.jit import select
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Chain, Field, count, each, member, outside
+from .fold import Field, count, each, member, outside
 
 
 class Hit(NamedTuple):
@@ -76,31 +75,21 @@ COURSE = 9
 _WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
 
 
-@by_type
-def in_steps(surface):
-    """A number where a straight flight to a wall, or to any of a chain, takes steps in lanes: a type for the compiler.
+def in_steps(chain):
+    """A number where a straight flight to any wall of a chain takes steps in lanes: a type for the compiler.
 
     None where its hit has a closed form, or is asked for as a whole.
     """
-    return
-
-
-@in_steps.register(Chain)
-def _(surface):
-    steps = in_steps(surface.first)
-    return in_steps(surface.rest) if steps is None else steps
+    steps = None
+    for link in each(chain):
+        steps = link.first.in_steps if steps is None else steps
+    return steps
 
 
 def begin(chain, gravity, course, row, lane, r, v):
     """The start of a flight for every wall into course[row:, lane]."""
     for k, link in enumerate(each(chain)):
-        begin_wall(link.first, gravity, course, row + k * COURSE, lane, r, v)
-
-
-@by_type
-def begin_wall(surface, gravity, course, row, lane, r, v):
-    """The same of one wall."""
-    begin_whole(gravity, surface, course, row, lane, r, v)
+        link.first.begin_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
 def begin_whole(gravity, surface, course, row, lane, r, v):
@@ -119,12 +108,11 @@ def begin_whole(gravity, surface, course, row, lane, r, v):
 def step(chain, gravity, course, row, lane, r, v):
     """One safe step of every wall that needs steps, of the flight that starts at r."""
     for k, link in enumerate(each(chain)):
-        step_wall(link.first, gravity, course, row + k * COURSE, lane, r, v)
+        link.first.step_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
-@by_type
-def step_wall(surface, gravity, course, row, lane, r, v):
-    """The same of one wall: of one whose level along the flight is known as a whole, or whose hit is."""
+def step_whole(gravity, surface, course, row, lane):
+    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
     if gravity is not None and surface.is_quartic:
         level = Quartic(
             course[row, lane], course[row + 1, lane], course[row + 2, lane],

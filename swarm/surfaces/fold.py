@@ -4,12 +4,11 @@ Fields come before all other walls: whether a scene has one is the type of its c
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..kernel.jit import select
 from ..kernel.vector import ZERO
-from . import contract
 from .surface import Surface
 
 
@@ -91,11 +90,11 @@ def count_in_fields(chain):
 # --- A function of one wall ------------------------------------------------------------------------------
 
 
-def of_wall(function: Callable[..., Any], neutral: Any) -> Any:
-    """The fold (chain, wall, ...) that is function(surface, ...) of the wall with this number.
+def of_wall(name: Any, neutral: Any) -> Any:
+    """The fold (chain, wall, ...) that is a method of the wall with this number.
 
-    For any other number it is the function of the last wall: a caller that has no wall ignores the result. `neutral` is
-    that of no walls.
+    For any other number it is the method of the last wall: a caller that has no wall ignores the result. `neutral` is
+    any value of the type of the result.
     """
 
     def fold(chain, wall, *given):
@@ -106,28 +105,34 @@ def of_wall(function: Callable[..., Any], neutral: Any) -> Any:
             surface, here, other = member(chain.first, wall), wall < many, wall - many
         else:
             surface, here, other = chain.first, wall == 0.0, wall - 1.0
-        value = function(surface, *given)
+        value = asked(surface, *given)
         return value if chain.rest is None else select(here, value, fold(chain.rest, other, *given))
+
+    def asked(surface, *given):
+        if not isinstance(name, str):
+            return name(surface, *given)
+        found = getattr(surface, name)
+        return found(*given) if callable(found) else found
 
     return fold
 
 
-velocity = of_wall(contract.velocity, ZERO)
-acceleration = of_wall(contract.acceleration, ZERO)
-carry = of_wall(contract.carry, ZERO)
-mean_velocity = of_wall(contract.mean_velocity, ZERO)
-way = of_wall(contract.way, ZERO)
-unit_normal = of_wall(contract.unit_normal, ZERO)
-settle = of_wall(contract.settle, ZERO)
-flat = of_wall(contract.flat, False)
-distance = of_wall(contract.distance, 0.0)
-push = of_wall(contract.push, ZERO)
-inner_gradient = of_wall(contract.inner_gradient, ZERO)
-step_normal = of_wall(contract.step_normal, ZERO)
-outward_acceleration = of_wall(contract.outward_acceleration, 0.0)
-chord_guess = of_wall(contract.chord_guess, 0.0)
-chord_improve = of_wall(contract.chord_improve, 0.0)
-chord_normal = of_wall(contract.chord_normal, ZERO)
+velocity = of_wall("velocity", ZERO)
+acceleration = of_wall("acceleration", ZERO)
+carry = of_wall("carry", ZERO)
+mean_velocity = of_wall("mean_velocity", ZERO)
+way = of_wall("way", ZERO)
+unit_normal = of_wall("unit_normal", ZERO)
+settle = of_wall("settle", ZERO)
+flat = of_wall("flat", False)
+distance = of_wall("distance", 0.0)
+push = of_wall("push", ZERO)
+inner_gradient = of_wall("inner_gradient", ZERO)
+step_normal = of_wall("step_normal", ZERO)
+outward_acceleration = of_wall("outward_acceleration", 0.0)
+chord_guess = of_wall("chord_guess", 0.0)
+chord_improve = of_wall("chord_improve", 0.0)
+chord_normal = of_wall("chord_normal", ZERO)
 
 
 # --- Of all walls ----------------------------------------------------------------------------------------

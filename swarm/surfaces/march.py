@@ -5,9 +5,8 @@ A safe step ends where a parabola above the level rises through 0, so no root is
 
 import math
 
-from ..kernel.jit import inlined, outlined, select
-from ..kernel.vector import ZERO, absolute, dot, norm, square, total
-from . import contract
+from ..kernel.jit import outlined, select
+from ..kernel.vector import absolute, dot, norm, square, total
 from .course import rise_time
 
 _EPSILON = 2.220446049250313e-16
@@ -19,18 +18,8 @@ _FALLING_MARCH = 16
 _BISECTIONS = 1100
 
 
-@contract.bend.implies(contract.first_hit)
-def _(surface, r, v):
-    return march(surface, r, v, ZERO)
-
-
-@contract.bend.implies(contract.falling_hit)
-def _(surface, r, v, pull):
-    return march(surface, r, v, pull)
-
-
-@contract.bend.implies(contract.safe_time)
-def _(surface, r, v, pull):
+def safe_time(surface, r, v, pull):
+    """A time during which the flight surely stays admissible."""
     level, _half, step, _way, _steepness = _safe_step(surface, r, v, pull, 0.0)
     return select(level > 0.0, 0.0, step)
 
@@ -75,7 +64,6 @@ def bisected(surface, r, v, pull, low, high):
     return low
 
 
-@inlined
 def lets_go(level, half, step, slack):
     """Whether a flight leaves a wall so slowly that its safe step is a matter of round-off; `slack` is that of a level.
 
@@ -120,19 +108,16 @@ def _safe_step(surface, r, v, pull, slack):
     return level, half, step, _travelled(speed, g, step), norm(n)
 
 
-@inlined
 def _step_within(level, half, bound, longest):
     """The root of the parabola above the level, within the time in which its bound holds."""
     return min(rise_time(level, half, bound), longest)
 
 
-@inlined
 def _time_to_travel(speed, g, way):
     """The time t with speed t + g t^2/2 = way."""
     twice = speed + (speed if g == 0.0 else math.sqrt(speed * speed + 2.0 * g * way))
     return 2.0 * way / twice if twice > 0.0 else math.inf
 
 
-@inlined
 def _travelled(speed, g, t):
     return (speed + 0.5 * g * t) * t

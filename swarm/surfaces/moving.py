@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..kernel.record import Record
-from . import contract, stroke  # noqa: F401
 from .drive import Drive, drive_of
 from .fold import Chain, Field
 from .posed import Drifting, Posed

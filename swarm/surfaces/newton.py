@@ -4,7 +4,6 @@ import math
 
 from ..kernel.jit import outlined
 from ..kernel.vector import Vec, dot, largest
-from . import contract
 
 _EPSILON = 2.220446049250313e-16
 # Newton steps; changes below this part of a step may be noise.
@@ -12,13 +11,11 @@ _ITERATIONS = 50
 _NOISE = 1e-12
 
 
-@contract.hessian.implies(contract.push)
-def _(surface, r0, p, kappa):
+def push(surface, r0, p, kappa):
     return r0 + _moved(surface, r0, p, kappa)
 
 
-@contract.hessian.implies(contract.rise)
-def _(surface, r0, p, kappa):
+def rise(surface, r0, p, kappa):
     d = _moved(surface, r0, p, kappa)
     r1 = r0 + d
     g = surface.inner_gradient(r0, r1)
@@ -42,8 +39,7 @@ def _moved(surface, r0, p, kappa):
     return Vec(math.nan, math.nan, math.nan)
 
 
-@contract.hessian.implies(contract.resolve)
-def _(surface, r, strength):
+def resolve(surface, r, strength):
     return _resolved(surface, r, strength)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..kernel.jit import select
-from . import contract, required
+from . import required
 from .fields.many import Many
 from .fold import Chain, Field, chain_of, each, linked
 from .images import Lengths, images_of

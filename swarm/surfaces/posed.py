@@ -1,17 +1,22 @@
-"""A wall that moves, at one instant or over one step: every function of a surface, asked in the frame of the wall.
+"""A wall that moves, at one instant or over one step: what is asked of a surface is asked in the frame of the wall.
 
-Of a flight only a wall in uniform translation is asked: it ends there as at a wall at rest.
+Of a flight only a wall in uniform translation is asked: it ends there as at a wall at rest. In the frame of a wall that
+is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by rho1 - rho0 = r1 - r0 - (d1 - d0): it is that
+at a wall at rest, with the free displacement p - (d1 - d0).
 """
 
+import math
 from typing import Any
 
-from ..kernel.record import Record
-from ..kernel.vector import cross, norm
-from . import contract
+from ..kernel.angle import sine_and_versine
+from ..kernel.jit import select
+from ..kernel.vector import Vec, absolute, cross, dot, norm, times, total
+from . import flights
 from .drive import Drive, Pose
+from .frames import Framed
 
 
-class Posed(contract.Smooth):
+class Posed(Framed):
     """A wall at one instant, or over one step, or a field of them."""
 
     body: Any
@@ -84,15 +89,17 @@ class Posed(contract.Smooth):
         """The middle of the step, from the end of the frame on."""
         return -0.5 * (self.left + self.after)
 
-    def settle(self, r):
-        return self.pose.place_out(self.drive.center, self.body.settle(self.own_place(r)))
+    place_in = own_place
 
-    def outward_acceleration(self, r, v, pull):
-        own_v, own_pull = self.own_velocity(r, v), self.own_pull(r, v, pull)
-        return self.body.outward_acceleration(self.own_place(r), own_v, own_pull)
+    def place_out(self, r):
+        return self.pose.place_out(self.drive.center, r)
 
-    def pace(self):
-        return self.drive.pace
+    def vector_out(self, a):
+        return self.pose.out(a)
+
+    # --- At this instant ---
+
+    # A rotation that leaves the surface as it is turns what it is made of.
 
     def velocity(self, r):
         moved, spin = self.pose.velocity, self.drive.spin
@@ -102,6 +109,109 @@ class Posed(contract.Smooth):
         moved, spin = self.pose.acceleration, self.drive.spin
         return moved if spin is None else moved + cross(spin, cross(spin, self.arm(r)))
 
+    def outward_acceleration(self, r, v, pull):
+        own_v, own_pull = self.own_velocity(r, v), self.own_pull(r, v, pull)
+        return self.body.outward_acceleration(self.own_place(r), own_v, own_pull)
+
+    def pace(self):
+        return self.drive.pace
+
+    # --- Flight, but for what safe.py adds ---
+
+    is_quartic, may_be_far, has_levels, in_steps = False, True, False, None
+
+    def safe_time(self, r, v, pull):
+        return 0.0
+
+    def begin_flight(self, gravity, course, row, lane, r, v):
+        flights.begin_whole(gravity, self, course, row, lane, r, v)
+
+    def step_flight(self, gravity, course, row, lane, r, v):
+        flights.step_whole(gravity, self, course, row, lane)
+
+    def straight_hit(self, end, r0, r1):
+        own = self.own_place(r0)
+        return self.body.first_hit(own, end.own_place(r1) - own)
+
+    # --- Over the step ---
+
+    def way(self):
+        return self.end.shift - self.pose.shift
+
+    def end_inner(self, r):
+        return self.body.inner(self.own_end(r))
+
+    def carry(self, r):
+        spin = self.drive.spin
+        if spin is None:
+            return self.end.shift - self.pose.shift + r
+        rate = norm(spin)
+        k = spin / select(rate > 0.0, rate, 1.0)
+        sine, versine = sine_and_versine(rate * (self.left - self.after))
+        before = self.arm(r)
+        after = before + versine * (dot(k, before) * k - before) + sine * cross(k, before)
+        return self.drive.center + self.end.shift + after
+
+    def mean_velocity(self, r0, r1, h):
+        drive, middle = self.drive, self.middle()
+        moved = drive.mean_velocity(middle, h)
+        if drive.turn is None:
+            return moved
+        mean = 0.5 * (self.own_place(r0) + self.own_end(r1)) - drive.center
+        return moved + drive.turn.mean_velocity(middle, h, mean)
+
+    def gap_scale(self, r):
+        # A place in the frame has the round-off of the displacement and of the time too.
+        own = self.own_place(r)
+        gradient, late = self.body.gradient(own), self.drive.late
+        moved = total(absolute(times(gradient, self.pose.shift))) + late * total(absolute(gradient))
+        return self.body.gap_scale(own) + moved
+
+    def place_scale(self, s):
+        late = self.drive.late
+        return s + absolute(self.pose.shift) + Vec(late, late, late)
+
+    def framed(self, r, p):
+        return self.body, self.own_place(r), p - self.way()
+
+    def push(self, r0, p, kappa):
+        body, own, free = self.framed(r0, p)
+        return self.end.shift + body.push(own, free, kappa)
+
+    def rise(self, r0, p, kappa):
+        body, own, free = self.framed(r0, p)
+        return body.rise(own, free, kappa)
+
+    def resolve(self, r, strength):
+        return self.pose.shift + self.body.resolve(self.own_place(r), strength)
+
+    def chord_guess(self, r, p):
+        body, own, free = self.framed(r, p)
+        return body.chord_guess(own, free)
+
+    def chord_improve(self, r, p, kappa):
+        body, own, free = self.framed(r, p)
+        return body.chord_improve(own, free, kappa)
+
+    def inner_gradient(self, r0, r1):
+        return self._halfway(self.body.inner_gradient(self.own_place(r0), self.own_end(r1)))
+
+    def step_normal(self, r0, r1):
+        n = self._halfway(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
+        return n if self.pose.turn is None else n / norm(n)
+
+    def _halfway(self, n):
+        """A normal of the frame of the wall, of a step, in the scene."""
+        if self.pose.turn is None:
+            return n
+        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
+        # across the axis and 1 along it, with the angle a of the step.
+        k = self.drive.turn.axis
+        half = math.sin(0.5 * self.drive.turn.rate * (self.left - self.after))
+        along = dot(k, n) * k
+        n = along + (n - along) * (1.0 / (1.0 - half * half))
+        return 0.5 * (self.pose.out(n) + self.end.out(n))
+
 
 class Drifting(Posed):
     """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
@@ -110,59 +220,23 @@ class Drifting(Posed):
         """Place and velocity of a particle in the frame of the wall."""
         return r - self.pose.shift, v - self.pose.velocity
 
+    is_quartic = property(lambda self: self.body.is_quartic)
+    may_be_far = property(lambda self: self.body.may_be_far)
+
+    def first_hit(self, r, v):
+        return self.body.first_hit(*self.own_flight(r, v))
+
+    def falling_hit(self, r, v, pull):
+        return self.body.falling_hit(*self.own_flight(r, v), pull)
+
+    def course(self, r, v, pull):
+        return self.body.course(*self.own_flight(r, v), pull)
+
+    def safe_time(self, r, v, pull):
+        return self.body.safe_time(*self.own_flight(r, v), pull)
+
     def field_hit(self, gravity, r, v):
         return self.body.field_hit(gravity, *self.own_flight(r, v))
 
     def until_next_cell(self, r, v):
         return self.body.until_next_cell(*self.own_flight(r, v))
-
-    @property
-    def is_quartic(self):
-        return self.body.is_quartic
-
-    @property
-    def may_be_far(self):
-        return self.body.may_be_far
-
-    def first_hit(self, r, v):
-        return self.body.first_hit(*self.own_flight(r, v))
-
-
-def straight_hit(surface, end, r0, r1):
-    """When a straight way from r0 at one instant to r1 at another meets a wall, which is `end` there."""
-    if not isinstance(surface, Posed):
-        return surface.first_hit(r0, r1 - r0)
-    own = surface.own_place(r0)
-    return surface.body.first_hit(own, end.own_place(r1) - own)
-
-
-# --- Its functions ---------------------------------------------------------------------------------------
-
-
-def _of(made: Any, *functions: Any, kind: type = Posed) -> None:
-    for function in functions:
-        function.register(kind, made(function))
-
-
-_of(lambda f: lambda surface: f(surface.body), contract.flat, contract.chord_sweeps, contract.farthest_push)
-_of(lambda f: lambda surface, q: f(surface.body, q), contract.gap_of, contract.level_of)
-_of(lambda f: lambda surface, q0, q1: f(surface.body, q0, q1), contract.gap_slope)
-_of(
-    lambda f: lambda surface, r: f(surface.body, surface.own_place(r)),
-    contract.phi, contract.inner, contract.distance,
-)  # fmt: skip
-_of(
-    lambda f: lambda surface, r: surface.pose.out(f(surface.body, surface.own_place(r))),
-    contract.gradient, contract.slope, contract.unit_normal,
-)  # fmt: skip
-
-
-# A rotation that leaves the surface as it is turns what it is made of.
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-_of(
-    lambda f: lambda surface, r, v, pull: f(surface.body, *surface.own_flight(r, v), pull),
-    contract.falling_hit, contract.course, contract.safe_time, kind=Drifting,
-)  # fmt: skip

@@ -14,7 +14,6 @@ from typing import Any
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, norm, square, times, total
-from . import contract
 from .course import rise_time
 from .fold import each
 from .levels import Between, Level
@@ -22,7 +21,6 @@ from .relative import Bounds, Seen
 from .rotation import Rotated
 from .shapes.plane import PlaneNumbers
 from .shapes.quadratic import QuadricNumbers, form
-from .shapes.rotated import own, scene
 from .shapes.slab import SlabNumbers, along, scaled
 from .shapes.solid import SolidNumbers, noise
 from .shapes.sphere import SphereNumbers
@@ -102,11 +100,6 @@ class Known(Ahead):
 
 # Bodies whose levels are known.
 _LEVELED = PlaneNumbers, SphereNumbers, QuadricNumbers
-for _kind in _LEVELED:
-    contract.has_levels.register(_kind, lambda surface: True)
-# Between its planes; of a solid there is one.
-contract.has_levels.register(SlabNumbers, lambda surface: surface.side > 0.0)
-contract.has_levels.register(Rotated, lambda surface: surface.body.has_levels)
 
 
 def needs_bend(body):
@@ -162,7 +155,7 @@ def _entry_step(body, seen, longest):
 
 def _turned(body, seen):
     """What is seen, in the frame of a wall that is turned in its own."""
-    return seen._replace(r=own(body, seen.r), v=own(body, seen.v), a=own(body, seen.a))
+    return seen._replace(r=body.vector_in(seen.r), v=body.vector_in(seen.v), a=body.vector_in(seen.a))
 
 
 # --- Levels and their bounds -----------------------------------------------------------------------------
@@ -218,7 +211,7 @@ def _flat_normal(body):
     """The normal of a flat wall, or None."""
     if isinstance(body, Rotated):
         n = _flat_normal(body.body)
-        return None if n is None else scene(body, n)
+        return None if n is None else body.vector_out(n)
     if isinstance(body, SlabNumbers):
         return scaled(body.normal, 1.0)
     return body.normal if isinstance(body, PlaneNumbers) else None

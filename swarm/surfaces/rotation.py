@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Vector, number, vector
 from ..errors import SceneError
-from ..kernel.record import Record
-from ..kernel.vector import Vec, vec
+from ..kernel.gravity import Gravity, as_vector
+from ..kernel.vector import Vec, dot, vec
+from .frames import Framed
 
 Quaternion = tuple[float, float, float, float]
 # By this much the length of what `unit` or a table of axis and angle gives may differ from 1.
@@ -122,13 +123,30 @@ def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
     return point if turn is None else tuple(product(matrix(turn).T, point).tolist())
 
 
-class Rotated(Record):
+class Rotated(Framed):
     """A surface `body` in its own frame, and the rows of the matrix from that frame to the scene's."""
 
     body: Any
     x: Vec
     y: Vec
     z: Vec
+
+    def vector_in(self, a):
+        """A vector of the scene in the surface's own frame."""
+        return self.x * a.x + self.y * a.y + self.z * a.z
+
+    def vector_out(self, a):
+        """A vector of the surface's own frame in the scene."""
+        return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
+
+    place_in, place_out = vector_in, vector_out
+
+    def gravity_in(self, gravity):
+        """Gravity, or none, in the surface's own frame."""
+        if gravity is None:
+            return None
+        turned = self.vector_in(as_vector(gravity))
+        return Gravity(turned.x, turned.y, turned.z)
 
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:

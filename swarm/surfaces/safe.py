@@ -8,7 +8,7 @@ from ..kernel.jit import index, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from ..motion import Guide
-from . import contract, flights
+from . import flights
 from .drive import drive_of
 from .fields.grid import cell_of
 from .fields.members import Members, member
@@ -165,7 +165,7 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
-    return needs_bend(wall) and contract.bend.dispatch(type(wall)) is contract.bend.dispatch(object)
+    return needs_bend(wall) and not wall.gives("bend")
 
 
 # --- Free time -------------------------------------------------------------------------------------------
@@ -239,10 +239,6 @@ def _alone(surface, r, v, pull):
     return found.time, found.wall >= 0.0
 
 
-contract.first_hit.register(Posed, lambda surface, r, v: _alone(surface, r, v, ZERO))
-contract.falling_hit.register(Posed, lambda surface, r, v, pull: _alone(surface, r, v, pull))
-
-
 @outlined
 def _field_alone(field, r, v, pull):
     """The first hit of a flight with the bodies of a field, or how far it is surely free."""
@@ -259,5 +255,7 @@ def _until_next_cell(members, r, v):
 
 
 # What takes safe steps is known only here.
+Posed.first_hit = lambda surface, r, v: _alone(surface, r, v, ZERO)  # type: ignore[method-assign]
+Posed.falling_hit = _alone  # type: ignore[method-assign]
 Posed.field_hit = _first_hit_of_field  # type: ignore[attr-defined]
 Posed.until_next_cell = _until_next_cell  # type: ignore[attr-defined]

@@ -12,7 +12,6 @@ from .. import motion as motions
 from ..checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
-from . import contract
 from . import rotation as rotations
 
 # A tilt of an axis this small is the round-off of a rotation.

@@ -12,7 +12,6 @@ import swarm
 from swarm.contact import discrete_gradient as forms
 from swarm.contact.records import Step
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
 
 SMOOTH = [law for law in LAWS.values() if exponent_of(law) > 1.0]
 CONVEX = ["sphere", "ellipsoid", "plane"]

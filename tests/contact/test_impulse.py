@@ -14,7 +14,6 @@ from swarm.contact import impulse
 from swarm.contact import regularisation as laws
 from swarm.contact.records import Step
 from swarm.kernel.vector import Vec, vec
-from swarm.surfaces import contract
 from swarm.surfaces.fold import Chain
 
 mp.mp.dps = 50

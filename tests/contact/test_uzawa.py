@@ -13,7 +13,6 @@ from swarm.contact import uzawa
 from swarm.contact.records import Step
 from swarm.contact.regularisation import regularisation
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
 from swarm.surfaces import fold as walls
 
 few = settings(max_examples=3)

@@ -30,7 +30,6 @@ from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import column, square, vec
-from swarm.surfaces import contract
 from swarm.surfaces.flights import first_hit
 from swarm.surfaces.fold import chain_of
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from passes import one_pass, run
 
 import swarm
-from swarm.surfaces import contract as surfaces
 
 RULES = {"verlet": swarm.Verlet, "midpoint": swarm.Midpoint, "trapezoidal": swarm.Trapezoidal}
 every_rule = pytest.mark.parametrize("rule", RULES)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from passes import one_pass, run, simulate
 
 import swarm
-from swarm.surfaces import contract as surfaces
 
 lengths = st.floats(1e-4, 0.3)
 

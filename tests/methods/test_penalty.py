@@ -11,7 +11,6 @@ from passes import energy_of, one_pass, run
 
 import swarm
 from swarm.contact.energy import contact_energy
-from swarm.surfaces import contract as surfaces
 
 exponents = pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
 

@@ -21,8 +21,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walls import depths, falling, flights, hit_of, start, straight
 
-from swarm.surfaces import contract
-
 # Of the accelerations that cross the surface in its crossing time.
 heavies = st.sampled_from([1e-6, 1.0, 1e3])
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import contract, flights, fold
+from swarm.surfaces import flights, fold
 
 every_chain = pytest.mark.parametrize(
     "names",
@@ -51,8 +51,8 @@ def first_least(hits):
 def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
     whole, single = both(names)
     gravity = Gravity(*pull) if falling else None
-    one, more = (contract.falling_hit, (pull,)) if falling else (contract.first_hit, ())
-    hits = [call(one, numbers, point, velocity, *more) for numbers in single]
+    one, more = ("falling_hit", (pull,)) if falling else ("first_hit", ())
+    hits = [call(getattr(numbers, one), point, velocity, *more) for numbers in single]
     assert fold.length(whole) == len(names)
     assert call(flights.first_hit, whole, gravity, point, velocity) == first_least(hits)
     for index, hit in enumerate(hits):
@@ -92,15 +92,15 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
     whole, single = both(names)
     for index, numbers in enumerate(single):
         for pick, one, arguments in [
-            (fold.unit_normal, contract.unit_normal, (point,)),
-            (fold.chord_guess, contract.chord_guess, (point, 0.1 * free)),
-            (fold.chord_improve, contract.chord_improve, (point, 0.1 * free, kappa)),
-            (fold.chord_normal, contract.chord_normal, (point, 0.1 * free, kappa)),
-            (fold.settle, contract.settle, (point,)),
-            (fold.push, contract.push, (point, free, kappa)),
-            (fold.inner_gradient, contract.inner_gradient, (point, free)),
+            (fold.unit_normal, "unit_normal", (point,)),
+            (fold.chord_guess, "chord_guess", (point, 0.1 * free)),
+            (fold.chord_improve, "chord_improve", (point, 0.1 * free, kappa)),
+            (fold.chord_normal, "chord_normal", (point, 0.1 * free, kappa)),
+            (fold.settle, "settle", (point,)),
+            (fold.push, "push", (point, free, kappa)),
+            (fold.inner_gradient, "inner_gradient", (point, free)),
         ]:
-            assert call(pick, whole, index, *arguments) == call(one, numbers, *arguments), one.__name__
+            assert call(pick, whole, index, *arguments) == call(getattr(numbers, one), *arguments), one
 
 
 @every_chain

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm import tables
-from swarm.surfaces import contract
 from swarm.surfaces.formulas import derivatives, numbers
 from swarm.surfaces.formulas.interval import Interval, bounds_of
 from swarm.surfaces.surface import UNBOUNDED

@@ -19,7 +19,6 @@ from swarm import tables
 from swarm.kernel import cache, frozen
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
-from swarm.surfaces import contract
 from swarm.surfaces.formulas import code, numbers
 from swarm.surfaces.surface import UNBOUNDED
 

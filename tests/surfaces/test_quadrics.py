@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import swarm
-from swarm.surfaces import contract, rotation
+from swarm.surfaces import rotation
 from swarm.surfaces.shapes.quadratic import QuadricNumbers
 
 # --- The level set ---------------------------------------------------------------------------------------

@@ -10,7 +10,6 @@ from walls import falling, hit_of, start, straight
 
 import swarm
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import contract
 from swarm.surfaces import march as marches
 from swarm.surfaces import rotation as rotations
 from swarm.surfaces.shapes.capsule import CapsuleNumbers

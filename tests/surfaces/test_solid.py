@@ -10,7 +10,6 @@ from walls import falling, hit_of, straight
 
 import swarm
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
 from swarm.surfaces.shapes.solid import body
 
 AXES = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]

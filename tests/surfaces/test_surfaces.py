@@ -26,7 +26,6 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.kernel.vector import vec
-from swarm.surfaces import contract
 from swarm.surfaces.rotation import Rotated
 
 # --- The level set ---------------------------------------------------------------------------------------

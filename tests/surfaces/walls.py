@@ -7,8 +7,6 @@ from conftest import call, directions, numbers_of, scales, wall_point
 from exact import EXACT, NEAR, TOUCHED, Flight
 from hypothesis import strategies as st
 
-from swarm.surfaces import contract
-
 # Where a flight starts relative to the wall, in units of its size: inside, next to it, on it, an ulp or two off.
 depths = st.one_of(st.floats(1e-3, 0.3), st.sampled_from([0.0, 0.0, 1e-15, -1e-15, 1e-9, 1e-12]))
 # How it leaves: part of the velocity along the normal, out of the wall or into it; 0 grazes.

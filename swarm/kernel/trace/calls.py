@@ -15,7 +15,7 @@ from numba.core.dispatcher import Dispatcher
 from .frame import Frame, Range
 from .selection import select, traced_select
 from .twins import twin_of
-from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
+from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted, notes
 from .ways import unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
@@ -107,11 +107,34 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
     if any(one is UNDEFINED for one in given):
         bool(UNDEFINED)
     if isinstance(function, python_types.FunctionType):
-        return traced(function, given, named)
+        return traced(function, given, named) if _is_own(function) else _foreign(function, given, named)
     is_python = getattr(function, "__module__", None) == "builtins"
     if function in _IN_PLACE or (is_python and any(isinstance(one, Value) for one in given)):
         raise TraceError(f"it asks {name_of(function)} about a number that is known in the kernel only")
     return function(*given, **named)
+
+
+def _is_own(function: Any) -> bool:
+    return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
+
+
+def _foreign(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """A call of a function of the user's, which may do what cannot be traced."""
+    now = notes()
+    mark = len(now)
+    try:
+        return traced(function, given, named)
+    except Exception as error:  # What Python says where a proxy is not what a function expects.
+        if named:
+            raise
+        del now[mark:]
+        leave(function, error)
+        return noted(function, *given)
+
+
+def leave(function: Any, error: Exception) -> None:
+    """Let Numba compile a function in place of a trace: the bridge to Numba says how, see `helpers.py`."""
+    raise error
 
 
 def _is_operation(function: Any) -> bool:

@@ -14,33 +14,29 @@ from numba.core.typing.templates import Signature, infer, infer_global, make_ove
 from numba.extending import lower_builtin
 
 from ..cache import is_disabled
-from ..entries import python_class
 from . import calls, values
 from .calls import traced
 from .emit import emit
 from .notes import Argument
 from .part import Part, key_of
-from .values import Real, Value
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
 # Why helpers are compiled by Numba, by their names.
 left_to_numba: dict[str, str] = {}
 
-Choose = Callable[[Any], Any]
-
 
 class Helper:
-    """A function, or a family of them that is chosen by the class of the first argument, for kernels.
+    """A function for kernels.
 
     Args:
         function: what Python calls.
-        choose: gives the definition for a class.
+        body: what kernels call.
         outlined: a function of its own in a kernel, called and not inlined.
     """
 
-    def __init__(self, function: Any, choose: Choose, outlined: bool) -> None:
-        self._function, self._choose, self._outlined = function, choose, outlined
+    def __init__(self, function: Any, body: Any, outlined: bool) -> None:
+        self._function, self._body, self._outlined = function, body, outlined
         self.signature = inspect.signature(function)
         self.name: str = function.__name__
         kinds = self.signature.parameters.values()
@@ -112,34 +108,47 @@ class Helper:
     def _run(self, given: Any) -> Any:
         first = len(given) - len(self._keywords)
         named = dict(zip(self._keywords, given[first:], strict=True))
-        return traced(self._choose(_class_of(given[0]) if given else object), given[:first], named)
+        return traced(self._body, given[:first], named)
 
     def _leave(self, error: Exception) -> None:
-        left_to_numba.setdefault(self.name, f"{type(error).__name__}: {error} ({self._place_of(error)})")
-        _LOG.debug("%s is compiled by Numba: %s", self.name, error, exc_info=error)
-
-    def _place_of(self, error: Exception) -> str:
-        """The line that an error is about, or where the function begins."""
-        frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
-        code = inspect.unwrap(self._function).__code__
-        places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]
-        return "{}, line {}".format(*places[-1])
+        _tell(self._function, error)
 
 
-def _class_of(given: Any) -> Any:
-    """The class by which a definition is chosen: that of the value in plain Python."""
-    if isinstance(given, Value):
-        return float if isinstance(given, Real) else object
-    return type(given)
+def _tell(function: Any, error: Exception) -> None:
+    """Keep why a function is left to Numba, and where: the line that an error is about, or where the function begins."""
+    frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
+    code = inspect.unwrap(function).__code__
+    places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]
+    left_to_numba.setdefault(
+        function.__name__, f"{type(error).__name__}: {error} ({places[-1][0]}, line {places[-1][1]})"
+    )
+    _LOG.debug("%s is compiled by Numba: %s", function.__name__, error, exc_info=error)
 
 
-def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None = None) -> None:
-    """Let traces and Numba call a helper; `choose` gives the definitions of a family."""
+def leaving(options: Any) -> Callable[[Any, Exception], None]:
+    """What a trace does with a function of the user's that it cannot trace: Numba compiles it with these options."""
+
+    def leave(function: Any, error: Exception) -> None:
+        _tell(function, error)
+        if function not in _LEFT:
+            _LEFT.add(function)
+            made: Any = make_overload_template(function, lambda *kinds: function, options, False, "never")
+            infer_global(function, types.Function(made))
+            values.context().refresh()
+
+    return leave
+
+
+_LEFT: set[Any] = set()
+
+
+def prepare(function: Any, options: Any, outlined: bool, body: Any = None) -> None:
+    """Let traces and Numba call a helper, or `body` in its place."""
     if is_disabled():
         return
-    helper = Helper(function, choose or (lambda made: function), outlined)
+    helper = Helper(function, body or function, outlined)
     calls.REPLACED[function] = helper.called
-    base: Any = make_overload_template(function, _definition(function, choose), options, choose is not None, "never")
+    base: Any = make_overload_template(function, _definition(function, body), options, body is not None, "never")
 
     class Template(base):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
@@ -165,12 +174,12 @@ def prepare(function: Any, options: Any, outlined: bool, choose: Choose | None =
         return impl_ret_borrowed(context, builder, sig.return_type, result)
 
 
-def _definition(function: Any, choose: Choose | None) -> Any:
+def _definition(function: Any, body: Any) -> Any:
     """What Numba asks for the function to compile, for the types of arguments."""
 
     @functools.wraps(function)
     def compiled(*kinds: Any, **named: Any) -> Any:
-        return function if choose is None else choose(python_class(kinds[0]))
+        return body or function
 
     return compiled
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from ...kernel.jit import outlined, scratch
 from ...kernel.vector import ZERO, square
-from ...surfaces import contract as surfaces
 from ...surfaces import fold as walls
 from . import hold, instant
 from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, index_of, near, point_of, solve_dense, span

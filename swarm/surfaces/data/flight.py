@@ -10,14 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import index, inlined, outlined, select
-from ...kernel.vector import ZERO, Symmetric, Vec, dot, lowest, norm, square, times, total
-from .. import contract
+from ...kernel.jit import index, outlined, select
+from ...kernel.vector import Symmetric, Vec, dot, lowest, norm, square, times, total
 from ..course import rise_time
 from ..march import bisected, lets_go
 from . import spline as splines
 from .cells import SPREAD
-from .numbers import SampledNumbers, coordinates
 from .spline import MARGIN
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -38,7 +36,6 @@ class Cell(NamedTuple):
     inside: bool
 
 
-@inlined
 def _cell_of(surface, r):
     u, n = times(r - surface.spline.low, surface.spline.inverse), surface.spline.shape
     inside = _is_in(u.x, n.x) & _is_in(u.y, n.y) & _is_in(u.z, n.z)
@@ -48,17 +45,14 @@ def _cell_of(surface, r):
     return Cell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
 
 
-@inlined
 def _is_in(u, count):
     return (u >= -0.5 * MARGIN) & (u <= count + 0.5 * MARGIN)
 
 
-@inlined
 def _layer(u, count):
     return min(max(np.floor(u), 0.0), count - 1.0)
 
 
-@inlined
 def _until_out(surface, low, around, r, v, pull):
     """When a flight is beyond a cell and so many cells around it, as far as they are in the grid."""
     made = surface.spline
@@ -68,12 +62,10 @@ def _until_out(surface, low, around, r, v, pull):
     return min(x, y, z)
 
 
-@inlined
 def _layers(low, around, count):
     return max(low - around, 0.0) - MARGIN, min(low + 1.0 + around, count) + MARGIN
 
 
-@inlined
 def _time_out(first, width, layers, x, v, pull):
     """When a coordinate leaves some layers of cells."""
     low, high = first + layers[0] * width, first + layers[1] * width
@@ -92,7 +84,6 @@ def _until_in(surface, r, v, pull):
     return max(x, y, z)
 
 
-@inlined
 def _time_in(low, high, x, v, pull):
     """Before when a coordinate is surely not in an interval."""
     if x < low:
@@ -110,7 +101,6 @@ class Bent(NamedTuple):
     most: float
 
 
-@inlined
 def _bent(surface, row, n, v, pull, time):
     """`Bent` around a cell for so long, with the gradient and the velocity now."""
     # w.H w + grad phi.G/2 with w = v + G t and grad phi = n + 2 H (v t + G t^2/2), where |H - A| is at most the spread
@@ -124,7 +114,6 @@ def _bent(surface, row, n, v, pull, time):
     return Bent(select(inside, least, -most), select(inside, most, -least))
 
 
-@inlined
 def _known(bends, i):
     """The matrix A of a row of `bends`, and how far H is from it."""
     a = Symmetric(
@@ -133,13 +122,11 @@ def _known(bends, i):
     return a, _at(bends, i, SPREAD)
 
 
-@inlined
 def _at(bends, i, k):
     # In plain Python products of short numbers would be short.
     return np.float64(bends[i, k])
 
 
-@inlined
 def _form(a, v, w):
     """v.A w"""
     x, y, z = (
@@ -151,9 +138,6 @@ def _form(a, v, w):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
-
-contract.first_hit.register(SampledNumbers, lambda surface, r, v: march(surface, r, v, ZERO))
-contract.falling_hit.register(SampledNumbers, lambda surface, r, v, pull: march(surface, r, v, pull))
 
 
 @outlined
@@ -177,7 +161,7 @@ def march(surface, r, v, pull):
             continue
         value, n = splines.value_and_slope(surface.spline, p)
         level, half = surface.side * value, 0.5 * surface.side * dot(n, w)
-        speed, room = norm(w), 2.0 * _EPSILON * total(coordinates(surface, p))
+        speed, room = norm(w), 2.0 * _EPSILON * total(splines.coordinates(surface.spline, p))
         # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
         noise = _ROUND_OFF * room * norm(n)
         if i > 0 and half >= 0.0 and level >= -noise:
@@ -208,7 +192,6 @@ class Near(NamedTuple):
     slope: Vec
 
 
-@inlined
 def _safe_step(surface, cell, near, r, v, pull):
     """(a time during which a flight surely stays admissible, within which its bounds hold, these as `Bent`)."""
     # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
@@ -252,12 +235,10 @@ def _through_empty(surface, r, v, t):
     return t
 
 
-@inlined
 def _inverse(x):
     return select(x != 0.0, 1.0 / select(x != 0.0, x, 1.0), math.inf)
 
 
-@inlined
 def _free_time(surface, cell, r, v, pull):
     """How long a flight surely stays where there is no surface, from outside of the grid or a cell that has none."""
     if not cell.inside:
@@ -272,13 +253,8 @@ def _free_time(surface, cell, r, v, pull):
 # Of walls that move, and of methods with steps: bounds within a distance.
 
 
-@contract.bend.register(SampledNumbers)
-def _(surface, r):
-    return _bend(surface, r)
-
-
 @outlined
-def _bend(surface, r):
+def bend(surface, r):
     cell, width = _cell_of(surface, r), surface.spline.width
     if cell.clear >= 0.0 or not cell.inside:
         return 0.0, 0.0, 0.0
@@ -290,18 +266,12 @@ def _bend(surface, r):
     return most, most, _least(times(wall, width))
 
 
-@inlined
 def _least(a):
     return min(a.x, a.y, a.z)
 
 
-@contract.clearance.register(SampledNumbers)
-def _(surface, r):
-    return _clearance(surface, r)
-
-
 @outlined
-def _clearance(surface, r):
+def clearance(surface, r):
     """The distance to the surface at least; next to its cells, to the wall of the cell."""
     cell, width = _cell_of(surface, r), surface.spline.width
     if not cell.inside:
@@ -313,11 +283,8 @@ def _clearance(surface, r):
     return max(_least(wall) + MARGIN * _least(width), cell.clear)
 
 
-contract.safe_time.register(SampledNumbers, lambda surface, r, v, pull: _safe_time(surface, r, v, pull))
-
-
 @outlined
-def _safe_time(surface, r, v, pull):
+def safe_time(surface, r, v, pull):
     """One safe step."""
     if norm(v) == 0.0 and norm(pull) == 0.0:
         return math.inf

@@ -2,9 +2,9 @@
 
 import math
 
-from ...kernel.record import Record
-from ...kernel.vector import absolute, dot, norm, times, total
+from ...kernel.vector import ZERO, absolute, dot, norm, times, total
 from .. import contract
+from . import flight
 from . import spline as splines
 from .cells import Cells
 from .spline import Spline
@@ -34,7 +34,7 @@ class SampledNumbers(contract.Smooth):
 
     def gap_scale(self, r):
         _value, n = splines.value_and_slope(self.spline, r)
-        return total(times(absolute(n), coordinates(self, r)))
+        return total(times(absolute(n), splines.coordinates(self.spline, r)))
 
     def settle(self, r):
         value, n = splines.value_and_slope(self.spline, r)
@@ -48,10 +48,19 @@ class SampledNumbers(contract.Smooth):
         # 1 + kappa H has its first pole at the least eigenvalue of side H.
         return self.side * (-1.0 / self.least if self.least < 0.0 else math.inf)
 
+    # --- Flight ---
 
-# --- The level set ---------------------------------------------------------------------------------------
+    def first_hit(self, r, v):
+        return flight.march(self, r, v, ZERO)
 
+    def falling_hit(self, r, v, pull):
+        return flight.march(self, r, v, pull)
 
-def coordinates(surface, r):
-    """The magnitudes of those that round a point, in the scene and in the grid: near the origin these are larger."""
-    return absolute(r) + absolute(r - surface.spline.low)
+    def safe_time(self, r, v, pull):
+        return flight.safe_time(self, r, v, pull)
+
+    def bend(self, r):
+        return flight.bend(self, r)
+
+    def clearance(self, r):
+        return flight.clearance(self, r)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...kernel.fours import Four, over_block, sum_of
 from ...kernel.jit import Array, outlined
 from ...kernel.record import Record
-from ...kernel.vector import Symmetric, Vec, norm, times
+from ...kernel.vector import Symmetric, Vec, absolute, norm, times
 
 Floats = NDArray[np.float64]
 # Samples along each axis, at least: the ends of the spline take four.
@@ -200,3 +200,8 @@ def difference(spline, r0, r1):
     along_x = sum_of(z1, over_block(table, a, _steps(a.at.x, b.at.x, d.x), y1))
     along_y = sum_of(z1, over_block(table, a, x0, _steps(a.at.y, b.at.y, d.y)))
     return along_x + along_y + sum_of(_steps(a.at.z, b.at.z, d.z), over_block(table, a, x0, y0))
+
+
+def coordinates(spline, r):
+    """The magnitudes of those that round a point, in the scene and in the grid: near the origin these are larger."""
+    return absolute(r) + absolute(r - spline.low)

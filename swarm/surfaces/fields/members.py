@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...kernel.jit import Array, index, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
-from .. import contract, flights
+from .. import flights
 from ..fold import Chain
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers

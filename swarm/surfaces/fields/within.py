@@ -2,7 +2,6 @@
 
 from ...kernel.jit import index, kernel
 from ...kernel.vector import column
-from .. import contract
 from .grid import cell_of
 from .members import member
 

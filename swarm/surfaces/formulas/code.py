@@ -16,7 +16,6 @@ from ...kernel.frozen import Frozen
 from ...kernel.jit import _INLINE, inlined
 from ...kernel.trace.helpers import prepare
 from ...kernel.vector import Symmetric, Vec
-from .. import contract
 from .numbers import OwnNumbers
 
 Function = Callable[..., Any]
@@ -44,8 +43,7 @@ def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Functi
             copies.append(frozen.function(function))
     name = f"Own_{frozen.digest()}"
     if name not in _classes:
-        made = type(name, (OwnNumbers,), {"__module__": __name__, "__qualname__": name, "__slots__": ()})
-        _register(made, names, *copies)
+        made = type(OwnNumbers)(name, (OwnNumbers,), {"__module__": __name__, **_methods(names, *copies)})
         # Two threads that ask at the same time get the same class.
         _classes.setdefault(name, made)
     return _classes[name]
@@ -60,32 +58,33 @@ def _check_function(name: str, function: Any) -> None:
         raise SceneError(f"{name} must be a function of (parameters, x, y, z), got one of ({names})")
 
 
-def _register(
-    kind: Any, names: tuple[str, ...], phi: Function, gradient: Function, hessian: Function | None = None
-) -> None:
+def _methods(
+    names: tuple[str, ...], phi: Function, gradient: Function, hessian: Function | None = None
+) -> dict[str, Function]:
+    """What the class of numbers knows."""
     value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
     # A class of the user's is not found by another process: the functions get their parameters in one that is.
     make = collections.namedtuple("Parameters", names)  # type: ignore[misc]
-    of = inlined(lambda surface: make(*surface.parameters)) if names else inlined(lambda surface: surface.parameters)
 
-    @contract.phi.register(kind)
-    def _(surface, r):
-        d = r - surface.center
-        return value(of(surface), d.x, d.y, d.z)
+    def own(surface):
+        return make(*surface.parameters) if names else surface.parameters
 
-    @contract.gradient.register(kind)
-    def _(surface, r):
-        d = r - surface.center
-        gx, gy, gz = slope(of(surface), d.x, d.y, d.z)
+    def phi_of(self, r):
+        d = r - self.center
+        return value(own(self), d.x, d.y, d.z)
+
+    def gradient_of(self, r):
+        d = r - self.center
+        gx, gy, gz = slope(own(self), d.x, d.y, d.z)
         # A user may return whole numbers.
         return Vec(1.0 * gx, 1.0 * gy, 1.0 * gz)
 
-    if hessian is not None:
+    def hessian_of(self, r):
+        d = r - self.center
+        return Symmetric(*hessian(own(self), d.x, d.y, d.z))
 
-        @contract.hessian.register(kind)
-        def _(surface, r):
-            d = r - surface.center
-            return Symmetric(*hessian(of(surface), d.x, d.y, d.z))
+    methods = {"phi": phi_of, "gradient": gradient_of}
+    return methods if hessian is None else {**methods, "hessian": hessian_of}
 
 
 # --- Arrays of points in plain Python --------------------------------------------------------------------
@@ -106,7 +105,7 @@ def _taking_arrays(function: Function, count: int) -> Function:
         return function(parameters, x, y, z)
 
     # What a user writes may make arrays.
-    prepare(in_python, {**_INLINE, "_nrt": True}, outlined=False, choose=lambda made: in_kernels)
+    prepare(in_python, {**_INLINE, "_nrt": True}, outlined=False, body=in_kernels)
     return in_python
 
 

@@ -12,7 +12,6 @@ from ... import checks
 from ...checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
-from .. import contract
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from .numbers import Bend
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernel.jit import outlined, select
-from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..course import rise_time

@@ -13,7 +13,6 @@ from ...checks import Vector
 from ...errors import SceneError
 from ...kernel.jit import kernel
 from ...kernel.vector import ZERO, total
-from .. import contract
 from ..surface import Box, Surface
 from .code import class_of
 from .form import Form, FormSurface

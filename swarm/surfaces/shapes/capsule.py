@@ -9,7 +9,6 @@ from ...checks import Vector, at_least, length
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from .. import contract, flights
 from ..approach import Border, Near
 from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
@@ -102,6 +101,9 @@ class CapsuleNumbers(Distance):
         cap = ball_rise_time(side, self.radius2, from_end, v)
         return select(abs(height) > half, cap, tube), True
 
+    # Without gravity the hit has a closed form.
+    in_steps = None
+
     def near(self, gravity, r, v):
         # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by the
         # square of the way beyond: higher than the tube's, lower than the sphere's.
@@ -136,7 +138,3 @@ def _from_segment(surface, r):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
-
-
-# Without gravity the hit has a closed form.
-flights.in_steps.register(CapsuleNumbers, lambda surface: None)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from ...kernel.jit import select
-from ...kernel.record import Record
 from .. import contract
 
 _TINY = float(np.finfo(np.float64).tiny)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from ...checks import Vector, length, vector
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
-from .. import contract
 from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
 from .quadratic import QuadricNumbers, form, parabola, turning, widths

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from ...checks import Vector, number
 from ...kernel.jit import select
 from ...kernel.vector import Vec, dot, vec
-from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
@@ -64,6 +63,8 @@ class PlaneNumbers(ExactChord):
 
     normal: Vec
     offset: float
+
+    has_levels = True
 
     def phi(self, r):
         return self.inner(r) - self.offset

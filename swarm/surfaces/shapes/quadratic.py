@@ -10,7 +10,6 @@ import numpy as np
 
 from ...checks import Vector
 from ...kernel.jit import select
-from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, cross, dot, largest, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
@@ -30,6 +29,8 @@ class QuadricNumbers(contract.Smooth):
     level: float
     scale: float  # by how much q varies over the surface's size
     side: float
+
+    has_levels = True
 
     def by_right_angles(self, axes: Any) -> Any:
         """The numbers of the quadric whose own axes are these other axes of the scene, or their opposites."""

@@ -11,7 +11,6 @@ from ...checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
-from .. import contract
 from ..course import rise_time
 from ..rotation import turned, unit
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
@@ -150,6 +149,11 @@ class SlabNumbers(Distance, ExactChord):
     radius: float  # the half width
     radius2: float
     side: float
+
+    @property
+    def has_levels(self):
+        # Between its planes; of a solid there is one.
+        return self.side > 0.0
 
     def gradient(self, r):
         return scaled(self.normal, np.copysign(1.0, _off(self, r)))

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...kernel.gravity import Gravity, as_vector, displacement
 from ...kernel.jit import outlined, select
-from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract, flights
 from ..approach import place, under_way
@@ -76,6 +75,19 @@ class SolidNumbers(contract.Smooth):
         # phi is about the distance, whose faces are flat or wide: no pole within a push.
         return -math.inf
 
+    # --- Flight in lanes ---
+
+    in_steps = 1.0
+
+    def begin_flight(self, gravity, course, row, lane, r, v):
+        time, last = _entry_step(self, gravity, r, v, 0.0, math.inf)
+        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
+
+    def step_flight(self, gravity, course, row, lane, r, v):
+        time, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
+        time, last = _entry_step(self, gravity, r, v, time, last)
+        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
+
 
 def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
     """The intersection of parts, each the numbers of a wall that is admissible outside of the part.
@@ -128,21 +140,6 @@ def _turn(part, r, step, f):
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
-
-flights.in_steps.register(SolidNumbers, lambda surface: 1.0)
-
-
-@flights.begin_wall.register(SolidNumbers)
-def _(surface, gravity, course, row, lane, r, v):
-    time, last = _entry_step(surface, gravity, r, v, 0.0, math.inf)
-    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
-
-
-@flights.step_wall.register(SolidNumbers)
-def _(surface, gravity, course, row, lane, r, v):
-    time, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
-    time, last = _entry_step(surface, gravity, r, v, time, last)
-    course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
 
 
 @outlined

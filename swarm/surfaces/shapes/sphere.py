@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from ...checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
-from .. import contract
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from .common import Distance, ExactChord
@@ -65,6 +64,8 @@ class SphereNumbers(Distance, ExactChord):
     radius2: float
     curvature: float  # side/R
     side: float
+
+    has_levels = True
 
     def inner(self, r):
         return square(r - self.center)

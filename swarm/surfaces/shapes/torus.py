@@ -10,7 +10,6 @@ from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from .. import contract
 from ..approach import Near
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign

@@ -9,7 +9,6 @@ from samples import ball, bumpy
 
 import swarm
 from swarm.kernel.vector import ZERO, Vec
-from swarm.surfaces import contract
 
 DOWN = (0.3, -0.2, -4.0)
 

@@ -8,7 +8,6 @@ from samples import ball, bumpy
 from scipy.interpolate import make_interp_spline
 
 from swarm.kernel.vector import Vec, vec
-from swarm.surfaces import contract
 from swarm.surfaces.data import spline
 
 RANDOM = np.random.default_rng(5)

@@ -1,0 +1,67 @@
+"""A surface in a frame of its own: what is asked of it is asked of its body there.
+
+Each argument of the contract has a role, by which it goes into the frame, and each answer one by which it comes out: a
+place and a vector are turned, a place is moved too, and a number is the same in any frame.
+"""
+
+from typing import Any
+
+from .contract import Smooth
+
+# What is asked: the roles of its arguments, and of the answer.
+_FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
+    ("gap_of", (None,), None),
+    ("level_of", (None,), None),
+    ("gap_slope", (None, None), None),
+    ("phi", ("place",), None),
+    ("inner", ("place",), None),
+    ("distance", ("place",), None),
+    ("gap_scale", ("place",), None),
+    ("gradient", ("place",), "vector"),
+    ("slope", ("place",), "vector"),
+    ("unit_normal", ("place",), "vector"),
+    ("settle", ("place",), "place"),
+    ("farthest_push", (), None),
+    ("first_hit", ("place", "vector"), None),
+    ("falling_hit", ("place", "vector", "vector"), None),
+    ("safe_time", ("place", "vector", "vector"), None),
+    ("course", ("place", "vector", "vector"), None),
+    ("outward_acceleration", ("place", "vector", "vector"), None),
+    ("begin_flight", ("gravity", None, None, None, "place", "vector"), None),
+    ("step_flight", ("gravity", None, None, None, "place", "vector"), None),
+    ("inner_gradient", ("place", "place"), "vector"),
+    ("step_normal", ("place", "place"), "vector"),
+    ("push", ("place", "vector", None), "place"),
+    ("rise", ("place", "vector", None), None),
+    ("resolve", ("place", None), "place"),
+    ("chord_guess", ("place", "vector"), None),
+    ("chord_improve", ("place", "vector", None), None),
+    ("chord_normal", ("place", "vector", None), "vector"),
+)
+_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "chord_sweeps")
+
+
+class Framed(Smooth):
+    """A surface `body`, asked in its own frame.
+
+    A class of frames gives `place_in`, `vector_in`, `gravity_in`, `place_out` and `vector_out`, and overrides what
+    depends on more than its arguments.
+    """
+
+
+def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> Any:
+    ways = tuple(role and f"{role}_in" for role in roles)
+    out = result and f"{result}_out"
+
+    def asked(self, *given):
+        own = (a if way is None else getattr(self, way)(a) for a, way in zip(given, ways, strict=True))
+        answer = getattr(self.body, name)(*own)
+        return answer if out is None else getattr(self, out)(answer)
+
+    return asked
+
+
+for _name, _roles, _result in _FORWARDED:
+    setattr(Framed, _name, _forwarded(_name, _roles, _result))
+for _name in _CONSTANTS:
+    setattr(Framed, _name, property(lambda self, name=_name: getattr(self.body, name)))  # type: ignore[misc]
