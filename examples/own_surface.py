@@ -1,9 +1,9 @@
 """Add a surface of your own: a superellipsoid, |x/a|^n + |y/b|^n + |z/c|^n = 1 with an even n.
 
 1. A record derived from `Smooth` is what kernels take in place of the surface: numbers, and methods of them. Its field
-   `side` is +1 for a cavity. swarm/surfaces/contract.py describes all methods that there are. Five serve every method of
-   simulation: `phi`, `gradient`, `hessian`, `bend` and `farthest_push`. The first hit is then found by safe steps. What
-   is missing is an error in one sentence.
+   `side` is +1 for a cavity. swarm/surfaces/contract.py describes all methods that there are. Five serve every method
+   of simulation: `phi`, `gradient`, `hessian`, `bend` and `farthest_push`. The first hit is then found by safe steps.
+   What is missing is an error in one sentence.
 2. A dataclass derived from `Surface` is what scenes take: it makes the numbers and says how large the surface is.
 
 The same methods run in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. Where
@@ -45,7 +45,7 @@ class SuperellipsoidNumbers(Smooth):
         return Symmetric(h.x, h.y, h.z, 0.0, 0.0, 0.0)
 
     def bend(self, r):
-        """The second derivatives are largest at the farthest corner of a box around r, with the semi-axes of the cavity."""
+        """The second derivatives are largest at the farthest corner of a box around r of the semi-axes."""
         h = self.hessian(absolute(r) + self.a)
         return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(self.a.x, self.a.y, self.a.z)
 

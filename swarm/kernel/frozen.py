@@ -31,7 +31,7 @@ _CODE = operator.attrgetter(
 _DISPATCHED = (type(None), float, object)
 
 
-_NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))  # noqa: PYI024
+_NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))
 
 
 class Frozen:

@@ -94,7 +94,7 @@ def _kernel(function: F, compiler: Any) -> F:
 
 
 def outlined(function: F) -> F:
-    """A function of its own in a kernel, for a helper that is rare and long: to inline it would only cost compile time."""
+    """Keep a helper that is rare and long a function of its own in kernels: to inline it costs compile time."""
     prepare(function, _OUTLINE, outlined=True)
     return function
 

@@ -20,8 +20,8 @@ class Instants(contract.MethodNumbers):
     """A method that steps to the instant of impact, with the fields of `Lasting`."""
 
     def constants(self, mass, energy, scale2):
-        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow: not by
-        # its velocity at the start of the frame, on whose ends no contact may depend
+        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow:
+        # not by its velocity at the start of the frame, on whose ends no contact may depend
         twice_energy = 2.0 * energy
         moving = twice_energy > 0.0
         half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)

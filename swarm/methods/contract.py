@@ -168,7 +168,7 @@ class MethodNumbers(Record):
         return self.gives("land")
 
     def landed_on(self, chain):
-        """The walls whose first hits are found before, for `land`; None where the method finds its contacts by itself."""
+        """The walls whose first hits `land` takes; None where the method finds its contacts by itself."""
         return chain if self.lands else None
 
     # --- The unknown of a contact ---
@@ -206,7 +206,7 @@ class MethodNumbers(Record):
         return 0.0, kappa, 0.0
 
     def next_multiplier(self, left, acceleration, multiplier, record, before):
-        """The multiplier after a sweep, what the sweep missed by, and whether to go on; `before` is the last `Sweep`."""
+        """The multiplier after a sweep, its miss, and whether to go on; `before` is the last `Sweep`."""
         return 0.0, 0.0, False
 
     @property

@@ -197,7 +197,7 @@ class Steps(contract.MethodNumbers):
         return chain
 
     def flight(self: Any, chain, gravity, lane):
-        """Over the steps that surely stay free, to one that touches a wall: HARD where one lane cannot take it alone."""
+        """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
         dt = self.dt
         # One too many by round-off starts a contact 1e-16 deep: harmless.
         steps = np.floor(safe.free_time(chain, gravity, lane.r, lane.v, lane.left * dt) * (1.0 / dt))

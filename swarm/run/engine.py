@@ -284,7 +284,7 @@ class Run(BaseRun):
         if self._far < math.inf:
             escaped = self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:
-            escaped += np.count_nonzero(~np.isnan(self.state.escape_time))
+            escaped += int(np.count_nonzero(~np.isnan(self.state.escape_time)))
         if self._scene.moves():
             poses = self._scene.poses(self._moment)
             seen["wall_position"] = np.array([pose.position() for pose in poses])

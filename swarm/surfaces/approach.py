@@ -122,6 +122,7 @@ def falling_hit(surface, r, v, pull):
 
 
 def safe_time(surface, r, v, pull):
+    """A time during which a fall surely stays admissible."""
     level = surface.near(Gravity(pull.x, pull.y, pull.z), r, v)
     return select(level.c > 0.0, 0.0, level.first_step()[0])
 

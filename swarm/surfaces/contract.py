@@ -26,13 +26,13 @@ class Smooth(Record):
     """A surface as kernels take it.
 
     Required are the field `side`, the methods `phi` and `gradient`, and one of
-        first_hit (and falling_hit under gravity)   the first hit of a flight in closed form,
-        course                                      the level along a fall as a quartic: falling_hit and safe_time follow,
-        near                                        a polynomial above the level from a place on: the hits follow by steps,
-        bend                                        how strongly q bends at most: the hits follow by safe steps, march.py;
+        first_hit (and falling_hit under gravity)  the first hit of a flight in closed form,
+        course   the level along a fall as a quartic: falling_hit and safe_time follow,
+        near     a polynomial above the level from a place on: the hits follow by steps, approach.py,
+        bend     how strongly q bends at most: the hits follow by safe steps, march.py;
     for methods with steps in contact also `farthest_push` and one of
-        push, rise and resolve                      the step in closed form,
-        hessian                                     the step follows by Newton's method, newton.py.
+        push, rise and resolve  the step in closed form,
+        hessian                 the step follows by Newton's method, newton.py.
     Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
     whose inner function is not phi overrides `inner`, `slope`, `gap_of`, `level_of` and `gap_slope` together.
     What is no method is a constant for the compiler.
@@ -102,7 +102,7 @@ class Smooth(Record):
         return self.gap_of(self.inner(r)) / norm(self.gradient(r))
 
     def gap_scale(self, r):
-        """By how much the gap changes at most when each coordinate changes by itself: magnitude that sets its round-off."""
+        """The most that the gap changes when each coordinate changes by itself: the magnitude of its round-off."""
         return total(absolute(times(self.gradient(r), r)))
 
     def unit_normal(self, r):
@@ -145,7 +145,7 @@ class Smooth(Record):
         return s
 
     def framed(self, r, p):
-        """What a step is asked of: the surface at rest in its frame, and the step's start and free displacement there."""
+        """The surface at rest in its frame, and the start and the free displacement of a step there."""
         return self, r, p
 
     def pace(self):
@@ -164,9 +164,10 @@ class Smooth(Record):
     def first_hit(self, r, v):
         """When the straight flight r + v t leaves the admissible side: (time, whether it does then).
 
-        Where the second is False the flight surely stays admissible until then, and what comes after is not known yet; an
-        infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of the
-        approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle moves outward.
+        Where the second is False the flight surely stays admissible until then, and what comes after is not known yet;
+        an infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of
+        the approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle moves
+        outward.
         """
         return approach.first_hit(self, None, r, v) if self.gives("near") else march.march(self, r, v, ZERO)
 
@@ -277,7 +278,7 @@ class Smooth(Record):
         return newton.resolve(self, r, strength)
 
     def chord_guess(self, r, p):
-        """First guess of the kappa for which a step from r0 on the surface ends on it; exact if `chord_sweeps` is 0."""
+        """First guess of the kappa for which a step from the surface ends on it; exact if `chord_sweeps` is 0."""
         return -self.chord_improve(r, p, 0.0)
 
     def chord_improve(self, r, p, kappa):
@@ -289,6 +290,6 @@ class Smooth(Record):
     chord_sweeps = _CHORD_SWEEPS
 
     def chord_normal(self, r, p, kappa):
-        """Unit normal of that step, parallel to D(r0, r1) and out of the admissible side; for p = 0 it is `unit_normal`."""
+        """Unit normal of that step, parallel to D(r0, r1), out of the admissible side; `unit_normal` for p = 0."""
         n = self.inner_gradient(r, self.push(r, p, kappa))
         return n * (self.side / norm(n))

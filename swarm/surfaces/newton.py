@@ -12,10 +12,12 @@ _NOISE = 1e-12
 
 
 def push(surface, r0, p, kappa):
+    """The end of the step."""
     return r0 + _moved(surface, r0, p, kappa)
 
 
 def rise(surface, r0, p, kappa):
+    """q1 - q0 of the step, and its derivative by kappa."""
     d = _moved(surface, r0, p, kappa)
     r1 = r0 + d
     g = surface.inner_gradient(r0, r1)
@@ -40,6 +42,7 @@ def _moved(surface, r0, p, kappa):
 
 
 def resolve(surface, r, strength):
+    """The point s with s + strength grad q(s) = r."""
     return _resolved(surface, r, strength)
 
 

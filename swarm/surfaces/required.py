@@ -39,8 +39,8 @@ def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], nam
                 if lacking:
                     raise SceneError(
                         f"{name or f'surfaces[{i}]'} ({type(surface).__name__}) must give what {purpose} needs, got "
-                        f"{type(part).__name__} without {' and '.join(lacking)}; derive it from contract.Smooth and give it what is missing as the files "
-                        "in swarm/surfaces/shapes do"
+                        f"{type(part).__name__} without {' and '.join(lacking)}; derive it from "
+                        "contract.Smooth and give it what is missing as the files in swarm/surfaces/shapes do"
                     )
 
 
@@ -105,13 +105,13 @@ def _falls(wall: Any, name: str) -> bool:
 def _definition(wall: Any, name: str) -> types.FunctionType:
     """The function that a method follows by which a surface does not give."""
     if name == "safe_time" or _falls(wall, name):
-        return _nothing
+        return _nothing  # type: ignore[return-value]
     if name in ("first_hit", "falling_hit"):
         return inspect.unwrap(approach.first_hit if wall.gives("near") else march.march)  # type: ignore[no-any-return]
     return getattr(newton if name in ("push", "rise", "resolve") else Smooth, name)  # type: ignore[no-any-return]
 
 
-def _nothing() -> None:
+def _nothing(*_asked: Any) -> None:
     """Of a bound that may be 0, or of what is asked for already."""
 
 

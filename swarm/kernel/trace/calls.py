@@ -81,6 +81,8 @@ REPLACED: dict[Any, Callable[..., Any]] = {
 # Of NumPy: `np.array`, `np.sum` and others that are no ufuncs.
 _ARRAY_FUNCTION = type(np.sum)
 _IN_PLACE = (list, dict, set)
+# Lets Numba compile a function in place of a trace; the bridge to Numba says how, see `helpers.py`.
+leave: Callable[[Any, Exception], None]
 
 
 def operation(function: Any) -> Any:
@@ -130,11 +132,6 @@ def _foreign(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> An
         del now[mark:]
         leave(function, error)
         return noted(function, *given)
-
-
-def leave(function: Any, error: Exception) -> None:
-    """Let Numba compile a function in place of a trace: the bridge to Numba says how, see `helpers.py`."""
-    raise error
 
 
 def _is_operation(function: Any) -> bool:

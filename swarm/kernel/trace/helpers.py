@@ -115,7 +115,7 @@ class Helper:
 
 
 def _tell(function: Any, error: Exception) -> None:
-    """Keep why a function is left to Numba, and where: the line that an error is about, or where the function begins."""
+    """Keep why a function is left to Numba, and where: the line of the error, or where the function begins."""
     frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
     code = inspect.unwrap(function).__code__
     places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]

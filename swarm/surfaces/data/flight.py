@@ -255,6 +255,7 @@ def _free_time(surface, cell, r, v, pull):
 
 @outlined
 def bend(surface, r):
+    """Bounds of the eigenvalues of side H: see `Smooth.bend`."""
     cell, width = _cell_of(surface, r), surface.spline.width
     if cell.clear >= 0.0 or not cell.inside:
         return 0.0, 0.0, 0.0

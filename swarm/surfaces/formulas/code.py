@@ -43,7 +43,9 @@ def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Functi
             copies.append(frozen.function(function))
     name = f"Own_{frozen.digest()}"
     if name not in _classes:
-        made = type(OwnNumbers)(name, (OwnNumbers,), {"__module__": __name__, **_methods(names, *copies)})
+        made: Any = type(OwnNumbers)(  # type: ignore[misc]
+            name, (OwnNumbers,), {"__module__": __name__, **_methods(names, *copies)}
+        )
         # Two threads that ask at the same time get the same class.
         _classes.setdefault(name, made)
     return _classes[name]
@@ -81,7 +83,7 @@ def _methods(
 
     def hessian_of(self, r):
         d = r - self.center
-        return Symmetric(*hessian(own(self), d.x, d.y, d.z))
+        return Symmetric(*hessian(own(self), d.x, d.y, d.z))  # type: ignore[misc]
 
     methods = {"phi": phi_of, "gradient": gradient_of}
     return methods if hessian is None else {**methods, "hessian": hessian_of}

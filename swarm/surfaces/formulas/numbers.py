@@ -52,7 +52,7 @@ class OwnNumbers(contract.Smooth):
     side: float
     step: float  # of the differences that replace second derivatives
     size: float
-    bend: Bend
+    bends: Bend
     low: Vec
     high: Vec
     # 1 if there is surely no wall outside the box, and how far outside of it the bend is known
@@ -77,19 +77,20 @@ class OwnNumbers(contract.Smooth):
         d = r1 - r0
         if largest(d) > _SHORT * self.size:
             return self.phi(r1) - self.phi(r0)
-        # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three points
+        # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three
+        # points
         m, e = 0.5 * (r0 + r1), _NODE * d
         outer = self.gradient(m - e) + self.gradient(m + e)
         return dot(5.0 * outer + 8.0 * self.gradient(m), d) / 18.0
 
     def farthest_push(self):
         # 1 + kappa H has its first pole at the least eigenvalue of side H.
-        least = self.bend.least
+        least = self.bends.least
         return self.side * (-1.0 / least if least < 0.0 else math.inf)
 
     def bend(self, r):
         # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
-        most, magnitude = self.bend.most, max(abs(self.bend.least), abs(self.bend.most))
+        most, magnitude = self.bends.most, max(abs(self.bends.least), abs(self.bends.most))
         if self.closed == 0.0:
             return most, magnitude, self.size
         out = _outside(self, r)
@@ -124,7 +125,7 @@ def _straight(surface, r, v):
         t, end = _in_box(surface, r, v)
         if not t <= end:
             return math.inf, True
-    bend = surface.bend
+    bend = surface.bends
     # least <= v.side H v <= most
     most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
     least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)

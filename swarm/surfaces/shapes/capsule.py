@@ -105,8 +105,8 @@ class CapsuleNumbers(Distance):
     in_steps = None
 
     def near(self, gravity, r, v):
-        # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by the
-        # square of the way beyond: higher than the tube's, lower than the sphere's.
+        # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by
+        # the square of the way beyond: higher than the tube's, lower than the sphere's.
         g, side, e = as_vector(gravity), self.side, _from_segment(self, r)
         past = abs(r.z - self.center.z) - self.half
         in_tube, q = past <= 0.0, square(e)

@@ -39,8 +39,8 @@ class Distance(contract.Smooth):
         return self.slope(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), _TINY))
 
     def gap_slope(self, q0, q1):
-        # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall pushes
-        # and what it is multiplied with is 0. There q1, the sum of q0 and a rise, may be below 0 by round-off.
+        # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall
+        # pushes and what it is multiplied with is 0. There q1, the sum of q0 and a rise, may be below 0 by round-off.
         root1 = math.sqrt(select(q1 > 0.0, q1, 0.0))
         both = math.sqrt(q0) + root1
         slope = 1.0 / select(both > _MIDDLE, both, _MIDDLE)

@@ -151,7 +151,7 @@ class SlabNumbers(Distance, ExactChord):
     side: float
 
     @property
-    def has_levels(self):
+    def has_levels(self):  # type: ignore[override]
         # Between its planes; of a solid there is one.
         return self.side > 0.0
 
