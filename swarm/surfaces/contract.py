@@ -242,7 +242,7 @@ class Smooth(Record):
         return False
 
     def outward_acceleration(self, r, v, pull):
-        """How fast a free flight along the wall gathers speed out of it [m/s^2]: above 0 the wall holds the particle."""
+        """The acceleration of a free flight along the wall out of it [m/s^2]: above 0 the wall holds the particle."""
         # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|
         n, h = self.slope(r), self.hessian(r)
         bent = h.xx * v.x * v.x + h.yy * v.y * v.y + h.zz * v.z * v.z

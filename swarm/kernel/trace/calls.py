@@ -81,8 +81,6 @@ REPLACED: dict[Any, Callable[..., Any]] = {
 # Of NumPy: `np.array`, `np.sum` and others that are no ufuncs.
 _ARRAY_FUNCTION = type(np.sum)
 _IN_PLACE = (list, dict, set)
-# Lets Numba compile a function in place of a trace; the bridge to Numba says how, see `helpers.py`.
-leave: Callable[[Any, Exception], None]
 
 
 def operation(function: Any) -> Any:
@@ -118,6 +116,14 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
 
 def _is_own(function: Any) -> bool:
     return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
+
+
+def _refused(function: Any, error: Exception) -> None:
+    raise error
+
+
+# Lets Numba compile a function in place of a trace; the bridge to Numba says how, see `helpers.py`.
+leave: Callable[[Any, Exception], None] = _refused
 
 
 def _foreign(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
