@@ -637,6 +637,7 @@ LAYERS = [
     ["lanes", "reacting"],
     ["methods"],
     ["scene"],
+    ["volume"],
     ["particles"],
     ["contact"],
     ["surfaces"],
