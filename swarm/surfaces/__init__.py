@@ -9,9 +9,7 @@ run.
 """
 
 # First, so that what follows from `near`, from `bend` and from `hessian` is registered with them.
-from . import approach as _approach  # noqa: F401
-from . import march as _march  # noqa: F401
-from . import newton as _newton  # noqa: F401
+from .contract import Smooth as Smooth
 from .data.sampled import Sampled
 from .fields.boxes import Boxes
 from .fields.capsules import Capsules
