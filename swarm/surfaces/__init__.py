@@ -3,8 +3,8 @@
 To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a record derived from
 `Smooth`, for kernels. Of the methods that contract.py describes it gives `phi`, `gradient` and one of `first_hit`,
 `course`, `near` and `bend`; for `Impact`, which slides along walls, and methods with steps in contact also `hessian`,
-and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES. examples/own_surface.py is
-a complete surface; if something is missing, an error says so before the run.
+and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES. examples/own_surface.py
+is a complete surface; if something is missing, an error says so before the run.
 """
 
 # First: what a surface is made of imports it in turn.
