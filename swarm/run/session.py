@@ -20,7 +20,7 @@ from .options import RunOptions, Task
 
 if TYPE_CHECKING:
     from ..output.background import Background
-    from ..output.checkpoint import Arrays, Job
+    from ..output.checkpoint import Arrays
 
 
 class Session:
@@ -36,10 +36,12 @@ class Session:
         self._end = math.inf if options.walltime is None else self._began + options.walltime
         self._due = self._began + self._every
         self._stops = False
-        self._trajectory, self._path = options.trajectory, options.checkpoint_file()
+        # Of a run without a trajectory they are None, and so is its `Job`.
+        self._trajectory: Any = options.trajectory
+        self._path: Any = options.checkpoint_file()
+        self._job: Any = None
         # What identifies the run besides its texts, for the trajectory.
         self.identity: dict[str, Any] = {}
-        self._job: Job | None = None
         self._arrays: Arrays | None = None
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
@@ -55,7 +57,7 @@ class Session:
     @property
     def first(self) -> int:
         """The first frame that this session writes."""
-        return 0 if self._arrays is None or self._job is None else self._job.frame + 1
+        return 0 if self._arrays is None else int(self._job.frame) + 1
 
     def prepare(self, task: Task, log: Impacts | None) -> None:
         """Find where this session starts: at 0 s with a new file or, to resume, at the checkpoint if there is one.
@@ -69,13 +71,13 @@ class Session:
         if self._trajectory is None and log is None:
             return
         self._hold(task, log)
-        if self._trajectory is None or self._path is None or not self._resumes:
+        if self._trajectory is None or not self._resumes:
             return
         overwrite, until = task.options.overwrite, task.options.until
         if self._path.exists():
-            self._resume(self._trajectory, until)
+            self._resume(until)
         elif self._trajectory.exists() and not overwrite:
-            self._refuse_to_restart(self._trajectory, until)
+            self._refuse_to_restart(until)
         if log is not None:
             self._find_log(task.options.impacts, overwrite)
 
@@ -94,7 +96,7 @@ class Session:
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
             self._held.enter_context(only_writer(impacts, "log of impacts"))
-        if self._trajectory is None or self._path is None:
+        if self._trajectory is None:
             return
         paths.check_target(self._trajectory, overwrite or self._resumes)
         self._held.enter_context(only_writer(self._trajectory))
@@ -113,8 +115,6 @@ class Session:
             return
         from ..output.impact_log import load_impacts
 
-        assert self._job is not None
-        assert self._path is not None
         with load_impacts(path) as before:
             there = dataclasses.replace(self._job, **before.identity)
             there.require_same(self._job, path)
@@ -122,11 +122,11 @@ class Session:
                 return  # a kill came before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._path)
 
-    def _refuse_to_restart(self, trajectory: Path, until: float) -> None:
+    def _refuse_to_restart(self, until: float) -> None:
         """Raise an error that says what the trajectory without a checkpoint is."""
         from ..output.trajectory import load
 
-        assert self._job is not None
+        trajectory = self._trajectory
         with load(trajectory) as before:
             texts: dict[str, Any] = before.descriptions
             identity: dict[str, Any] = {"particles": before.count, "start": before.start, "seed": before.seed}
@@ -145,12 +145,11 @@ class Session:
             f"{frames} frames of {trajectory}; to do so, overwrite it with --overwrite"
         )
 
-    def _resume(self, trajectory: Path, until: float) -> None:
+    def _resume(self, until: float) -> None:
         from ..output import checkpoint
         from ..output.trajectory import load
 
-        assert self._job is not None
-        assert self._path is not None
+        trajectory = self._trajectory
         saved, arrays = checkpoint.read(self._path)
         if checkpoint.SHARDS in arrays:
             raise SceneError(f"{self._path} is of a run on a cluster; resume it on one, by cluster= or --cluster")
@@ -173,7 +172,7 @@ class Session:
 
     def restore(self, run: BaseRun) -> None:
         """Put the run into the state of the checkpoint."""
-        if self._arrays is not None and self._job is not None and self._path is not None:
+        if self._arrays is not None:
             from ..output.checkpoint import require_fit
 
             require_fit(self._path, self._arrays, run.arrays())
@@ -190,7 +189,7 @@ class Session:
         """
         job = self._job
         for number, before, moment in times:
-            if self._arrays is not None and job is not None:
+            if self._arrays is not None:
                 for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
                     if number == frame and saved is not None and saved != moment:
                         raise SceneError(
@@ -211,7 +210,8 @@ class Session:
 
     def wall_time(self) -> float:
         """Seconds of all sessions of the run."""
-        return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
+        before: float = 0.0 if self._job is None else self._job.wall_time
+        return time.monotonic() - self._began + before
 
     def look(
         self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
@@ -233,14 +233,9 @@ class Session:
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
-    def _save(
-        self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
-    ) -> None:
+    def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
         from ..output import checkpoint
 
-        assert self._job is not None
-        assert self._path is not None
-        assert writer is not None
         # A checkpoint is never ahead of the frames.
         writer.drain()
         job = dataclasses.replace(
