@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
-from ..output import paths
+from ..output import checkpoint, paths
+from ..output.lock import only_writer
 from ..version import VERSION
 from .base import BaseRun
 from .impacts import Impacts
@@ -20,7 +21,6 @@ from .options import RunOptions, Task
 
 if TYPE_CHECKING:
     from ..output.background import Background
-    from ..output.checkpoint import Arrays
 
 
 class Session:
@@ -42,7 +42,7 @@ class Session:
         self._job: Any = None
         # What identifies the run besides its texts, for the trajectory.
         self.identity: dict[str, Any] = {}
-        self._arrays: Arrays | None = None
+        self._arrays: checkpoint.Arrays | None = None
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
 
@@ -83,8 +83,6 @@ class Session:
 
     def _hold(self, task: Task, log: Impacts | None) -> None:
         """Lock the files of the run, and describe it."""
-        from ..output import checkpoint
-        from ..output.lock import only_writer
         from ..output.writer import body_text, descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
@@ -146,7 +144,6 @@ class Session:
         )
 
     def _resume(self, until: float) -> None:
-        from ..output import checkpoint
         from ..output.trajectory import load
 
         trajectory = self._trajectory
@@ -173,9 +170,7 @@ class Session:
     def restore(self, run: BaseRun) -> None:
         """Put the run into the state of the checkpoint."""
         if self._arrays is not None:
-            from ..output.checkpoint import require_fit
-
-            require_fit(self._path, self._arrays, run.arrays())
+            checkpoint.require_fit(self._path, self._arrays, run.arrays())
             if self._log is not None:
                 self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)
@@ -234,8 +229,6 @@ class Session:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
     def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
-        from ..output import checkpoint
-
         # A checkpoint is never ahead of the frames.
         writer.drain()
         job = dataclasses.replace(
