@@ -439,6 +439,7 @@ def test_a_full_disk_is_exit_code_1_and_the_run_goes_on_later(folder):
     # The kernels are not to be what is too large.
     whole = command("run", "scene.toml", "-o", "whole.h5", "--quiet", cwd=folder)
     assert (whole.returncode, whole.stderr) == (0, "")
+    # The frames that are written at once, up to a hundred, fit; all do not.
     limit = 2_000_000
     done = subprocess.run(
         [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600,
