@@ -1,4 +1,4 @@
-"""What of a trajectory is exported: some of its frames, and some of its particles or bodies, frame by frame."""
+"""The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
 
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -60,7 +60,7 @@ class Exported:
         self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
 
     def __len__(self) -> int:
-        """How many particles a frame has."""
+        """Number of particles of a frame."""
         return len(self.ids)
 
     def moments(self) -> Iterator[Moment]:

@@ -50,7 +50,7 @@ _LATEST = 9.2e9
 
 @dataclass(frozen=True)
 class Settings:
-    """What a recording shows.
+    """The choices of a recording.
 
     Args:
         particles: the most that are recorded, evenly chosen; of bodies, the most points, and bodies are whole.

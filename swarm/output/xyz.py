@@ -40,7 +40,7 @@ def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
 
 
 def _cell(chosen: Exported) -> str:
-    """What says which cell repeats."""
+    """The keys of the cell that repeats."""
     periods, scene = chosen.periods, chosen.trajectory.scene
     if not periods.any():
         return 'pbc="F F F"'
