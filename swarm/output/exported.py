@@ -39,13 +39,15 @@ class Exported:
         periods: the lengths of the cell that repeats, 0 where none does.
     """
 
-    def __init__(self, trajectory: "Trajectory", frames: slice | int | None, particles: int) -> None:
+    def __init__(
+        self, trajectory: "Trajectory", frames: slice | int | None, particles: int, progress: Progress | None
+    ) -> None:
         """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
 
         Raises:
             SceneError: there is no such frame, or the file keeps no particles.
         """
-        self.trajectory = trajectory
+        self.trajectory, self._progress = trajectory, progress
         trajectory.require_frames()
         self.numbers = _numbers(frames, len(trajectory))
         self.times = trajectory.times[list(self.numbers)]
@@ -64,10 +66,12 @@ class Exported:
         return len(self.ids)
 
     def moments(self) -> Iterator[Moment]:
-        """The frames one after the other."""
-        for number, time in zip(self.numbers, self.times.tolist(), strict=True):
+        """The frames one after the other, each of which is written when the next is asked for."""
+        for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
             held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}
             yield Moment(number, time, held.pop("position"), held.pop("velocity"), held)
+            if self._progress is not None:
+                self._progress(done + 1, len(self.numbers))
 
 
 def _numbers(frames: slice | int | None, n: int) -> range:
