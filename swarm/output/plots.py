@@ -103,13 +103,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
     lines = series.lines_of(content.scene, content.method, shapes, content.body)
-    before: series.Seen = None
-    rows = []
-    for k, moment in enumerate(times):
-        now = {name: column[k] for name, column in seen.items()}
-        rows.append([line.value(moment, now, before) for line in lines])
-        before = moment, now
-    values = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
+    values = {line.path: line.values(times, seen) for line in lines}
     shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
     views = series.views_of(shown)
     count = len(views) + bool(content.frames)  # one more is for the speeds
