@@ -38,18 +38,13 @@ def export(
     if kind not in SUFFIXES:
         raise SceneError(f"export: expected a file name that ends in {', '.join(SUFFIXES)}, got {target}")
     checks.flag("surfaces", surfaces)
-    chosen = Exported(trajectory, frames, particles)
+    chosen = Exported(trajectory, frames, particles, progress)
     targets = [target]
     if kind == ".vtkhdf" and surfaces and trajectory.scene.surfaces:
         targets.append(target.with_suffix(".surfaces.vtkhdf"))
     for one in targets:
         paths.check_distinct({"export": one}, {"trajectory": trajectory.path})
         paths.check_target(one, overwrite, "export")
-
-    def told(done: int) -> None:
-        if progress is not None:
-            progress(done, len(chosen.numbers))
-
     # What is missing is found before anything is written.
     with needed_by(f"an export as {kind}", "gsd"):
         form = importlib.import_module(f".{kind[1:]}", __package__)
@@ -59,5 +54,5 @@ def export(
                 from . import walls
             drawn = walls.shapes(chosen)
             walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
-        form.write(chosen, stack.enter_context(named_when_whole(target)), told)
+        form.write(chosen, stack.enter_context(named_when_whole(target)))
     return targets
