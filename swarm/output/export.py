@@ -8,7 +8,7 @@ A frame is in memory at a time. 10 000 particles and 500 frames take, read and w
 import contextlib
 import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from .. import checks
 from ..errors import SceneError
@@ -17,14 +17,11 @@ from . import paths
 from .exported import Exported, Progress
 from .replaced import named_when_whole
 
-if TYPE_CHECKING:
-    from .trajectory import Trajectory
-
 SUFFIXES = (".vtkhdf", ".xyz", ".gsd")
 
 
 def export(
-    trajectory: "Trajectory",
+    trajectory: Any,
     path: str | Path,
     frames: slice | int | None,
     particles: int,

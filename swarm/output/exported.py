@@ -1,7 +1,7 @@
 """The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from .. import checks
 from ..errors import SceneError
 from .stored import whole
-
-if TYPE_CHECKING:
-    from .trajectory import Trajectory
 
 # Is called with how many frames are written, and how many there are to write.
 Progress = Callable[[int, int], None]
@@ -39,9 +36,7 @@ class Exported:
         periods: the lengths of the cell that repeats, 0 where none does.
     """
 
-    def __init__(
-        self, trajectory: "Trajectory", frames: slice | int | None, particles: int, progress: Progress | None
-    ) -> None:
+    def __init__(self, trajectory: Any, frames: slice | int | None, particles: int, progress: Progress | None) -> None:
         """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
 
         Raises:
