@@ -5,7 +5,6 @@ import math
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, square
-from ..surfaces import fold as walls
 from .reflection import relative
 
 _TINY = 2.2250738585072014e-308
@@ -46,15 +45,15 @@ class One(Record):
 
     def split(self, chain, drift, r0, r1, w):
         """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        return _off_wall(drift, walls.step_normal(chain, self.first, r0, r1), w)
+        return _off_wall(drift, chain.step_normal(self.first, r0, r1), w)
 
     def split_at(self, chain, drift, r, w):
         """`Held` of a velocity at a point."""
-        return _off_wall(drift, walls.unit_normal(chain, self.first, r), w)
+        return _off_wall(drift, chain.unit_normal(self.first, r), w)
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
-        g = walls.inner_gradient(chain, self.first, r0, r1)
+        g = chain.inner_gradient(self.first, r0, r1)
         return w - (_towards(drift, w, g) / square(g)) * g
 
     def inward(self, n, m):
@@ -63,11 +62,11 @@ class One(Record):
 
     def settle(self, chain, r):
         """A point within round-off of the walls, moved onto them."""
-        return walls.settle(chain, self.first, r)
+        return chain.settle(self.first, r)
 
     def presses(self, chain, r, v, pull):
         """How the walls press on a particle that slides with this velocity, per mass: (first, second)."""
-        return walls.outward_acceleration(chain, self.first, r, v, pull), 0.0
+        return chain.outward_acceleration(self.first, r, v, pull), 0.0
 
     def lets_go(self, n, m):
         """Whether a wall no longer presses."""
@@ -90,13 +89,13 @@ class Two(Record):
 
     def split(self, chain, drift, r0, r1, w):
         """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        n = walls.step_normal(chain, self.first, r0, r1)
-        return _off_edge(drift, n, walls.step_normal(chain, self.second, r0, r1), w)
+        n = chain.step_normal(self.first, r0, r1)
+        return _off_edge(drift, n, chain.step_normal(self.second, r0, r1), w)
 
     def split_at(self, chain, drift, r, w):
         """`Held` of a velocity at a point."""
-        n = walls.unit_normal(chain, self.first, r)
-        return _off_edge(drift, n, walls.unit_normal(chain, self.second, r), w)
+        n = chain.unit_normal(self.first, r)
+        return _off_edge(drift, n, chain.unit_normal(self.second, r), w)
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone."""
@@ -109,13 +108,13 @@ class Two(Record):
 
     def settle(self, chain, r):
         """A point within round-off of the walls, moved onto them."""
-        return walls.settle(chain, self.first, walls.settle(chain, self.second, r))
+        return chain.settle(self.first, chain.settle(self.second, r))
 
     def presses(self, chain, r, v, pull):
         """How the walls press on it, per mass: (first, second)."""
-        one = walls.outward_acceleration(chain, self.first, r, v, pull)
-        other = walls.outward_acceleration(chain, self.second, r, v, pull)
-        n, m = walls.unit_normal(chain, self.first, r), walls.unit_normal(chain, self.second, r)
+        one = chain.outward_acceleration(self.first, r, v, pull)
+        other = chain.outward_acceleration(self.second, r, v, pull)
+        n, m = chain.unit_normal(self.first, r), chain.unit_normal(self.second, r)
         cosine, inverse = dot(n, m), _inverse(square(edge(n, m)))
         return (one - cosine * other) * inverse, (other - cosine * one) * inverse
 
@@ -143,7 +142,7 @@ def drift(moving, held, chain, r):
     """`Drift` at a point."""
     if moving is None:
         return None
-    return Drift(walls.velocity(chain, held.first, r), walls.velocity(chain, max(held.second, 0.0), r))
+    return Drift(chain.velocity(held.first, r), chain.velocity(max(held.second, 0.0), r))
 
 
 def mean_drift(moving, held, chain, r0, r1, h):
@@ -151,7 +150,7 @@ def mean_drift(moving, held, chain, r0, r1, h):
     if moving is None:
         return None
     other = max(held.second, 0.0)
-    return Drift(walls.mean_velocity(chain, held.first, r0, r1, h), walls.mean_velocity(chain, other, r0, r1, h))
+    return Drift(chain.mean_velocity(held.first, r0, r1, h), chain.mean_velocity(other, r0, r1, h))
 
 
 def given_by_second(drift, taken):

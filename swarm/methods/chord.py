@@ -9,7 +9,6 @@ from ..contact.reflection import Energy, chord_end, chord_step, chord_turn
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import kept, select
 from ..kernel.vector import square
-from ..surfaces import fold as walls
 from . import contract
 
 # A particle gets nowhere in this part of a crossing.
@@ -69,11 +68,11 @@ class Chord(Instants):
     holds = True
 
     def most_sweeps(self, chain):
-        return walls.chord_sweeps(chain)
+        return chain.chord_sweeps()
 
     def guess(self, chain, gravity, lane, wall):
         h = _step(self, lane)
-        return walls.chord_guess(chain, wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
+        return chain.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
 
     def improve(self, chain, gravity, lane, wall, solution, multiplier):
         p = displacement(gravity, lane.v, _step(self, lane))

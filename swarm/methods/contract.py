@@ -21,8 +21,6 @@ from ..contact.reflection import Turned
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0
@@ -87,7 +85,7 @@ class Contact(NamedTuple):
 
 def work_along(moving, chain, wall, force):
     """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-    return 0.0 if moving is None else dot(force, walls.way(chain, wall))
+    return 0.0 if moving is None else dot(force, chain.way(wall))
 
 
 class MethodNumbers(Record):
@@ -150,7 +148,7 @@ class MethodNumbers(Record):
 
         A method of steps takes all there are, to ask them over its step.
         """
-        return at(chain, left)
+        return chain.at(left)
 
     # --- Flight ---
 
