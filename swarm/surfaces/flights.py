@@ -115,7 +115,7 @@ def step_whole(gravity, surface, course, row, lane):
 def end(chain, course, row, lane):
     """`first_hit` from the course."""
     first = NEVER
-    for k in reversed(range(len(chain.walls))):
+    for k, _wall in reversed(tuple(enumerate(chain.walls))):
         at = row + k * COURSE
         first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), float(k), first)
     return first
