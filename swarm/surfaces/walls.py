@@ -123,7 +123,8 @@ class Walls(Record):
         """The shortest pace of all walls."""
         shortest = math.inf
         for wall in reversed(self.walls):
-            shortest = min(wall.pace(), shortest)
+            one = wall.members if isinstance(wall, Field) else wall
+            shortest = min(one.pace(), shortest)
         return shortest
 
     def chord_sweeps(self):

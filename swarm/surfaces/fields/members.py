@@ -34,8 +34,12 @@ class Members(Record):
     table: Array  # (members, width) the numbers of each
     grid: Grid
 
-    # As of a wall: what is asked before it is known which one is meant.
+    # What a wall at rest says, as in contract.py.
     flat = False
+
+    def pace(self):
+        """A time in which their motion changes little [s]."""
+        return math.inf
 
     def count(self):
         """How many they are."""
