@@ -155,17 +155,19 @@ def _arrival_later(chain, held, path, near, left):
     later, before = Arrival(math.inf, -1.0), chain.count_in_fields()
     for i in range(chain.others().length()):
         later = _sooner_at(chain, before + i, held, path, near, left, later)
-    for k, (number, _field) in reversed(tuple(enumerate(chain.fields()))):
-        found = _arrival_among(k, chain, number, held, path, near, left)
+    if not chain.fields():
+        return later
+    starts, ends = chain.at(left).fields(), chain.at(left - path.h).fields()
+    for (number, field), (_number, end) in reversed(tuple(zip(starts, ends, strict=True))):
+        found = _arrival_among(field.members, end.members, chain, number, held, path, near, left)
         later = found if found.time < later.time else later
     return later
 
 
 @outlined
-def _arrival_among(k, chain, number, held, path, near, left):
-    """The same at the bodies of field k."""
+def _arrival_among(field, ends, chain, number, held, path, near, left):
+    """The same at the bodies of a field, which is `ends` at the end of the step."""
     found = Arrival(math.inf, -1.0)
-    field, ends = chain.at(left).walls[k].members, chain.at(left - path.h).walls[k].members
     grid = members_of(field).grid
     block = block_of_path(grid, own_path(field, ends, path), near)
     for k in range(size_of(block)):
