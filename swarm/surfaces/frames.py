@@ -26,6 +26,8 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("falling_hit", ("place", "vector", "vector"), None),
     ("safe_time", ("place", "vector", "vector"), None),
     ("course", ("place", "vector", "vector"), None),
+    ("level_along", ("seen",), None),
+    ("moving_step", ("seen", None), None),
     ("outward_acceleration", ("place", "vector", "vector"), None),
     ("begin_flight", ("gravity", None, None, None, "place", "vector"), None),
     ("step_flight", ("gravity", None, None, None, "place", "vector"), None),
@@ -38,7 +40,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("chord_improve", ("place", "vector", None), None),
     ("chord_normal", ("place", "vector", None), "vector"),
 )
-_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "chord_sweeps")
+_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "needs_bend", "chord_sweeps")
 
 
 class Framed(Smooth):
@@ -47,6 +49,10 @@ class Framed(Smooth):
     A class of frames gives `place_in`, `vector_in`, `gravity_in`, `place_out` and `vector_out`, and overrides what
     depends on more than its arguments.
     """
+
+    def seen_in(self, seen):
+        """A particle as the wall sees it, in the frame of the body."""
+        return seen._replace(r=self.place_in(seen.r), v=self.vector_in(seen.v), a=self.vector_in(seen.a))
 
 
 def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> Any:

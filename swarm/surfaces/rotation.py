@@ -141,6 +141,10 @@ class Rotated(Framed):
 
     place_in, place_out = vector_in, vector_out
 
+    def flat_normal(self):
+        n = self.body.flat_normal()
+        return None if n is None else self.vector_out(n)
+
     def gravity_in(self, gravity):
         """Gravity, or none, in the surface's own frame."""
         if gravity is None:
