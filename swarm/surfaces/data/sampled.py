@@ -14,11 +14,10 @@ from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
-from . import flight as _flight  # noqa: F401
 from . import spline
 from .arrays import read
 from .cells import Cells, cells_of, eigenvalues, least_at_border
-from .numbers import SampledNumbers
+from .flight import SampledNumbers
 from .spline import Spline
 
 Floats = NDArray[np.float64]
