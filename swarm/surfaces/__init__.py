@@ -13,12 +13,8 @@ from . import approach as _approach  # noqa: F401
 from . import march as _march  # noqa: F401
 from . import newton as _newton  # noqa: F401
 from .data.sampled import Sampled
-from .fields.boxes import Boxes
-from .fields.capsules import Capsules
-from .fields.cylinders import Cylinders
-from .fields.ellipsoids import Ellipsoids
+from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
-from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes.box import Box
