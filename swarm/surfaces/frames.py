@@ -39,6 +39,13 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("chord_guess", ("place", "vector"), None),
     ("chord_improve", ("place", "vector", None), None),
     ("chord_normal", ("place", "vector", None), "vector"),
+    # Of a field: see `Members`
+    ("count", (), None),
+    ("is_in_another", (None, "place"), None),
+    ("count_in_cell", ("place",), None),
+    ("list_in_cell", (None, None, "place", None), None),
+    ("one_in_cell", (None, "place"), None),
+    ("deepest_in_cell", ("place",), None),
 )
 _CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "needs_bend", "chord_sweeps")
 

@@ -26,28 +26,9 @@ class Posed(Framed):
     left: float  # of the frame [s]
     after: float  # of the frame, at the end of the step [s]
 
-    # --- Of a field: see `Members` ---
-
-    def count(self):
-        return self.body.count()
-
     def wall(self, number):
+        """Of a field one of its walls."""
         return self._replace(body=self.body.wall(number))
-
-    def is_in_another(self, number, r):
-        return self.body.is_in_another(number, self.own_place(r))
-
-    def count_in_cell(self, r):
-        return self.body.count_in_cell(self.own_place(r))
-
-    def list_in_cell(self, k, before, r, into):
-        return self.body.list_in_cell(k, before, self.own_place(r), into)
-
-    def one_in_cell(self, k, r):
-        return self.body.one_in_cell(k, self.own_place(r))
-
-    def deepest_in_cell(self, r):
-        return self.body.deepest_in_cell(self.own_place(r))
 
     # --- The frame of the wall ---
 

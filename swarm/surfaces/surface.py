@@ -241,6 +241,11 @@ def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:
     return x, y, z
 
 
+def shown(point: Any) -> str:
+    """A point as errors write it."""
+    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"
+
+
 def farthest(point: Vector) -> float:
     """The largest coordinate of a point."""
     return max(map(abs, point))
