@@ -11,7 +11,7 @@ from . import rising
 
 
 class AtRest(Record):
-    """What walls in motion override, and what shapes do that may be in such a wall."""
+    """The methods that walls in motion override, and those that shapes do which may be in such a wall."""
 
     # --- Overridden by a wall in motion ---
 

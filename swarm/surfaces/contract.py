@@ -191,6 +191,10 @@ class Smooth(AtRest):
         """Lower bound of the distance to the wall; 0 if unknown."""
         return 0.0
 
+    def may_reach(self, low, high):
+        """Whether a solid may have a point in common with a box with these corners; its bounds do."""
+        return True
+
     def passed(self, r, v):
         """Whether a straight flight surely never meets the surface again."""
         return False

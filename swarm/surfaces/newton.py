@@ -1,4 +1,4 @@
-"""What follows from `hessian`: steps in contact by Newton's method."""
+"""Steps in contact by Newton's method, from `hessian`."""
 
 import math
 

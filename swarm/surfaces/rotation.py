@@ -154,7 +154,7 @@ class Rotated(Framed):
 
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:
-    """What kernels take of a surface whose own axes are these columns."""
+    """A surface whose own axes are these columns, as kernels take it."""
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)
@@ -164,5 +164,5 @@ def framed(axes: NDArray[np.float64], body: Any) -> Any:
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:
-    """What kernels take of a rotated surface; `body` has its centre in its own frame, `turned_back(turn, center)`."""
+    """A rotated surface as kernels take it; `body` has its centre in its own frame, `turned_back(turn, center)`."""
     return framed(matrix(turn), body)

@@ -136,7 +136,7 @@ class Sampled(Surface):
 
 
 class Samples:
-    """What is made of the samples of a surface, once."""
+    """The samples of a surface and all that is made of them, once."""
 
     def __init__(self, values: Floats, spacing: Vector) -> None:
         self.values, self.spacing = values, spacing

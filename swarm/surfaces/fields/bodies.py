@@ -55,7 +55,7 @@ class Spheres(Many):
 
     @cached_property
     def members(self) -> Members:
-        """What kernels take."""
+        """The field as kernels take it."""
         table = aligned(np.column_stack([self.centers, self.radii]))
         return field_of(ball(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)
 

@@ -117,7 +117,7 @@ class Many(Surface):
 
     @cached_property
     def members(self) -> Members:
-        """What kernels take."""
+        """The field as kernels take it."""
         return members_of(self.solids(), self.repeated)
 
     def walls(self) -> tuple[Members]:

@@ -135,7 +135,7 @@ def can_be_member(wall: Any) -> bool:
 
 
 def kind_of(wall: Any) -> Any:
-    """What numbers have in common that a field may hold: their types, whatever their axes are."""
+    """The types of numbers that one field may hold, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
     if isinstance(wall, (Vec, *AXES)):
         return Vec

@@ -69,7 +69,7 @@ class FormSurface(Surface):
         raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: the functions of a form are known to the process that has made it, so each makes its own."""
+        """The fields: the functions of a form are known to the process that has made it, so each makes its own."""
         return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What kernels know of a surface by functions, and its flights by safe steps; its subclasses know phi and gradient."""
+"""A surface by functions as kernels take it: its flights by safe steps. Its subclasses know phi and gradient."""
 
 import math
 from typing import Any, NamedTuple

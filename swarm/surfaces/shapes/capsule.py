@@ -66,7 +66,7 @@ class Capsule(Revolved):
 
 
 class CapsuleNumbers(Distance):
-    """What kernels know of a capsule."""
+    """A capsule as kernels take it, about the z axis."""
 
     center: Vec
     radius: float

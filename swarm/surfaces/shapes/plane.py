@@ -60,7 +60,7 @@ class Plane(Surface):
 
 
 class PlaneNumbers(ExactChord):
-    """What kernels know of a plane."""
+    """A plane as kernels take it."""
 
     normal: Vec
     offset: float

@@ -22,7 +22,7 @@ _TINY = float(np.finfo(np.float64).tiny)
 
 
 class QuadricNumbers(contract.Smooth):
-    """What kernels know of a quadric; it, or its waist, may be small compared with the distance of a flight from it."""
+    """A quadric as kernels take it; it, or its waist, may be small compared with the distance of a flight from it."""
 
     center: Vec
     a: Vec  # the diagonal of A in the principal frame

@@ -123,7 +123,7 @@ Normal = Vec | AlongX | AlongY | AlongZ
 
 
 def normal_of(vector: Sequence[float]) -> Any:
-    """What kernels take for a unit vector, or for the opposite one where that is an axis."""
+    """A unit vector as kernels take it, or the opposite one where that is an axis."""
     for axis, others in zip(AXES, ((1, 2), (2, 0), (0, 1)), strict=True):
         if not any(vector[k] for k in others):
             return axis(1.0)
@@ -134,7 +134,7 @@ def normal_of(vector: Sequence[float]) -> Any:
 
 
 class SlabNumbers(Distance, ExactChord):
-    """What kernels know of a slab."""
+    """A slab as kernels take it."""
 
     normal: Normal
     offset: float  # n.c

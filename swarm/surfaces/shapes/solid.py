@@ -34,7 +34,7 @@ _SPACING = 6e-6
 
 
 class SolidNumbers(contract.Smooth):
-    """What kernels know of a body: its parts, and a length that bounds the round-off of their coordinates."""
+    """A body as kernels take it: its parts, and a length that bounds the round-off of their coordinates."""
 
     parts: Any  # Chain or None
     side: float

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ...checks import Vector, length
 from ...kernel.jit import select
-from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
+from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
 from ..levels import Level
 from ..relative import Bounds
@@ -65,7 +65,7 @@ def _risen(d, p):
 
 
 class SphereNumbers(Distance, ExactChord):
-    """What kernels know of a sphere; a ball may be small compared with the distance of a flight from it."""
+    """A sphere as kernels take it; a ball may be small compared with the distance of a flight from it."""
 
     center: Vec
     radius: float
@@ -91,6 +91,9 @@ class SphereNumbers(Distance, ExactChord):
         # 1/(2 R^2)
         k = 0.5 * self.curvature * self.curvature
         return r - ((square(d) - self.radius2) * k) * d
+
+    def may_reach(self, low, high):
+        return square(highest(highest(low - self.center, self.center - high), ZERO)) <= self.radius2
 
     def outward_acceleration(self, r, v, pull):
         # |v|^2/R + n.G

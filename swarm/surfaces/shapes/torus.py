@@ -74,7 +74,7 @@ class Torus(Surface):
 
 
 class TorusNumbers(Distance):
-    """What kernels know of a torus."""
+    """A torus as kernels take it, about the z axis."""
 
     center: Vec
     major: float
