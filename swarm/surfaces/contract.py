@@ -10,6 +10,7 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 `required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
 """
 
+from ..kernel.gravity import Gravity
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
 from . import approach, flights, march, newton
@@ -132,7 +133,9 @@ class Smooth(AtRest):
         """`first_hit` for the parabola r + v t + G t^2/2."""
         if self.is_quartic:
             return first_rise(self.may_be_far, self.course(r, v, pull))
-        return approach.falling_hit(self, r, v, pull) if self.gives("near") else march.march(self, r, v, pull)
+        if self.gives("near"):
+            return approach.first_hit(self, Gravity(pull.x, pull.y, pull.z), r, v)
+        return march.march(self, r, v, pull)
 
     def safe_time(self, r, v, pull):
         """A time during which that parabola surely stays admissible: a lower bound, cheap.

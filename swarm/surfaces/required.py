@@ -108,7 +108,7 @@ def _definition(wall: Any, name: str) -> types.FunctionType:
         return _nothing  # type: ignore[return-value]
     if name in ("first_hit", "falling_hit"):
         return inspect.unwrap(approach.first_hit if wall.gives("near") else march.march)  # type: ignore[no-any-return]
-    return getattr(newton if name in ("push", "rise", "resolve") else Smooth, name)  # type: ignore[no-any-return]
+    return inspect.unwrap(getattr(newton if name in ("push", "rise", "resolve") else Smooth, name))  # type: ignore[no-any-return]
 
 
 def _nothing(*_asked: Any) -> None:
