@@ -197,27 +197,15 @@ class Posed(Framed):
 class Drifting(Posed):
     """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
 
-    def own_flight(self, r, v):
-        """Place and velocity of a particle in the frame of the wall."""
-        return r - self.pose.shift, v - self.pose.velocity
+    def velocity_in(self, v):
+        """A velocity in the frame of the wall."""
+        return v - self.pose.velocity
 
+    def vector_in(self, a):
+        """An acceleration there."""
+        return a
+
+    gravity_in = vector_in
     is_quartic = property(lambda self: self.body.is_quartic)
     may_be_far = property(lambda self: self.body.may_be_far)
-
-    def first_hit(self, r, v):
-        return self.body.first_hit(*self.own_flight(r, v))
-
-    def falling_hit(self, r, v, pull):
-        return self.body.falling_hit(*self.own_flight(r, v), pull)
-
-    def course(self, r, v, pull):
-        return self.body.course(*self.own_flight(r, v), pull)
-
-    def safe_time(self, r, v, pull):
-        return self.body.safe_time(*self.own_flight(r, v), pull)
-
-    def field_hit(self, gravity, r, v):
-        return self.body.field_hit(gravity, *self.own_flight(r, v))
-
-    def until_next_cell(self, r, v):
-        return self.body.until_next_cell(*self.own_flight(r, v))
+    safe_time = Framed.safe_time

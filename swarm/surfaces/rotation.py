@@ -139,7 +139,8 @@ class Rotated(Framed):
         """A vector of the surface's own frame in the scene."""
         return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
 
-    place_in, place_out = vector_in, vector_out
+    place_in = velocity_in = vector_in
+    place_out = vector_out
 
     def flat_normal(self):
         n = self.body.flat_normal()
