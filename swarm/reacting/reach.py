@@ -13,7 +13,7 @@ from ..surfaces.course import rise_time
 from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
-from ..surfaces.shapes.slab import SlabNumbers, along
+from ..surfaces.shapes.slab import SlabNumbers
 from ..surfaces.shapes.solid import SolidNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
 
@@ -85,9 +85,8 @@ def _reach_of_plane(body, seen):
 
 
 def _reach_of_slab(body, seen):
-    n = body.normal
-    x, u, a = along(n, seen.r) - body.offset, along(n, seen.v), 0.5 * along(n, seen.pull)
-    width = seen.width * (1.0 if seen.axis is None else abs(along(n, seen.axis)))
+    x, u, a = body.off(seen.r), body.along(seen.v), 0.5 * body.along(seen.pull)
+    width = seen.width * (1.0 if seen.axis is None else abs(body.along(seen.axis)))
     # To the wall on the one side and on the other; of a plate the particle is on one side.
     up = rise_time(body.side * (x - body.radius), 0.5 * (body.side * u + width), body.side * a)
     down = rise_time(body.side * (-x - body.radius), 0.5 * (-body.side * u + width), -body.side * a)

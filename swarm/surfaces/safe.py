@@ -17,7 +17,6 @@ from .flights import NEVER, Hit, hit, sooner, soonest
 from .moving import Driven, Following, Marched, Moving, Translated
 from .posed import Drifting, Posed
 from .relative import flight_of
-from .rising import needs_bend, safe_step
 from .rotation import Rotated
 from .surface import Surface
 from .walls import Field, Walls
@@ -92,7 +91,7 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
 
 def _nearer(seen, body, number, rest, longest):
     """The `Nearest` of one wall and the rest."""
-    step = safe_step(body, seen, longest)
+    step = body.moving_step(seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
     speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
@@ -157,7 +156,7 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
-    return needs_bend(wall) and not wall.gives("bend")
+    return wall.needs_bend and not wall.gives("bend")
 
 
 # --- Free time -------------------------------------------------------------------------------------------
@@ -182,7 +181,7 @@ def _free_of(surface, gravity, r, v):
     if not _is_marched(surface):
         return flights.free_time(gravity, Walls((surface,)), r, v)
     # One safe step: of a flight of many steps the next one begins nearer to the wall.
-    step = safe_step(surface.body, _seen_now(surface, gravity, r, v), surface.left)
+    step = surface.body.moving_step(_seen_now(surface, gravity, r, v), surface.left)
     return select(step.level > 0.0, 0.0, step.time)
 
 

@@ -13,7 +13,7 @@ from ..kernel.vector import ZERO
 from .flights import Hit
 from .moving import Moving
 from .relative import flight_of
-from .rising import Known, level_of
+from .rising import Known
 from .safe import closed_hit, seen_by_walls
 
 _EPSILON = 2.220446049250313e-16
@@ -37,7 +37,7 @@ def stride(chain, gravity, course, lane, r, v, left, is_first):
     longest = select(closed < left, closed, left) - t
     flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), left)
     known = tuple(
-        (number, Known(wall.body, seen, level_of(wall.body, seen)))
+        (number, Known(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(chain, flight, t)
     )
     within, ahead = _first_rise(known), _AHEAD * _pace(chain)

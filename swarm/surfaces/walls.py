@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
-from .surface import Surface
 
 
 class Field(Record):
@@ -186,6 +185,6 @@ for _name, _neutral in _ASKED.items():
     setattr(Walls, _name, _asked(_name, _neutral))
 
 
-def all_walls(surfaces: Iterable[Surface]) -> Walls:
+def all_walls(surfaces: Iterable[Any]) -> Walls:
     """The walls of surfaces, in their order."""
     return Walls(tuple(wall for surface in surfaces for wall in surface.walls()))

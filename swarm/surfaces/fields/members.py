@@ -139,7 +139,7 @@ def can_be_member(wall: Any) -> bool:
 
 
 def kind_of(wall: Any) -> Any:
-    """What numbers have in common that a field may hold: their types, whatever their axes are."""
+    """The types of numbers that one field may hold, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
     if isinstance(wall, (Vec, *AXES)):
         return Vec
@@ -280,3 +280,15 @@ def _least_in_shell(members, r, center, shell):
 
 def _around(place, shell, count):
     return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
+
+
+@kernel
+def within(members, points, found):
+    """Whether each of the points (3, N) is in any body, into `found`; on its surface it is not."""
+    grid = members.grid
+    for i in range(points.shape[1]):
+        r = column(points, 0, i)
+        cell, inside = index(cell_of(grid, r).number), False
+        for k in range(grid.first[cell], grid.first[cell + index(1)]):
+            inside = inside or member(members, index(grid.entries[k])).phi(r) < 0.0
+        found[i] = inside

@@ -15,9 +15,10 @@ from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract, flights
 from ..approach import place, under_way
 from ..course import rise_near
+from ..rising import Step
 from ..rotation import Rotated
 from .plane import PlaneNumbers
-from .slab import SlabNumbers, near_face_hit
+from .slab import SlabNumbers
 
 _EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.
@@ -32,7 +33,7 @@ _SPACING = 6e-6
 
 
 class SolidNumbers(contract.Smooth):
-    """What kernels know of a body: its parts, and a length that bounds the round-off of their coordinates."""
+    """A body as kernels take it: its parts, and a length that bounds the round-off of their coordinates."""
 
     parts: tuple[Any, ...]
     side: float
@@ -73,6 +74,19 @@ class SolidNumbers(contract.Smooth):
     def farthest_push(self):
         # phi is about the distance, whose faces are flat or wide: no pole within a push.
         return -math.inf
+
+    def moving_step(self, seen, longest):
+        # Of the part that the particle is least deep in: outside of one part is outside of the body.
+        found = Step(math.inf, 0.0, 0.0)
+        for part in reversed(self.parts):
+            here = part.moving_step(seen, longest)
+            # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
+            depth = part.gap_of(part.inner(seen.r))
+            time = select(depth > noise(part, self.extent, seen.r), 0.0, here.time)
+            least = here.level < found.level
+            level, half = select(least, here.level, found.level), select(least, here.half, found.half)
+            found = Step(level, half, select(time > found.time, time, found.time))
+        return found
 
     # --- Flight in lanes ---
 
@@ -186,7 +200,7 @@ def _entry_of(part, gravity, r, v):
         return part.first_hit(r, v)
     pull = as_vector(gravity)
     if isinstance(part, SlabNumbers):
-        return near_face_hit(part, r, v, pull), True
+        return part.near_face_hit(r, v, pull), True
     if part.is_quartic:
         return rise_near(part.course(r, v, pull))
     return part.falling_hit(r, v, pull)
@@ -197,6 +211,3 @@ def noise(part, extent, r):
     gradient = total(absolute(part.gradient(r)))
     terms = part.gap_scale(r) + extent * gradient + abs(part.gap_of(0.0))
     return _ULPS * _EPSILON * terms
-
-
-# --- Contact ---------------------------------------------------------------------------------------------
