@@ -7,7 +7,6 @@ from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot
 from ..surfaces import fold as walls
-from . import laws as wall_laws
 from .reflection import from_relative, given, relative, wall_velocity
 
 
@@ -34,11 +33,11 @@ class Left(Record):
 @outlined
 def exchange(laws, chain, wall, arriving, mass, draw):
     """`Left` of a particle that is `arriving` at a thermal wall with (r, v)."""
-    law = wall_laws.thermal_of(laws, wall)
+    law = laws.thermal_of(wall)
     r, v = arriving
     n = walls.unit_normal(chain, wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)
-    moving = wall_velocity(wall_laws.moving(laws), chain, wall, r)
+    moving = wall_velocity(laws.moving, chain, wall, r)
     before, after = relative(moving, v), flux_maxwellian(n, law.energy / mass, u)
     b, happens = dot(before, n), u.choice < law.accommodation
     work = given(moving, after - before)

@@ -1,19 +1,45 @@
 """The laws of walls: restitution, Coulomb's friction, thermal walls. What no wall of a scene has is None."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..surfaces.fold import Chain
 
 
-class Laws(NamedTuple):
+class Laws(Record):
     """The effects of impacts on a particle besides turning it round."""
 
     restitution: Any  # None, or a Chain of one e a wall
     friction: Any  # None, or a Chain of one mu a wall
     thermal: Any  # None, or a Chain of one `Thermal` a wall
     moving: Any  # None, or `Moves` where a wall moves
+
+    @property
+    def loses(self):
+        """Whether an impact may turn energy into heat: a constant for the compiler."""
+        return self.restitution is not None or self.friction is not None
+
+    @property
+    def change_energy(self):
+        """Whether an impact may change the energy of a particle: a constant for the compiler."""
+        return self.loses or self.thermal is not None or self.moving is not None
+
+    def restitution_of(self, wall):
+        """e of a wall."""
+        return of_wall(self.restitution, wall, 1.0)
+
+    def friction_of(self, wall):
+        """mu of a wall."""
+        return of_wall(self.friction, wall)
+
+    def thermal_of(self, wall):
+        """`Thermal` of a wall."""
+        return of_wall(self.thermal, wall, Thermal(0.0, 0.0))
+
+
+# The laws of rigid elastic walls at rest.
+NONE = Laws(None, None, None, None)
 
 
 class Span(Record):
@@ -52,36 +78,3 @@ def of_wall(chain, wall, neutral=0.0):
     if isinstance(chain, Span):
         return select(wall < chain.walls, chain.first, of_wall(chain.rest, wall - chain.walls, neutral))
     return select(wall == 0.0, chain.first, of_wall(chain.rest, wall - 1.0, neutral))
-
-
-# --- Of the laws of a scene, or None ---------------------------------------------------------------------
-
-
-def friction(laws):
-    """The friction of all walls, or None."""
-    return None if laws is None else laws.friction
-
-
-def thermal(laws):
-    """The temperatures of all walls, or None."""
-    return None if laws is None else laws.thermal
-
-
-def moving(laws):
-    """`Moves`, or None."""
-    return None if laws is None else laws.moving
-
-
-def loses(laws):
-    """Whether an impact may turn energy into heat: a constant for the compiler."""
-    return laws is not None and (laws.restitution is not None or laws.friction is not None)
-
-
-def restitution_of(laws, wall):
-    """e of a wall."""
-    return 1.0 if laws is None or laws.restitution is None else of_wall(laws.restitution, wall)
-
-
-def thermal_of(laws, wall):
-    """`Thermal` of a wall."""
-    return of_wall(thermal(laws), wall, Thermal(0.0, 0.0))

@@ -9,7 +9,6 @@ from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.fold import each
 from ..surfaces.openings import is_open, outside
-from . import laws as wall_laws
 from .crossing import at_part, bisected, block_of_path
 from .events import TOUCH
 from .reflection import relative, wall_velocity
@@ -52,7 +51,7 @@ def hit_wall(openings, rules, chain, motion, wall, near):
     r, v = motion
     if not is_open(openings, wall, r, near):
         return wall
-    moving, touch = wall_laws.moving(rules.laws), TOUCH * rules.size + near
+    moving, touch = rules.laws.moving, TOUCH * rules.size + near
     number = numbers_near(chain, r)
     found, soonest = wall, math.inf
     for i in range(number.size):

@@ -15,8 +15,8 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from ..surfaces import fold as walls
-from . import laws as wall_laws
 from .hold import Two, mean_drift
+from .laws import of_wall
 from .reflection import relative, wall_velocity
 
 _EPSILON = 2.220446049250313e-16
@@ -55,8 +55,8 @@ NEEDS = (
 def _grip(friction, held, presses):
     """sum mu b, where a wall presses with b"""
     b, c = presses
-    first = wall_laws.of_wall(friction, held.first) * b
-    return first + (wall_laws.of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
+    first = of_wall(friction, held.first) * b
+    return first + (of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
 
 
 class Slowed(Record):
@@ -131,7 +131,7 @@ class Force(Record):
 
 def force(laws, held, chain, gravity, r, v):
     """The `Force` on a particle that slides with this velocity along the walls."""
-    pull, moving, friction = accelerated(gravity, ZERO, 1.0), wall_laws.moving(laws), wall_laws.friction(laws)
+    pull, moving, friction = accelerated(gravity, ZERO, 1.0), laws.moving, laws.friction
     n, m = held.presses(chain, r, v, pull)
     taken = held.split_at(chain, None, r, v)
     a = pull - n * taken.n - m * taken.m

@@ -17,8 +17,8 @@ from ..surfaces import flights
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near, until_others
-from . import laws as wall_laws
 from . import reflection
+from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
@@ -39,7 +39,7 @@ class Contacts(Record):
     """How impacts are taken."""
 
     contact_step: Any  # None or h
-    laws: Any  # None or `Laws`
+    laws: Laws
     shortest: float  # flight: the particle slides instead of shorter ones [s]
     touch: float  # distance within which walls hold a sliding particle too [m]
 
@@ -98,7 +98,7 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
-    laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
+    laws, r, moving = method.laws, flight.r, method.laws.moving
     carried, chain = chain, at(chain, flight.left)
     number = numbers_near(chain, r)
     count = number.size
@@ -227,11 +227,11 @@ def _landed(laws, chain, touch, given, r, v, twice_energy):
     Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
     would reflect the rest.
     """
-    if laws is None:
+    if not laws.change_energy:
         return v, twice_energy
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
-        lossy[i] = touch.touched[i] and 1.0 + wall_laws.restitution_of(laws, touch.number[i]) < 2.0
+        lossy[i] = touch.touched[i] and 1.0 + laws.restitution_of(touch.number[i]) < 2.0
     put_normals(chain, touch, lossy, r, r)
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u

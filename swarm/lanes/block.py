@@ -161,7 +161,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
         solve(method, chain, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if method.thermal is not None:
+    if method.laws.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
     some_arrived, some_hard = False, False

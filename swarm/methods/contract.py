@@ -17,6 +17,7 @@ and one with a multiplier the three functions of Uzawa's loop. examples/own_meth
 from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
+from ..contact.laws import NONE
 from ..contact.reflection import Turned
 from ..kernel.jit import outlined
 from ..kernel.record import Record
@@ -127,18 +128,8 @@ class MethodNumbers(Record):
 
     @property
     def laws(self):
-        """The laws of its walls, or None."""
-        return None
-
-    @property
-    def friction(self):
-        """Their friction, or None."""
-        return None
-
-    @property
-    def thermal(self):
-        """Their temperatures, or None."""
-        return None
+        """The `Laws` of its walls."""
+        return NONE
 
     @property
     def sliding_tolerance(self):

@@ -13,6 +13,7 @@ from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import MeanValue
+from ..contact.laws import NONE
 from ..contact.records import Step
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
@@ -224,7 +225,7 @@ class FixedSteps(Numbers):
                 return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
             if hit.wall < 0.0:
                 continue
-            bounce = exact(None, chain, None, hit.wall, r, v, energy)
+            bounce = exact(NONE, chain, None, hit.wall, r, v, energy)
             v = bounce.v
             lanes.impulse[int(hit.wall), i] += bounce.impulse
             hits += 1.0
@@ -262,7 +263,7 @@ class CutSteps(Numbers):
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
         energy = _first_energy(lane)
         shortest = self.shortest_length / math.sqrt(energy.twice)
-        contacts = Contacts(None, None, shortest, _SAME_INSTANT * self.shortest_length)
+        contacts = Contacts(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
         end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
         return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.laws import Laws
 from ..contact.reflection import Energy, exact
 from ..kernel.gravity import accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
@@ -40,7 +41,7 @@ class Scenery(NamedTuple):
     """What particles meet: walls that do not react, their laws and their numbers in the scene; those that do."""
 
     given: Any  # None, or the walls
-    laws: Any
+    laws: Laws
     owners: Array  # (given walls,)
     reacting: Any
     pull: Any  # gravity, or None
