@@ -26,9 +26,9 @@ from numba.core.errors import TypingError
 import swarm
 from swarm.kernel import cache
 from swarm.kernel import jit as _jit
+from swarm.kernel.compilers import _DEEPEST, deep
 from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import kept, select
-from swarm.kernel.parts import _DEEPEST, deep
 from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.run.engine import Run

@@ -50,7 +50,7 @@ TEMPLATES = {
     "core.typing.templates.infer_global": None,
     "core.typing.templates.make_overload_template": "func overload_func jit_options strict inline",
 }
-# The passes of the compiler and of LLVM: parts.py
+# The passes of the compiler and of LLVM: compilers.py
 COMPILING = {
     "core.codegen.CPUCodegen._pass_builder": "self **kwargs",
     "core.codegen.JITCodeLibrary": None,

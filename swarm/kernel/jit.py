@@ -25,7 +25,7 @@ from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from . import cache
-from .parts import KernelCompiler, LongKernelCompiler, PartCompiler
+from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler
 from .trace import calls
 from .trace.helpers import leaving, prepare
 from .trace.selection import select as select
@@ -77,7 +77,7 @@ def kernel(function: F) -> F:
 
 
 def long_kernel(function: F) -> F:
-    """`kernel` for what is not flights: many short loops, see `parts.py`."""
+    """`kernel` for what is not flights: many short loops, see `compilers.py`."""
     return _kernel(function, LongKernelCompiler)
 
 

@@ -1,6 +1,6 @@
 """The contract of a method: every function that the loops over lanes ask of one, required or derived.
 
-A method's numbers are a NamedTuple, by whose type these functions are chosen. A pass is a free flight followed by at
+A method is a record for kernels, derived from `MethodNumbers`. A pass is a free flight followed by at
 most one contact. Its parts are scalar, branch-free functions of one lane, and the lanes loop over each part separately:
 short loops keep more lanes in the processor's window than one long loop (measured on Zen 3: 7.8 instead of 10.3 ns an
 impact in an ellipsoid). What is rare and needs loops and branches is left to `hard_pass`.
@@ -8,10 +8,10 @@ impact in an ellipsoid). What is rare and needs loops and branches is left to `h
 Required are
     constants and own       what a lane keeps of its particle for the whole frame,
     land or flight          the way to the next contact: from the first hit, which is found before, or by itself,
-    contact                 the contact in lanes,
-    hard_pass               what `flight` or `contact` leave to it.
-A contact with an unknown registers `guess`, `improve` and `most_sweeps` too, one that is too long for a loop `turn`,
-and one with a multiplier the three functions of Uzawa's loop. examples/own_method.py is a complete method.
+    contact                 the contact in lanes.
+A method whose `flight` or `contact` leaves contacts to it has `hard_pass` too, one whose contact has an unknown
+`guess`, `improve` and `most_sweeps`, one that is too long for a loop `turn`, and one with a multiplier the three
+functions of Uzawa's loop. examples/own_method.py is a complete method.
 """
 
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ from ..contact.laws import NONE
 from ..contact.reflection import Turned
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot
-from ..surfaces import fold as walls
+from ..kernel.vector import ZERO, Vec
+from ..status import Status
 from ..surfaces.moving import at
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
@@ -86,9 +86,9 @@ class Contact(NamedTuple):
     work: Any = 0.0
 
 
-def work_along(moving, chain, wall, force):
-    """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-    return 0.0 if moving is None else dot(force, walls.way(chain, wall))
+def refused(lane, status):
+    """A contact that is not taken, for this reason: a result of `hard_pass`."""
+    return Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status
 
 
 class MethodNumbers(Record):
@@ -221,4 +221,4 @@ class MethodNumbers(Record):
 
         Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
         """
-        raise NotImplementedError
+        return refused(lane, Status.STALLED.value)

@@ -78,20 +78,24 @@ class Numbers(fixed_step.Steps):
         """The contact as exact impacts: the result of `hard_pass`."""
         raise NotImplementedError
 
-    # --- One pass ---
+    # --- The unknown of a contact ---
+
+    def free(self, gravity, lane, h):
+        """The step without walls: r0, p and c = h^2/(2m)."""
+        return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
     def most_sweeps(self, chain):
         return contact_impulse.NEWTON_STEPS
 
     def guess(self, chain, gravity, lane, wall):
         cut, over = self.cut(lane.left), self.over(chain, lane.left)
-        kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        kappa = contact_impulse.guess(over, wall, cut.law, self.free(gravity, lane, cut.h))
         touching = wall >= 0.0
         return select(touching, kappa, 0.0), touching
 
     def improve(self, chain, gravity, lane, wall, solution, multiplier):
         cut, over, kappa = self.cut(lane.left), self.over(chain, lane.left), solution.kappa
-        newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
+        newton = contact_impulse.improve(over, wall, cut.law, multiplier, self.free(gravity, lane, cut.h), kappa)
         return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
     # --- Uzawa's loop (8) ---
@@ -102,7 +106,7 @@ class Numbers(fixed_step.Steps):
 
     def first_multiplier(self, chain, gravity, lane, wall, kappa):
         cut, over = self.cut(lane.left), self.over(chain, lane.left)
-        better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
         limited = uzawa.has_limit(over, wall, cut.law, lane.r)
         return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
@@ -112,6 +116,8 @@ class Numbers(fixed_step.Steps):
         following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
         return following, miss, not (record.stored <= self.tolerance)
 
+    # --- Contact ---
+
     def contact(self, chain, gravity, lane, wall, solution):
         # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
         cut, kappa = self.cut(lane.left), solution.kappa
@@ -120,7 +126,7 @@ class Numbers(fixed_step.Steps):
         r1 = walls.push(over, wall, lane.r, p, kappa)
         g = walls.inner_gradient(over, wall, lane.r, r1)
         f = 2.0 / h * kappa
-        work = contract.work_along(self.moving, over, wall, -f / h * g)
+        work = self.work_along(over, wall, -f / h * g)
         v1 = accelerated(gravity, lane.v, h) - f * g
         given = abs(f) * norm(g)
 
@@ -146,8 +152,6 @@ class Numbers(fixed_step.Steps):
             work,
         )
 
-    # --- Several walls, nested solves, and loops that do not converge ---
-
     @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
         cut, record = self.cut(lane.left), lanes.record
@@ -155,9 +159,9 @@ class Numbers(fixed_step.Steps):
         if self.is_blocked(chain, wall, lane.r, h * lane.v):
             record[uzawa.SWEEPS, i] = 0.0
             return self.as_impacts(chain, lane, cut, wall, lanes, i)
-        free = _free_step(gravity, lane, h)
+        free = self.free(gravity, lane, h)
         if self.is_too_fast(free.p):
-            return fixed_step.refused(lane, Status.TOO_FAST.value)
+            return contract.refused(lane, Status.TOO_FAST.value)
         reactions = scratch((walls.length(chain), 4), np.float64)
         end = uzawa.loop(self, cut.law, over, free, reactions)
         record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
@@ -165,7 +169,7 @@ class Numbers(fixed_step.Steps):
         if not end.converged and self.policy == IMPACT:
             return self.as_impacts(chain, lane, cut, wall, lanes, i)
         if not end.converged and (self.policy == RAISE or not end.solved):
-            return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
+            return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
         new = 1.0 if self.is_new(over, lane.r) else 0.0
         reaction = corner.total(reactions)
         v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
@@ -186,11 +190,6 @@ def _first_energy(lane):
     now, first = square(lane.v), lane.own.twice_energy
     speed2 = first if abs(first - now) <= _ROUND_OFF * now else now
     return Energy(speed2, 0.5 / speed2)
-
-
-def _free_step(gravity, lane, h):
-    """The step without walls: r0, p and c = h^2/(2m)."""
-    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
 
 def _after(r, v, left, hits):
@@ -214,7 +213,7 @@ class FixedSteps(Numbers):
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
         if self.moving is not None:
             # Refused before the run.
-            return fixed_step.refused(lane, Status.UNCONVERGED.value)
+            return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
         remaining, hits = cut.h, 0.0
         for _i in range(_MOST_BOUNCES):

@@ -214,7 +214,7 @@ def a_kernel(x):
 
 
 def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
-    """And each of the hooks of `parts.py` is called."""
+    """And each of the hooks of `compilers.py` is called."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     asked = []
     ours = parts._Kernel._optimize_functions
