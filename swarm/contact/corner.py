@@ -9,7 +9,7 @@ from ..kernel.vector import ZERO, Vec, dot, largest, norm
 from ..surfaces.fold import each
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction
-from .records import Step
+from .impulse import Step
 
 _EPSILON = 2.220446049250313e-16
 # Sweeps over the walls; a corner of 90 degrees takes three.
@@ -99,5 +99,5 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
 def constraints(chain, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
     for k, link in enumerate(each(chain)):
-        start = contact_impulse.start_gap(0.0, link.first, r, link.first.inner(r))
+        start = contact_impulse.start_of(0.0, link.first, r)
         into[k] = law.constraint(start.gap)

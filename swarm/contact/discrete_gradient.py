@@ -17,7 +17,7 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from . import impulse
-from .records import Step
+from .impulse import Step
 
 _EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
@@ -100,11 +100,10 @@ class Composite(NamedTuple):
 
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""
-        kappa, solved = impulse.careful(law, multiplier, surface, step)
+        equation = impulse.equation(law, multiplier, surface, step)
+        kappa, solved = equation.careful()
         r1 = surface.push(step.r, step.p, kappa)
-        start = impulse.start_gap(multiplier, surface, step.r, surface.inner(step.r))
-        g1 = impulse.end_gap(surface, step, start, kappa)
-        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(g1), solved)
+        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(equation.end(kappa).gap), solved)
 
 
 class MeanValue(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import corner, implicit
-from ..contact.records import Step
+from ..contact.impulse import Step
 from ..kernel.jit import scratch, select
 from ..kernel.vector import Vec, norm
 from ..surfaces import fold as walls

@@ -9,7 +9,7 @@ from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, reaction_needs
-from ..contact.records import Step
+from ..contact.impulse import Step
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import scratch, select
 from ..kernel.vector import norm

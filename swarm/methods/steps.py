@@ -13,8 +13,8 @@ from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import MeanValue
+from ..contact.impulse import Step
 from ..contact.laws import NONE
-from ..contact.records import Step
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
 from ..kernel.gravity import accelerated, displacement
