@@ -158,7 +158,7 @@ def _give_back(seen, lanes, i):
 
 def _look(gravity, like, before, lanes, live, seen, near):
     """Every lane at the next of these bodies: in closed form where flights are straight and none is met by steps."""
-    if gravity is None and flights.in_steps(like) is None:
+    if gravity is None and like.in_steps is None:
         for i in range(index(live)):
             time, hits = gathered(like, seen.body, i, 0).first_hit(*_flight(lanes.rows, near, i))
             _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
