@@ -54,7 +54,7 @@ def meets(chain, ends, held, path, near):
 
 @outlined
 def _meets_one(field, ends, number, held, path, near):
-    """The same of the bodies of a field that has so many walls before it."""
+    """`meets` of the bodies of a field that has so many walls before it."""
     grid = members_of(field).grid
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
@@ -144,7 +144,7 @@ def arrival(chain, held, path, near, left):
 
 @outlined
 def _first_of(members, number, held, path, near, later):
-    """The first of that and of all that a step meets of a field that has so many walls before it."""
+    """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
     grid, found = members.grid, later
     block = block_of_path(grid, path, near)
     for k in range(size_of(block)):
@@ -173,7 +173,7 @@ def _arrival_later(rest, chain, number, held, path, near, left):
 
 @outlined
 def _arrival_among(rest, chain, number, held, path, near, left):
-    """The same at the bodies of the first field of the rest."""
+    """`arrival` at the bodies of the first field of the rest."""
     found = Arrival(math.inf, -1.0)
     field, ends = at(Carried(rest), left).first, at(Carried(rest), left - path.h).first
     grid = members_of(field).grid
@@ -262,7 +262,7 @@ def bisected(has_happened, given, low, high):
 
 
 def at_part(path, s):
-    """Where the cubic through both ends of a step is."""
+    """The place on the cubic through both ends of a step."""
     r0, a, b, c = cubic(path)
     return r0 + s * (a + s * (b + s * c))
 

@@ -1,4 +1,4 @@
-"""How a lasting contact begins and ends, one particle at a time: what it becomes at a wall."""
+"""The beginnings and ends of lasting contacts, one particle at a time: its state after it meets a wall."""
 
 import math
 
@@ -44,7 +44,7 @@ class Particle(Record):
 
 
 class Next(Record):
-    """Its phase then, its velocity along the walls, the speed that it keeps across them, its energy, its walls.
+    """The state of a particle after an event: phase, velocity along the walls, speed across them, energy, walls.
 
     `impulse` is that of the wall, `wait` how long the hops last that are left out.
     """
@@ -60,7 +60,7 @@ class Next(Record):
 
 
 def own_speed2(p):
-    """The square of the speed that a particle's own scale and its motion say."""
+    """The square of a particle's own speed: the larger one of its scale and of its motion."""
     return max(p.scale2, square(p.v))
 
 

@@ -19,7 +19,7 @@ class Draw(Record):
 
 
 class Left(Record):
-    """Whether a wall has accommodated a particle, its velocity then, and the normal impulse per mass.
+    """The leave of a particle: whether the wall accommodated it, its velocity then, its normal impulse per mass.
 
     `work` is twice what the wall gives by its motion, per mass; the rest of the change of energy is heat.
     """

@@ -1,4 +1,4 @@
-"""The walls that hold a particle, one or the edge of two: what they take of its velocity, and how they press on it."""
+"""The walls that hold a particle, one or the edge of two: their parts of its velocity, and their pressures."""
 
 import math
 from typing import Any
@@ -85,7 +85,7 @@ class One(Holding):
         return -1.0 * n
 
     def presses(self, chain, r, v, pull):
-        """How the walls press on a particle that slides with this velocity, per mass: (first, second)."""
+        """The pressures of the walls on a particle that slides with this velocity, per mass: (first, second)."""
         return walls.outward_acceleration(chain, self.first, r, v, pull), 0.0
 
     def lets_go(self, n, m):
@@ -120,7 +120,7 @@ class Two(Holding):
         return k * (-1.0 / math.sqrt(square(k)))
 
     def presses(self, chain, r, v, pull):
-        """How the walls press on it, per mass: (first, second)."""
+        """The pressures of the walls on it, per mass: (first, second)."""
         one, other = (walls.outward_acceleration(chain, wall, r, v, pull) for wall in self)
         n, m = (walls.unit_normal(chain, wall, r) for wall in self)
         cosine, inverse = dot(n, m), _inverse(square(edge(n, m)))

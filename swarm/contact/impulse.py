@@ -187,7 +187,7 @@ class Equation(Record):
         return sign * k, False
 
     def first_push(self, size, df):
-        """Where to look for the root first, from |F(0)| and F'(0)."""
+        """The first trial of the root, from |F(0)| and F'(0)."""
         # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to
         # that. Without one it does not pass the root where the right side of (K) is convex. The value at 0 can be past
         # the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from

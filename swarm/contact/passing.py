@@ -1,4 +1,4 @@
-"""Where a particle comes into an opening of its wall, and closed walls at the same place, which close it."""
+"""Particles that come into openings of their walls, and closed walls at the same place, which close these."""
 
 import math
 
@@ -136,7 +136,7 @@ def part_until_open(openings, rules, chain, held, path, near):
 
 @outlined
 def _part_uncovered(openings, rules, chain, wall, path, near):
-    """The same of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
+    """`part_until_open` of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
     low = _part(openings, wall, path, near)
     if not low < math.inf or not _is_covered(openings, rules, chain, wall, at_part(path, low), near):
         return low
@@ -182,7 +182,7 @@ def _way_into_any(members, path, near):
 
 @outlined
 def _way_in(volume, path, near):
-    """The same of one volume, whose distance is looked at at some places of the step and where it is least."""
+    """`_way_into` of one volume, whose distance is looked at at some places of the step and where it is least."""
     reach = _reach(path)
     if not outside(volume, path.r1) <= reach:
         return math.inf

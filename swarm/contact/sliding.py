@@ -165,7 +165,7 @@ def longest(friction, v, a):
 
 
 def still(r, v, taken, allowed):
-    """How far the last sweep but one may move r1, if the walls take so much of v in a composed step."""
+    """The most that the last sweep but one may move r1, if the walls take so much of v in a composed step."""
     least = _STILL * total(absolute(r))
     least = select(least > _SLACK * allowed, least, _SLACK * allowed)
     turn, whole = _GAIN * total(absolute(taken)), total(absolute(v))
@@ -192,7 +192,7 @@ def part(k):
 
 
 def before(k):
-    """How much of the composition comes before its step k."""
+    """The part of the composition that comes before its step k."""
     return select(k < 3, OUTER * select(k < 3, 1.0 * k, 0.0), 1.0 - OUTER * (5.0 - k))
 
 
@@ -202,7 +202,7 @@ def inverse_part(k):
 
 
 def lead(k):
-    """How far the acceleration of step k is beyond the mean one of the step before, over its change in that.
+    """The part of its change that the acceleration of step k is beyond the mean one of the step before.
 
     Constant jerk: the mean of a step is that of its middle, and r1 - r0 - h v0 is h^2/2 times that of its first third.
     """

@@ -36,7 +36,7 @@ NEEDS = ("first_hit", "unit_normal", "inner_gradient", "distance", "settle")
 
 
 class Contacts(Record):
-    """How impacts are taken."""
+    """The settings of an impact."""
 
     contact_step: Any  # None or h
     laws: Laws
@@ -53,7 +53,7 @@ class Moving(Record):
 
 
 class Landing(Record):
-    """The particle after the impact, the time it took, and twice its energy per mass."""
+    """A particle after its impact, the time it took, and twice its energy per mass."""
 
     r: Vec
     v: Vec

@@ -1,4 +1,4 @@
-"""What kernels take from Numba that is not documented: where another version of it may break them.
+"""The undocumented parts of Numba that kernels take: where another version of it may break them.
 
 Each name is here with the parameters by which this package calls it, or None for what it is not called by itself; what
 is taken from them is held by tests/trace/test_internals.py.

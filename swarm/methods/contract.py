@@ -50,7 +50,7 @@ class Flight(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """What is known of a contact: its unknown, whether it is unsolved, and the velocity where the method has `turn`."""
+    """The solve of a contact: its unknown, whether it is unsolved, and the velocity where the method has `turn`."""
 
     kappa: float
     unsolved: bool
@@ -68,7 +68,7 @@ class Sweep(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
+    """The result of a contact of a lane, with the normal impulse per mass that the wall gave, and new impacts.
 
     Where contacts change the energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
     particles on walls, `lasts` says that another kernel decides what follows, at this wall. Where walls move, `work` is
@@ -182,7 +182,7 @@ class MethodNumbers(Record):
         return self if self.gives("guess") else None
 
     def turn(self, chain, gravity, lane, wall, kappa):
-        """How the contact has `Turned` the velocity, for `contact`, where one loop of both would be too long."""
+        """The `Turned` velocity, for `contact`, where one loop of both would be too long."""
         return NOT_TURNED
 
     @property
@@ -217,7 +217,7 @@ class MethodNumbers(Record):
 
     @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
-        """What `flight` or `contact` left, as the `Contact` that it is, and its status.
+        """The `Contact` that `flight` or `contact` left to this function, and its status.
 
         Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
         """

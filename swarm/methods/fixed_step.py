@@ -1,4 +1,4 @@
-"""What methods with a fixed step share: whole steps, the jump over free ones, solids that a step could miss."""
+"""The common part of methods with a fixed step: whole steps, the jump over free ones, solids that a step could miss."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -103,7 +103,7 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
 
 
 def longest_step(scene: Scene, dt: float) -> float | None:
-    """How far a particle may fly in a step so that no solid is jumped over [m]; None where there is no solid."""
+    """The longest flight in a step that jumps over no solid [m]; None where there is no solid."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
     thickness, i = _thinnest(scene, dt)
@@ -127,7 +127,7 @@ def _described(scene: Scene, i: int) -> str:
 
 
 def whole_steps(name: str, duration: float, dt: float) -> float:
-    """How many steps a duration is; a `SceneError` that calls it `name` where they are not whole."""
+    """The number of steps of a duration; a `SceneError` that calls it `name` where they are not whole."""
     if duration / dt > _MOST_STEPS:
         raise SceneError(
             f"{name} must be at most {_MOST_STEPS:g} steps, got {name} = {duration:g} s with dt = {dt:g} s"

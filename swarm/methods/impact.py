@@ -166,7 +166,7 @@ def _require_reacting(scene: Scene) -> None:
 
 
 class Own(NamedTuple):
-    """What a lane keeps: its energy, and twice the speed [m/s] away from a wall below which a contact may last."""
+    """The energy of a lane, and twice the speed [m/s] away from a wall below which its contact may last."""
 
     energy: Energy
     slow: float

@@ -1,4 +1,4 @@
-"""What the implicit baselines share: the pass of a rule that takes the force at a point it has to find.
+"""The common part of the implicit baselines: the pass of a rule that takes the force at a point it has to find.
 
 A rule says where that point would be without walls (`reach`), and the step that follows from where it is (`end`).
 """

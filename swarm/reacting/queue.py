@@ -38,7 +38,7 @@ _NEAR = 1e-6
 
 
 class Scenery(NamedTuple):
-    """What particles meet: walls that do not react, their laws and their numbers in the scene; those that do."""
+    """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
 
     given: Any  # None, or the walls
     laws: Laws
@@ -173,7 +173,7 @@ def _soon(clock):
 
 @long_kernel
 def predict(scenery, freedoms, queue, clock, rule, first, last):
-    """What is next for the particles from `first` to before `last`; no other is touched.
+    """Find the next events of the particles from `first` to before `last`; no other is touched.
 
     At the start of a frame also when they meet walls that do not react.
     """
@@ -215,7 +215,7 @@ def _until(freedoms):
 
 
 def _list(queue, close, i):
-    """How many are listed, with particle i if it is near."""
+    """The number of those that are listed, with particle i if it is near."""
     if queue.near[i] and not queue.listed[i]:
         queue.listed[i] = True
         queue.close[close] = i
