@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, square
 from ..surfaces import fold as walls

@@ -2,7 +2,8 @@
 
 import math
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
 from ..surfaces import fold as walls
 from ..surfaces.fields.grid import in_block, size_of

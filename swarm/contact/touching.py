@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import flights

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.arrays import scratch
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec
 from ..surfaces import fold as walls

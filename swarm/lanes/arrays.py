@@ -6,7 +6,8 @@ import numpy as np
 
 from ..contact.events import ARRIVED, EVENT
 from ..contact.uzawa import RECORDS
-from ..kernel.jit import Array, index, next_of, outlined, select
+from ..kernel.arrays import index, next_of
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
+from ..kernel.arrays import index
 from ..kernel.gravity import potential
-from ..kernel.jit import index, kernel, outlined, select
+from ..kernel.jit import kernel, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import put, square
 from ..methods import contract as methods

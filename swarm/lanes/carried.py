@@ -12,8 +12,9 @@ from ..contact import crossing, events
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
 from ..surfaces import fold as walls

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..contact.reflection import relative, wall_velocity
-from ..kernel.jit import Array, index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
 from ..surfaces import fold as walls

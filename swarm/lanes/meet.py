@@ -7,8 +7,9 @@ from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
 from ..contact.reflection import given, wall_velocity
+from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
-from ..kernel.jit import long_kernel, outlined, scratch
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import fold as walls

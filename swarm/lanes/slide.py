@@ -10,7 +10,8 @@ import numpy as np
 from ..contact import events, hold
 from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
-from ..kernel.jit import index, long_kernel, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
 from ..surfaces.moving import at

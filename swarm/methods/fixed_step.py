@@ -10,8 +10,9 @@ from ..contact.discrete_gradient import MeanValue
 from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
+from ..kernel.arrays import kept
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, outlined, select
+from ..kernel.jit import outlined, select
 from ..kernel.vector import Vec, dot, square
 from ..particles import Particles
 from ..scene import Scene

@@ -11,8 +11,9 @@ from ..contact import sliding, touching
 from ..contact.laws import NONE, Laws
 from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact
 from ..errors import SceneError
+from ..kernel.arrays import kept
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, select
+from ..kernel.jit import select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..contact import corner, implicit
 from ..contact.impulse import Step
-from ..kernel.jit import scratch, select
+from ..kernel.arrays import scratch
+from ..kernel.jit import select
 from ..kernel.vector import Vec, norm
 from ..surfaces import fold as walls
 from ..surfaces.moving import at

@@ -10,8 +10,9 @@ from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.impulse import Step
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import scratch, select
+from ..kernel.jit import select
 from ..kernel.vector import norm
 from ..scene import Scene
 from ..surfaces import fold as walls

@@ -17,8 +17,9 @@ from ..contact.impulse import Step
 from ..contact.laws import NONE
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
+from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, outlined, scratch, select
+from ..kernel.jit import outlined, select
 from ..kernel.vector import norm, square
 from ..status import Status
 from ..surfaces import flights

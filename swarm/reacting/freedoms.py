@@ -7,7 +7,8 @@ the velocity stays within a width of a middle one, so that what was said of far 
 import math
 from typing import Any, NamedTuple, cast
 
-from ..kernel.jit import Array, index, select
+from ..kernel.arrays import index
+from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
 from ..surfaces import flights, safe

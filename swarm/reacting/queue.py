@@ -12,9 +12,10 @@ import numpy as np
 
 from ..contact.laws import Laws
 from ..contact.reflection import Energy, exact
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
-from ..kernel.jit import Array, index, long_kernel, outlined, select
+from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import ZERO, square
 from ...surfaces import fold as walls
 from . import hold, instant

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import index, outlined, select
+from ...kernel.arrays import index
+from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, dot, lowest, norm, square, times, total
 from ..course import rise_time
 from ..march import bisected, lets_go

@@ -1,6 +1,7 @@
 """Which points are in a body of a field: asked of the bodies in a point's cell only."""
 
-from ...kernel.jit import index, kernel
+from ...kernel.arrays import index
+from ...kernel.jit import kernel
 from ...kernel.vector import column
 from .grid import cell_of
 from .members import member
