@@ -14,7 +14,7 @@ from swarm.kernel.jit import select
 from swarm.kernel.vector import dot
 from swarm.methods import contract
 from swarm.methods.base import Method
-from swarm.surfaces import flights, fold
+from swarm.surfaces import flights
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class MirrorNumbers(contract.MethodNumbers):
         return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
 
     def contact(self, chain, gravity, lane, wall, solution):
-        n = fold.unit_normal(chain, wall, lane.r)
+        n = chain.unit_normal(wall, lane.r)
         b = dot(lane.v, n)
         # v1 = v0 - 2 (v0.n) n where v0.n > 0
         impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)

@@ -35,7 +35,6 @@ from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm,
 from swarm.run.engine import Run
 from swarm.scene import MOST_WALLS
 from swarm.surfaces import flights
-from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(
@@ -67,17 +66,17 @@ def every_function_of_a_surface(surface, r, v, pull, kappa):
 
 def every_function_of_a_chain(whole, r, v, pull, kappa):
     return (
-        chain.length(whole),
+        whole.length(),
         flights.first_hit(whole, None, r, v),
         flights.first_hit(whole, Gravity(pull.x, pull.y, pull.z), r, v),
         flights.hit_of(whole, None, 1.0, r, v),
         flights.other_hit(whole, 0.0, r, v),
-        chain.unit_normal(whole, 2.0, r),
-        chain.outside(whole, 1.0, r),
-        chain.push(whole, 1.0, r, v, kappa),
+        whole.unit_normal(2.0, r),
+        whole.outside(1.0, r),
+        whole.push(1.0, r, v, kappa),
         flights.free_time(None, whole, r, v),
         flights.free_time(Gravity(pull.x, pull.y, pull.z), whole, r, v),
-        chain.touched(whole, r, v),
+        whole.touched(r, v),
     )
 
 
@@ -343,7 +342,7 @@ def in_all_directions(n, **laws):
 
 
 def takes_steps(walls, r):
-    return flights.in_steps(walls) is not None or chain.outside(walls, -1.0, r)
+    return walls.in_steps() is not None or walls.outside(-1.0, r)
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from . import hold, sliding, touching
 from .hold import One, Two
 from .laws import NONE
@@ -85,12 +84,12 @@ def _loses(rules, wall):
 
 @outlined
 def _normal(chain, wall, r):
-    return walls.unit_normal(chain, wall, r)
+    return chain.unit_normal(wall, r)
 
 
 @outlined
 def _press(chain, wall, r, v, pull):
-    return walls.outward_acceleration(chain, wall, r, v, pull)
+    return chain.outward_acceleration(wall, r, v, pull)
 
 
 @outlined

@@ -6,7 +6,6 @@ from ..kernel.jit import outlined
 from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot
-from ..surfaces import fold as walls
 from .reflection import from_relative, given, relative, wall_velocity
 
 
@@ -35,7 +34,7 @@ def exchange(laws, chain, wall, arriving, mass, draw):
     """`Left` of a particle that is `arriving` at a thermal wall with (r, v)."""
     law = laws.thermal_of(wall)
     r, v = arriving
-    n = walls.unit_normal(chain, wall, r)
+    n = chain.unit_normal(wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)
     moving = wall_velocity(laws.moving, chain, wall, r)
     before, after = relative(moving, v), flux_maxwellian(n, law.energy / mass, u)

@@ -6,7 +6,6 @@ from typing import Any
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, square
-from ..surfaces import fold as walls
 from .reflection import relative
 
 _TINY = 2.2250738585072014e-308
@@ -42,16 +41,16 @@ class Holding(Record):
     def settle(self: Any, chain, r):
         """A point within round-off of the walls, moved onto them."""
         for one in reversed(self):
-            r = walls.settle(chain, one, r)
+            r = chain.settle(one, r)
         return r
 
     def split(self: Any, chain, drift, r0, r1, w):
         """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        return self.parts(drift, w, *(walls.step_normal(chain, one, r0, r1) for one in self))
+        return self.parts(drift, w, *(chain.step_normal(one, r0, r1) for one in self))
 
     def split_at(self: Any, chain, drift, r, w):
         """`Held` of a velocity at a point."""
-        return self.parts(drift, w, *(walls.unit_normal(chain, one, r) for one in self))
+        return self.parts(drift, w, *(chain.unit_normal(one, r) for one in self))
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone."""
@@ -77,7 +76,7 @@ class One(Holding):
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
-        g = walls.inner_gradient(chain, self.first, r0, r1)
+        g = chain.inner_gradient(self.first, r0, r1)
         return w - (_towards(drift, w, g) / square(g)) * g
 
     def inward(self, n, m):
@@ -86,7 +85,7 @@ class One(Holding):
 
     def presses(self, chain, r, v, pull):
         """The pressures of the walls on a particle that slides with this velocity, per mass: (first, second)."""
-        return walls.outward_acceleration(chain, self.first, r, v, pull), 0.0
+        return chain.outward_acceleration(self.first, r, v, pull), 0.0
 
     def lets_go(self, n, m):
         """Whether a wall no longer presses."""
@@ -121,8 +120,8 @@ class Two(Holding):
 
     def presses(self, chain, r, v, pull):
         """The pressures of the walls on it, per mass: (first, second)."""
-        one, other = (walls.outward_acceleration(chain, wall, r, v, pull) for wall in self)
-        n, m = (walls.unit_normal(chain, wall, r) for wall in self)
+        one, other = (chain.outward_acceleration(wall, r, v, pull) for wall in self)
+        n, m = (chain.unit_normal(wall, r) for wall in self)
         cosine, inverse = dot(n, m), _inverse(square(edge(n, m)))
         return (one - cosine * other) * inverse, (other - cosine * one) * inverse
 
@@ -146,7 +145,7 @@ def drift(moving, held, chain, r):
     """`Drift` at a point."""
     if moving is None:
         return None
-    return Drift(walls.velocity(chain, held.first, r), walls.velocity(chain, max(held.second, 0.0), r))
+    return Drift(chain.velocity(held.first, r), chain.velocity(max(held.second, 0.0), r))
 
 
 def mean_drift(moving, held, chain, r0, r1, h):
@@ -154,7 +153,7 @@ def mean_drift(moving, held, chain, r0, r1, h):
     if moving is None:
         return None
     other = max(held.second, 0.0)
-    return Drift(walls.mean_velocity(chain, held.first, r0, r1, h), walls.mean_velocity(chain, other, r0, r1, h))
+    return Drift(chain.mean_velocity(held.first, r0, r1, h), chain.mean_velocity(other, r0, r1, h))
 
 
 def given_by_second(drift, taken):

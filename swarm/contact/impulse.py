@@ -14,7 +14,6 @@ from typing import Any
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec
-from ..surfaces.fold import of_wall
 
 # A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
 # a multiplier its square need only be small, as the loop repairs the rest.
@@ -253,6 +252,11 @@ def _improve(surface, law, multiplier, step, kappa):
     return equation(law, multiplier, surface, step).newton(kappa)
 
 
-# Of all walls: (chain, wall, law, step) and (chain, wall, law, multiplier, step, kappa).
-guess = of_wall(_guess, 0.0)
-improve = of_wall(_improve, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)))
+def guess(chain, wall, *given):
+    """`_guess` of a wall."""
+    return chain.of(wall, 0.0, _guess, *given)
+
+
+def improve(chain, wall, *given):
+    """`_improve` of a wall."""
+    return chain.of(wall, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)), _improve, *given)

@@ -4,15 +4,14 @@ from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..surfaces.fold import Chain
 
 
 class Laws(Record):
     """The effects of impacts on a particle besides turning it round."""
 
-    restitution: Any  # None, or a Chain of one e a wall
-    friction: Any  # None, or a Chain of one mu a wall
-    thermal: Any  # None, or a Chain of one `Thermal` a wall
+    restitution: Any  # None, or e of each wall
+    friction: Any  # None, or mu of each wall
+    thermal: Any  # None, or `Thermal` of each wall
     moving: Any  # None, or `Moves` where a wall moves
 
     @property
@@ -43,15 +42,10 @@ NONE = Laws(None, None, None, None)
 
 
 class Span(Record):
-    """In a chain of numbers, one that holds for so many walls."""
+    """What holds for so many walls in a row."""
 
-    first: Any
+    value: Any
     walls: float
-    rest: Any
-
-
-# The chain of a law that some wall has.
-Given = Chain | Span
 
 
 class Moves(Record):
@@ -71,10 +65,16 @@ class Thermal(Record):
         return (self.accommodation > 0.0) & (self.energy > 0.0)
 
 
-def of_wall(chain, wall, neutral=0.0):
-    """The entry of this wall, `neutral` where no wall has the law."""
-    if chain is None:
-        return neutral
-    if isinstance(chain, Span):
-        return select(wall < chain.walls, chain.first, of_wall(chain.rest, wall - chain.walls, neutral))
-    return select(wall == 0.0, chain.first, of_wall(chain.rest, wall - 1.0, neutral))
+def of_wall(given, wall, neutral=0.0):
+    """The part of a law that is of this wall, `neutral` where no wall has the law."""
+    each: Any = ()
+    first = 0.0
+    for one in given or ():
+        is_span = isinstance(one, Span)
+        after = first + (one.walls if is_span else 1.0)
+        each = (*each, (wall < after, one.value) if is_span else (wall == first, one))
+        first = after
+    found = neutral
+    for here, value in reversed(each):
+        found = select(here, value, found)
+    return found

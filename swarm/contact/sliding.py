@@ -14,7 +14,6 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
-from ..surfaces import fold as walls
 from .hold import Two, mean_drift
 from .laws import of_wall
 from .reflection import relative, wall_velocity
@@ -138,7 +137,7 @@ def force(laws, held, chain, gravity, r, v):
     if friction is None:
         return Force(a, n, m)
     slip = relative(wall_velocity(moving, chain, held.first, r), v)
-    drive = relative(None if moving is None else walls.acceleration(chain, held.first, r), a)
+    drive = relative(None if moving is None else chain.acceleration(held.first, r), a)
     return Force(a - _drag(_grip(friction, held, (n, m)), slip, drive), n, m)
 
 

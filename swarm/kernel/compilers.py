@@ -16,8 +16,7 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-# Frames that a trace may nest. A fold over the walls of a scene is a function of the first that calls itself for the
-# others: 24 planes, the most that a scene has, nest 1600, in less than 512 kB of a stack.
+# Frames that a trace may nest, in less than 512 kB of a stack for 1600.
 _DEEPEST = 10_000
 
 # LLVM's levels: for one function by itself, and for a module.

@@ -12,7 +12,6 @@ from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
 from .table import EIGHT, MOVED, STRIDE, Number, Rows, copy_lane, table
 
@@ -266,13 +265,13 @@ def _phase_after(contacts, i, left, wall):
 
 def booked(chain):
     """How many rows book what the walls give: their impulses, then the work of those that move."""
-    return 2 * walls.length(chain) if isinstance(chain, Carried) else walls.length(chain)
+    return 2 * chain.length() if isinstance(chain, Carried) else chain.length()
 
 
 def _work(chain, impulse, k):
     """The energy per mass that walls that move have given a lane."""
     total = 0.0
-    for s in range(walls.length(chain), booked(chain)):
+    for s in range(chain.length(), booked(chain)):
         total += impulse[s, k]
     return total
 

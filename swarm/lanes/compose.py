@@ -11,8 +11,6 @@ from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at, during
 from ..surfaces.period import is_beyond
 from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK, moves
 
@@ -32,7 +30,7 @@ def compose(kind, method, chain, gravity, lanes, live):
         for i in range(live):
             lane = lanes.lane(i)
             r, v, h = lane.r1, lane.v1, slides.part(k) * lane.h
-            now = at(chain, lane.left - slides.before(k) * lane.h)
+            now = chain.at(lane.left - slides.before(k) * lane.h)
             last = lane.change
             change = last + slides.lead(k) * (last - lane.before)
             lane.before = last
@@ -40,7 +38,7 @@ def compose(kind, method, chain, gravity, lanes, live):
             if rubs:
                 u = wall_velocity(moving, now, lane.first, r)
                 # The drive of a particle that is at rest on its first wall
-                drive = last - lane.h * walls.acceleration(now, lane.first, r) if moves(method) else last
+                drive = last - lane.h * now.acceleration(lane.first, r) if moves(method) else last
                 toward = slides.direction(friction, relative(u, v), drive)
                 slowed = slides.slow(friction, lane.held(kind), now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
@@ -58,13 +56,13 @@ def compose(kind, method, chain, gravity, lanes, live):
             lane = lanes.lane(i)
             h, w, v0, r0, held = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, lane.held(kind)
             left, after = _when(lane, k)
-            step, end = during(chain, left, after), lane.end
+            step, end = chain.during(left, after), lane.end
             # The last sweep
             drift = hold.mean_drift(moving, held, step, r0, end, h)
             taken = held.split(step, drift, r0, end, w)
             r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
             if rubs:
-                now = at(chain, after)
+                now = chain.at(after)
                 u = wall_velocity(moving, now, lane.first, r)
                 slowed = slides.slow(friction, held, now, gravity, r, (v1, lane.toward, u), 0.5 * h)
                 v1 = slowed.v
@@ -83,7 +81,7 @@ def _start(method, chain, gravity, lanes, i):
     v, a, r = lane.v, lane.a, lane.r
     h = select(lane.step < lane.left, lane.step, lane.left)
     h = select(lane.cut < h, lane.cut, h)
-    stop = _longest(method, at(chain, lane.left), lane.first, (r, v, a))
+    stop = _longest(method, chain.at(lane.left), lane.first, (r, v, a))
     h = select(stop < h, stop, h)
     # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
     speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
@@ -99,7 +97,7 @@ def _longest(method, chain, wall, motion):
     """A time within which a particle that slides with friction surely does not stop on its first wall."""
     (r, v, a), friction = motion, method.laws.friction
     if moves(method):
-        v, a = v - walls.velocity(chain, wall, r), a - walls.acceleration(chain, wall, r)
+        v, a = v - chain.velocity(wall, r), a - chain.acceleration(wall, r)
     return slides.longest(friction, v, a)
 
 
@@ -113,7 +111,7 @@ def _sweep_lane(kind, moving, chain, lanes, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
     lane, unsolved = lanes.lane(i), lanes.unsolved
     r0, end, w = lane.r1, lane.end, lane.w
-    step = during(chain, *_when(lane, k))
+    step = chain.during(*_when(lane, k))
     swept = slides.sweep(moving, lane.held(kind), step, slides.part(k) * lane.h, (r0, end, w), lane.still)
     on = unsolved[i]
     lane.end = either(on, swept.r, end)
@@ -134,7 +132,7 @@ def end_steps(kind, method, chain, gravity, lanes, live):
 def _end_step(kind, method, chain, gravity, lanes, i):
     lane, laws = lanes.lane(i), method.laws
     moving, held = laws.moving, lane.held(kind)
-    start, now = at(chain, lane.left), at(chain, lane.left - lane.h)
+    start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
     r1 = held.settle(now, lane.r1)

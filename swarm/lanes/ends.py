@@ -11,8 +11,6 @@ from ..contact.passing import part_until_open
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from ..surfaces.period import part_until
 from .compose import SHORTEST, twice_after
 from .escape import is_at_opening
@@ -32,7 +30,7 @@ def set_going(kind, method, chain, gravity, state, lanes, i):
     """The forces on a lane at the start of its next step; its phase then, which may be to rest."""
     lane, laws = lanes.lane(i), method.laws
     r, v, left = lane.r, lane.v, lane.left
-    now = at(chain, left)
+    now = chain.at(left)
     if lanes.openings is not None and is_at_opening(lanes.openings, kind, method, now, state, lanes, i):
         return EVENT
     force = slides.force(laws, lane.held(kind), now, gravity, r, v)
@@ -44,9 +42,9 @@ def set_going(kind, method, chain, gravity, state, lanes, i):
     if square(v) == 0.0 and events.rests(gravity, force):
         p, contacts = lanes.particle[i], state.contacts
         contacts.sliding[p] += left
-        contacts.phase[p], contacts.load[walls.row(chain, lane.first), p] = ARRIVED, force.n
+        contacts.phase[p], contacts.load[chain.row(lane.first), p] = ARRIVED, force.n
         if lane.second >= 0.0:
-            contacts.load[walls.row(chain, lane.second), p] = force.m
+            contacts.load[chain.row(lane.second), p] = force.m
         push(chain, state, lanes, i, force.n * left, force.m * left)
         lane.left = 0.0
         return ARRIVED
@@ -80,12 +78,12 @@ def decide(kind, method, chain, gravity, state, lanes, i):
         # At once, or so soon that the time left does not change.
         if lane.left - met.time * h == lane.left:
             state.contacts.met[lanes.particle[i]] = met.wall
-            lane.r = walls.settle(at(chain, lane.left), met.wall, r)
+            lane.r = chain.at(lane.left).settle(met.wall, r)
             return EVENT
         cut = min(cut, met.time)
     if event & (LEAVES | PASSES):
         cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
-        cut = min(cut, part_until_open(lanes.openings, method, at(chain, lane.left), held, path, near))
+        cut = min(cut, part_until_open(lanes.openings, method, chain.at(lane.left), held, path, near))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(kind, method, chain, gravity, state, lanes, i)
@@ -98,7 +96,7 @@ def _stop(method, chain, gravity, state, lanes, i):
     """Friction has stopped a lane."""
     lane, r, u, given = lanes.lane(i), lanes.lane(i).r, ZERO, 0.0
     if moves(method):
-        u = walls.velocity(at(chain, lane.left), lane.first, r)
+        u = chain.at(lane.left).velocity(lane.first, r)
         lost, twice = square(lane.v - u) + lane.keep * lane.keep, square(u) + 2.0 * potential(gravity, r)
         given = twice - lane.twice + lost
         lane.twice = twice
@@ -136,7 +134,7 @@ def _shorten(kind, method, chain, state, lanes, i):
     if h > SHORTEST * method.size / math.sqrt(lane.scale2):
         return phase_of(kind)
     end = lane.r + h * lane.v
-    if walls.outside(at(chain, lane.left - h), -1.0, end) or not h > 0.0:
+    if chain.at(lane.left - h).outside(-1.0, end) or not h > 0.0:
         return _give_up(state, lanes, i)
     lane.r = end
     lane.left -= h

@@ -5,7 +5,6 @@ from ..contact.passing import hit_wall, open_wall_at, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import column
-from ..surfaces.moving import at
 from ..surfaces.openings import is_open
 from . import log as impact_log
 from .sliding import with_kept
@@ -27,7 +26,7 @@ def let_out_lanes(openings, method, chain, share, lanes, live):
         i = index(lanes.order[k])
         flier = lanes.lane(i)
         r, v = flier.r, flier.v
-        wall = hit_wall(openings, method, at(chain, flier.left), (r, v), lanes.wall[i], 0.0)
+        wall = hit_wall(openings, method, chain.at(flier.left), (r, v), lanes.wall[i], 0.0)
         if not is_open(openings, wall, r, 0.0):
             lanes.wall[i] = wall
             continue

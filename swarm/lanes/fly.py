@@ -3,8 +3,7 @@
 from ..kernel.arrays import index
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.fold import Field, count_in_fields, others
-from ..surfaces.moving import Carried, Marched, Strided, at
+from ..surfaces.moving import Carried, Marched, Strided
 from ..surfaces.period import cut
 from .seek import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
@@ -19,9 +18,9 @@ def go(method, chain, gravity, lanes, live):
     if met is None:
         for i in range(index(live)):
             _flight(method, chain, gravity, lanes, i, flights.NEVER)
-    elif isinstance(met, Field):
-        _meet_others(others(chain), gravity, count_in_fields(chain), lanes, live)
-        seek(chain, 0.0, gravity, lanes, live)
+    elif met.fields() and not isinstance(met, Carried):
+        _meet_others(chain.others(), gravity, chain.count_in_fields(), lanes, live)
+        seek(chain, gravity, lanes, live)
         for i in range(index(live)):
             _flight(method, chain, gravity, lanes, i, hit_of_lane(lanes, i))
     elif isinstance(met, Strided):
@@ -46,16 +45,16 @@ def _fly(method, chain, gravity, lanes, live):
     if _is_closed(gravity, chain):
         for i in range(index(live)):
             lane = lanes.lane(i)
-            _flight(method, chain, gravity, lanes, i, flights.first_hit(at(chain, lane.left), gravity, lane.r, lane.v))
+            _flight(method, chain, gravity, lanes, i, flights.first_hit(chain.at(lane.left), gravity, lane.r, lane.v))
     else:
         _go_by_steps(chain, gravity, lanes, live)
         for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, flights.end(at(chain, lanes.lane(i).left), lanes.course, 0, i))
+            _flight(method, chain, gravity, lanes, i, flights.end(chain.at(lanes.lane(i).left), lanes.course, 0, i))
 
 
 def _meet_others(chain, gravity, before, lanes, live):
     """The first hits with the walls that are in no field; these have so many walls before them."""
-    if chain is None:
+    if not chain.walls:
         for i in range(index(live)):
             keep_hit(lanes, i, flights.NEVER, 0.0)
     elif _is_closed(gravity, chain):
@@ -69,8 +68,8 @@ def _meet_others(chain, gravity, before, lanes, live):
 
 
 def _is_closed(gravity, chain):
-    """Whether the first hit has a closed form: flights are straight, and walls that move, or none is met by steps."""
-    return gravity is None and (isinstance(chain, Carried) or flights.in_steps(chain) is None)
+    """Whether the first hit has a closed form: flights are straight, and no wall is met by steps."""
+    return gravity is None and chain.in_steps() is None
 
 
 def _stride(method, chain, gravity, lanes, live):
@@ -95,7 +94,7 @@ def _go_by_steps(chain, gravity, lanes, live):
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        flights.begin(at(chain, lane.left), gravity, course, 0, i, lane.r, lane.v)
+        flights.begin(chain.at(lane.left), gravity, course, 0, i, lane.r, lane.v)
     for _step in range(SAFE_STEPS):
         for i in range(index(live)):
             _step_on(chain, gravity, lanes, i)
@@ -113,13 +112,13 @@ def _go_by_steps(chain, gravity, lanes, live):
 def _step_on(chain, gravity, lanes, i):
     """One safe step of a lane."""
     lane = lanes.lane(i)
-    flights.step(at(chain, lane.left), gravity, lanes.course, 0, i, lane.r, lane.v)
+    flights.step(chain.at(lane.left), gravity, lanes.course, 0, i, lane.r, lane.v)
 
 
 def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
     left = lanes.lane(i).left
-    hit = flights.end(at(chain, left), lanes.course, 0, i)
+    hit = flights.end(chain.at(left), lanes.course, 0, i)
     return (hit.wall < 0.0) & (hit.time < left)
 
 

@@ -12,8 +12,6 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from .table import LANES, Rows
 
 # What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.
@@ -173,9 +171,9 @@ def add_escape(log, state, particle, struck):
 def _add(log, method, chain, state, particle, struck):
     k = _add_struck(log, state, particle, struck)
     if log.slip is not None:
-        now = at(chain, struck.left)
+        now = chain.at(struck.left)
         u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
-        n, before = walls.unit_normal(now, struck.wall, struck.r), relative(u, struck.before)
+        n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
         _put(log.slip, k, before - dot(before, n) * n)
 
 

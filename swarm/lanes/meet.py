@@ -12,8 +12,7 @@ from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
-from ..surfaces import fold as walls
-from ..surfaces.moving import Carried, at
+from ..surfaces.moving import Carried
 from ..surfaces.near import count_near, list_near
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
@@ -64,7 +63,7 @@ def _decide(method, chain, gravity, share, i):
     """What becomes of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
-    carried, chain = chain, at(chain, left)
+    carried, chain = chain, chain.at(left)
     if state.openings is not None and _let_out(method, chain, share, i, r, v, left):
         return True
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
@@ -84,7 +83,7 @@ def _decide(method, chain, gravity, share, i):
         found = events.meet(method, One(first), chain, gravity, wall, p)
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
-    state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
+    state.impulse[chain.row(wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
         struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
@@ -115,7 +114,7 @@ def _settles(method, chain, gravity, p):
     """Whether the walls around a particle hold it."""
     if method.laws.moving is not None:
         return is_carried(method, chain, gravity, p)
-    return events.settles(method, chain, gravity, p, scratch((2, walls.length(chain)), np.float64))
+    return events.settles(method, chain, gravity, p, scratch((2, chain.length()), np.float64))
 
 
 def _let_out(method, chain, share, i, r, v, left):
@@ -143,12 +142,12 @@ def _exchange_heat(method, chain, gravity, share, i):
     """Whether a thermal wall accommodates a sliding particle: then it flies."""
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
-    now = at(chain, contacts.left[i])
+    now = chain.at(contacts.left[i])
     left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i]))
     if not left.happens:
         return False
     before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, walls.row(chain, wall), before, after - left.work)
+    book_heat(state, i, chain.row(wall), before, after - left.work)
     book_work(chain, state, i, wall, left.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
@@ -156,7 +155,7 @@ def _exchange_heat(method, chain, gravity, share, i):
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
     for watch in share.watches():
         watch.add_row(method, chain, state, i, struck)
-    state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
+    state.impulse[chain.row(wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True
@@ -166,15 +165,15 @@ def _exchange_heat(method, chain, gravity, share, i):
 def _spare(moving, chain, state, i, found, wall):
     """Book how much less its walls give particle i, which chatters, than one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
-    turned = v - found.impulse * walls.unit_normal(chain, wall, r)
+    turned = v - found.impulse * chain.unit_normal(wall, r)
     if found.phase == HELD:
         held = One(found.wall)
         taken = held.split_at(chain, drift(moving, held, chain, r), r, turned)
     else:
         edge = Two(found.wall, found.other)
         taken = edge.split_at(chain, drift(moving, edge, chain, r), r, turned)
-        state.impulse[walls.row(chain, found.other), i] += taken.c * state.mass[i]
-    state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
+        state.impulse[chain.row(found.other), i] += taken.c * state.mass[i]
+    state.impulse[chain.row(found.wall), i] += taken.b * state.mass[i]
 
 
 @long_kernel
@@ -226,12 +225,12 @@ def _step(method, chain, gravity, share, i):
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
-    now = at(chain, left)
+    now = chain.at(left)
     if state.openings is not None and let_out_at(state.openings, method, now, share, i, r, left):
         _leave(share, i)
         return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
-    held = scratch((2, walls.length(chain)), np.float64)
+    held = scratch((2, chain.length()), np.float64)
     if method.laws.moving is None and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
         return
@@ -254,7 +253,7 @@ def _step(method, chain, gravity, share, i):
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
     given_work = 0.0
-    for s in range(walls.length(chain), impulses.shape[0]):
+    for s in range(chain.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
     book_step(chain, state, i, contacts.met[i], change, given_work, method.laws.loses)
@@ -268,9 +267,9 @@ def _step(method, chain, gravity, share, i):
 @outlined
 def _have_closed(chain, method, r, left):
     """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
-    now, deepest = at(chain, left), 0.0
+    now, deepest = chain.at(left), 0.0
     number = scratch(count_near(now, r), np.float64)
-    list_near(now, 0, 0.0, r, number)
+    list_near(now, r, number)
     for i in range(number.size):
-        deepest = max(deepest, walls.distance(now, number[i], r))
+        deepest = max(deepest, now.distance(number[i], r))
     return deepest > events.TOUCH * method.size

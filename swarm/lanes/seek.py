@@ -10,11 +10,12 @@ from ..kernel.arrays import copy_row, index, unwritten
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces import flights, fold
+from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, gathered, member, width
 from ..surfaces.period import on_time
+from ..surfaces.walls import Walls
 from .arrays import Flying
 from .table import STRIDE, marked_lanes
 
@@ -53,13 +54,15 @@ def hit_of_lane(lanes, i):
     return flights.Hit(lanes.course[_TIME, i], lanes.course[_WALL, i])
 
 
+def seek(chain, gravity, lanes, live):
+    """The first hits of every live lane with the fields, or one found."""
+    for before, field in reversed(chain.fields()):
+        _seek(gravity, field.members, before, lanes, live)
+
+
 @outlined
-def seek(chain, before, gravity, lanes, live):
-    """The first hit of every live lane with the fields of a chain that has so many walls before it, or one found."""
-    if not isinstance(chain, fold.Field):
-        return
-    members = chain.first
-    seek(chain.rest, before + fold.count(members), gravity, lanes, live)
+def _seek(gravity, members, before, lanes, live):
+    """The same with one field that has so many walls before it."""
     if isinstance(members, Few):
         _look_at_all(members, before, lanes, live)
     else:
@@ -196,8 +199,8 @@ def _flight(rows, near, i):
 
 
 def _one(like, seen, i):
-    """The body of a lane, as a chain."""
-    return fold.Chain(gathered(like, seen.body, i, 0), None)
+    """The body of a lane, as a scene of one wall."""
+    return Walls((gathered(like, seen.body, i, 0),))
 
 
 def _goes_on(like, course, seen, i, near):

@@ -14,7 +14,6 @@ from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
-from ..surfaces.moving import at
 from .arrays import following_particle, goes_on_by, speed2_scale
 from .compose import compose, end_steps
 from .ends import decide, set_going
@@ -123,7 +122,7 @@ def _load(kind, method, chain, gravity, share, lanes, i, p):
     lane.first, lane.second = contacts.walls[0, p], contacts.walls[1, p]
     lane.keep, lane.twice, lane.scale2 = contacts.keep[p], 2.0 * state.energy[p], speed2_scale(state, p)
     if begins:
-        held, now = lane.held(kind), at(chain, left)
+        held, now = lane.held(kind), chain.at(left)
         # Frames show the speed that is kept across the walls too.
         v = held.split_at(now, hold.drift(method.laws.moving, held, now, r), r, v).along
     lane.r, lane.v = r, v
@@ -143,9 +142,9 @@ def _retire(kind, method, chain, share, lanes, i, phase):
     v, keep = lane.v, lane.keep
     slid = phase != FLYING and phase != CAREFUL
     if not (slid and lane.left > 0.0):
-        v = with_kept(kind, at(chain, lane.left), lane)
+        v = with_kept(kind, chain.at(lane.left), lane)
     if phase == FLYING:
-        now, r = at(chain, lane.left), lane.r
+        now, r = chain.at(lane.left), lane.r
         u = wall_velocity(method.laws.moving, now, lane.first, r)
         v = events.off_the_wall(now, lane.first, r, v, u)
     put(share.state.position, 0, p, lane.r)

@@ -8,7 +8,6 @@ from ..contact import hold
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from ..surfaces import fold as walls
 from .table import STRIDE, Rows, copy_lane, table
 
 # What a step may end with.
@@ -133,18 +132,18 @@ def account(method, chain, state, lanes, i):
 def push(chain, state, lanes, i, first, second):
     """Impulses per mass to the walls that hold a lane."""
     lane, p = lanes.lane(i), lanes.particle[i]
-    state.impulse[walls.row(chain, lane.first), p] += first * state.mass[p]
+    state.impulse[chain.row(lane.first), p] += first * state.mass[p]
     if lane.second >= 0.0:
-        state.impulse[walls.row(chain, lane.second), p] += second * state.mass[p]
+        state.impulse[chain.row(lane.second), p] += second * state.mass[p]
 
 
 def work(chain, state, lanes, i, twice, second):
     """Book twice the work per mass of walls that move, and of it that of the second wall."""
     lane, p, behind = lanes.lane(i), lanes.particle[i], state.impulse.shape[0] // 2
     state.energy[p] = 0.5 * lane.twice
-    state.impulse[behind + walls.row(chain, lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+    state.impulse[behind + chain.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
     if lane.second >= 0.0:
-        state.impulse[behind + walls.row(chain, lane.second), p] += 0.5 * second * state.mass[p]
+        state.impulse[behind + chain.row(lane.second), p] += 0.5 * second * state.mass[p]
 
 
 def lose(state, lanes, i, twice):

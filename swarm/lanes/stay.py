@@ -11,8 +11,6 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, norm, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at, during
 from .compose import SLOWEST
 from .sliding import AGAIN, phase_of, push, work
 
@@ -37,12 +35,12 @@ def stay(kind, method, chain, gravity, state, lanes, i):
     """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
     lane = lanes.lane(i)
     left, first, r = lane.left, lane.first, lane.r
-    now = at(chain, left)
-    u, slowest = walls.velocity(now, first, r), SLOWEST * lane.scale2
+    now = chain.at(left)
+    u, slowest = now.velocity(first, r), SLOWEST * lane.scale2
     moves_on = square(lane.v - u) > slowest or _rubs(kind, method.laws, now, lane, r, slowest)
     if moves_on or not _rests(kind, method, now, gravity, lane, r):
         return phase_of(kind)
-    pace, low, high, met, paces = walls.shortest_pace(now), 0.0, 0.0, -1.0, 0.0
+    pace, low, high, met, paces = now.shortest_pace(), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
@@ -77,8 +75,8 @@ def stay(kind, method, chain, gravity, state, lanes, i):
         pressed += 0.5 * (one.n + two.n) * (end - start)
         pressed_second += 0.5 * (one.m + two.m) * (end - start)
     after = left - end
-    r1, then = _carried(chain, lane, end), at(chain, after)
-    v1 = walls.velocity(then, first, r1)
+    r1, then = _carried(chain, lane, end), chain.at(after)
+    v1 = then.velocity(first, r1)
     twice = square(v1) + 2.0 * potential(gravity, r1)
     given = twice - lane.twice
     lane.r, lane.v, lane.left, lane.twice, lane.keep = r1, v1, after, twice, 0.0
@@ -89,7 +87,7 @@ def stay(kind, method, chain, gravity, state, lanes, i):
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
         state.contacts.met[lanes.particle[i]] = met
-        lane.r = walls.settle(then, met, r1)
+        lane.r = then.settle(met, r1)
         return EVENT
     force = slides.force(method.laws, lane.held(kind), then, gravity, r1, v1)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
@@ -100,7 +98,7 @@ def _rubs(kind, laws, now, lane, r, slowest):
     """Whether the second wall has friction and slips on a lane that moves with the first one."""
     if not isinstance(kind, hold.Two):
         return False
-    slip = lane.v - walls.velocity(now, lane.second, r)
+    slip = lane.v - now.velocity(lane.second, r)
     return laws.friction_of(lane.second) > 0.0 and square(slip) > slowest
 
 
@@ -111,7 +109,7 @@ def _clear(kind, method, chain, lane, low, high):
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
-        start, then, path = at(chain, left - time), at(chain, left - end), _way(chain, lane, time, end)
+        start, then, path = chain.at(left - time), chain.at(left - end), _way(chain, lane, time, end)
         if not crossing.meets(start, then, held, path, near):
             if end == high:
                 return Clear(high, -1.0)
@@ -129,22 +127,22 @@ def _clear(kind, method, chain, lane, low, high):
 @outlined
 def _carried(chain, lane, t):
     """Where a lane that moves with its first wall is after a time."""
-    return walls.carry(during(chain, lane.left, lane.left - t), lane.first, lane.r)
+    return chain.during(lane.left, lane.left - t).carry(lane.first, lane.r)
 
 
 @outlined
 def _way(chain, lane, start, end):
     """The way of a lane that moves with its first wall, from one time to another."""
     r0, r1 = _carried(chain, lane, start), _carried(chain, lane, end)
-    v0 = walls.velocity(at(chain, lane.left - start), lane.first, r0)
-    v1 = walls.velocity(at(chain, lane.left - end), lane.first, r1)
+    v0 = chain.at(lane.left - start).velocity(lane.first, r0)
+    v1 = chain.at(lane.left - end).velocity(lane.first, r1)
     return crossing.Path(r0, v0, r1, v1, end - start)
 
 
 @outlined
 def _rests(kind, method, now, gravity, lane, r):
     """Whether a lane that moves with its first wall goes on to do so from here."""
-    force, acceleration = _force_at_rest(kind, method, now, gravity, lane, r), walls.acceleration(now, lane.first, r)
+    force, acceleration = _force_at_rest(kind, method, now, gravity, lane, r), now.acceleration(lane.first, r)
     pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
     pressed = not kind.lets_go(force.n, force.m)
     return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
@@ -153,13 +151,13 @@ def _rests(kind, method, now, gravity, lane, r):
 @outlined
 def _force_at_rest(kind, method, now, gravity, lane, r):
     """The force on a lane at r that moves with its first wall."""
-    u = walls.velocity(now, lane.first, r)
+    u = now.velocity(lane.first, r)
     return slides.force(method.laws, lane.held(kind), now, gravity, r, u)
 
 
 def _rests_later(kind, method, chain, gravity, lane, t):
-    return _rests(kind, method, at(chain, lane.left - t), gravity, lane, _carried(chain, lane, t))
+    return _rests(kind, method, chain.at(lane.left - t), gravity, lane, _carried(chain, lane, t))
 
 
 def _press_later(kind, method, chain, gravity, lane, t):
-    return _force_at_rest(kind, method, at(chain, lane.left - t), gravity, lane, _carried(chain, lane, t))
+    return _force_at_rest(kind, method, chain.at(lane.left - t), gravity, lane, _carried(chain, lane, t))

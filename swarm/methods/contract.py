@@ -23,7 +23,6 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
 from ..status import Status
-from ..surfaces.moving import at
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0
@@ -141,7 +140,7 @@ class MethodNumbers(Record):
 
         A method of steps takes all there are, to ask them over its step.
         """
-        return at(chain, left)
+        return chain.at(left)
 
     # --- Flight ---
 

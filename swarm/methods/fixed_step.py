@@ -18,9 +18,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import flights, safe
-from ..surfaces import fold as walls
 from ..surfaces.drive import drive_of
-from ..surfaces.moving import at, during
 from ..surfaces.surface import Surface
 from . import base, contract
 
@@ -179,15 +177,15 @@ class Steps(contract.MethodNumbers):
 
     def before(self: Any, chain, left):
         """The walls at the start of a step, with so many of the frame left."""
-        return at(chain, left * self.dt)
+        return chain.at(left * self.dt)
 
     def over(self: Any, chain, left):
         """The walls over that step."""
-        return during(chain, left * self.dt, (left - 1.0) * self.dt)
+        return chain.during(left * self.dt, (left - 1.0) * self.dt)
 
     def after(self: Any, chain, left):
         """The walls at the end of that step."""
-        return at(chain, (left - 1.0) * self.dt)
+        return chain.at((left - 1.0) * self.dt)
 
     def reach(self: Any, before, gravity, lane):
         """From r0 to the point whose force it takes, as if there were no wall."""
@@ -199,7 +197,7 @@ class Steps(contract.MethodNumbers):
 
     def work_along(self: Any, over, wall, force):
         """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-        return 0.0 if self.moving is None else dot(force, walls.way(over, wall))
+        return 0.0 if self.moving is None else dot(force, over.way(wall))
 
     def flight(self: Any, chain, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
@@ -212,8 +210,8 @@ class Steps(contract.MethodNumbers):
             lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
             lane.own,
         )  # fmt: skip
-        to_point = during(chain, start.left * dt, (start.left - self.point) * dt)
-        touched = walls.touched(to_point, start.r, self.reach(self.before(chain, start.left), gravity, start))
+        to_point = chain.during(start.left * dt, (start.left - self.point) * dt)
+        touched = to_point.touched(start.r, self.reach(self.before(chain, start.left), gravity, start))
         # Several walls at once, or nested solves: the careful way.
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
@@ -240,7 +238,7 @@ class Numbers(Steps):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
             return contract.refused(lane, Status.TOO_FAST.value)
         step = self.careful_step(chain, gravity, lane, lanes.impulse, i)
-        new = select(walls.outside(self.before(chain, lane.left), -1.0, lane.r), 0.0, 1.0)
+        new = select(self.before(chain, lane.left).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
         twice_energy = lane.own.twice_energy + 2.0 * step.work
         return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status

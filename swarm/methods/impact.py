@@ -18,7 +18,6 @@ from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from ..surfaces.surface import Surface
 from . import base, contract
 
@@ -261,11 +260,11 @@ class Chord(Reflection):
     # --- The unknown of a contact ---
 
     def most_sweeps(self, chain):
-        return walls.chord_sweeps(chain)
+        return chain.chord_sweeps()
 
     def guess(self, chain, gravity, lane, wall):
         h = self.step(lane)
-        return walls.chord_guess(chain, wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
+        return chain.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
 
     def improve(self, chain, gravity, lane, wall, solution, multiplier):
         p = displacement(gravity, lane.v, self.step(lane))

@@ -12,8 +12,6 @@ from ..contact.impulse import Step
 from ..kernel.arrays import scratch
 from ..kernel.jit import select
 from ..kernel.vector import Vec, norm
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from . import contract, fixed_step
 
 
@@ -42,7 +40,7 @@ class RuleNumbers(fixed_step.Numbers):
 
     def there(self, chain, lane):
         """The walls when the particle is at the point."""
-        return at(chain, (lane.left - self.point) * self.dt)
+        return chain.at((lane.left - self.point) * self.dt)
 
     def most_sweeps(self, chain):
         return implicit.SWEEPS
@@ -66,10 +64,10 @@ class RuleNumbers(fixed_step.Numbers):
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
         # Another wall at s, or an equation that is not solved yet: the careful way.
-        solved = (not solution.unsolved) & (not walls.outside(there, wall, point))
+        solved = (not solution.unsolved) & (not there.outside(wall, point))
         # The midpoint rule may end outside before it feels a force.
-        inside = not walls.outside(before, -1.0, lane.r)
-        new = inside & (touching | walls.outside(after, -1.0, step.r))
+        inside = not before.outside(-1.0, lane.r)
+        new = inside & (touching | after.outside(-1.0, step.r))
         # One wall alone has a part in the kick.
         work = self.work_along(over, wall, -1.0 / self.dt * step.kick)
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
@@ -78,7 +76,7 @@ class RuleNumbers(fixed_step.Numbers):
     def careful_step(self, chain, gravity, lane, impulse, i):
         before = self.before(chain, lane.left)
         free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
-        reactions = scratch((walls.length(chain), 4), np.float64)
+        reactions = scratch((chain.length(), 4), np.float64)
         point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(chain, lane), free, reactions)
         work = self.add_impulses(chain, lane, reactions, impulse, i)
         step = self.end(before, gravity, lane, point, corner.total(reactions))

@@ -15,7 +15,6 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
 from ..kernel.vector import norm
 from ..scene import Scene
-from ..surfaces import fold as walls
 from . import contract, fixed_step
 
 
@@ -104,25 +103,25 @@ class PenaltyNumbers(fixed_step.Numbers):
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
         step = self.free(gravity, lane)
         touching = wall >= 0.0
-        r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
+        r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
         # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-        g = walls.inner_gradient(over, wall, step.r, r1)
+        g = over.inner_gradient(wall, step.r, r1)
         f = select(touching, 2.0 / h * kappa, 0.0)
         v1 = accelerated(gravity, lane.v, h) - f * g
         work = self.work_along(over, wall, -f / h * g)
 
         # A push into another wall, or an equation that is not solved yet: the careful way.
         factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-        solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
-        solved = solved & (not walls.outside(after, wall, r1))
-        new = touching & (not walls.outside(over, -1.0, lane.r))
+        solved = balanced & (not solution.unsolved) & over.pushes(wall, kappa)
+        solved = solved & (not after.outside(wall, r1))
+        new = touching & (not over.outside(-1.0, lane.r))
         taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
         return fixed_step.contact(lane, wall, taken)
 
     def careful_step(self, chain, gravity, lane, impulse, i):
         h, step = self.dt, self.free(gravity, lane)
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
-        reactions = scratch((walls.length(chain), 4), np.float64)
+        reactions = scratch((chain.length(), 4), np.float64)
         r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
         corner.add_impulses(reactions, h, impulse, i)
         work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)

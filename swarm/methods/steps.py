@@ -23,7 +23,6 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import norm, square
 from ..status import Status
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from . import contract, fixed_step
 
 RAISE, COUNT, IMPACT = 0, 1, 2
@@ -109,7 +108,7 @@ class Numbers(fixed_step.Steps):
         cut, over = self.cut(lane.left), self.over(chain, lane.left)
         better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-        limited = uzawa.has_limit(over, wall, cut.law, lane.r)
+        limited = over.of(wall, False, uzawa.has_limit, cut.law, lane.r)
         return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
 
     def next_multiplier(self, left, acceleration, multiplier, record, before):
@@ -124,15 +123,15 @@ class Numbers(fixed_step.Steps):
         cut, kappa = self.cut(lane.left), solution.kappa
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
         h, p = cut.h, displacement(gravity, lane.v, cut.h)
-        r1 = walls.push(over, wall, lane.r, p, kappa)
-        g = walls.inner_gradient(over, wall, lane.r, r1)
+        r1 = over.push(wall, lane.r, p, kappa)
+        g = over.inner_gradient(wall, lane.r, r1)
         f = 2.0 / h * kappa
         work = self.work_along(over, wall, -f / h * g)
         v1 = accelerated(gravity, lane.v, h) - f * g
         given = abs(f) * norm(g)
 
         alone = self.is_alone(after, wall, lane.r, r1, kappa)
-        solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
+        solved = alone & (not solution.unsolved) & over.pushes(wall, kappa)
         touching = wall >= 0.0
         step = (lane.left > 0.0) & touching & solved
         budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
@@ -163,7 +162,7 @@ class Numbers(fixed_step.Steps):
         free = self.free(gravity, lane, h)
         if self.is_too_fast(free.p):
             return contract.refused(lane, Status.TOO_FAST.value)
-        reactions = scratch((walls.length(chain), 4), np.float64)
+        reactions = scratch((chain.length(), 4), np.float64)
         end = uzawa.loop(self, cut.law, over, free, reactions)
         record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
         record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
@@ -205,10 +204,10 @@ class FixedSteps(Numbers):
         return Cut(self.dt, 1.0, self.law)
 
     def is_new(self, chain, r):
-        return not walls.outside(chain, -1.0, r)
+        return not chain.outside(-1.0, r)
 
     def is_alone(self, chain, wall, r0, r1, kappa):
-        return not walls.outside(chain, wall, r1)
+        return not chain.outside(wall, r1)
 
     @outlined
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
@@ -252,12 +251,12 @@ class CutSteps(Numbers):
 
     def is_blocked(self, chain, wall, r, p):
         kappa = chord(chain, wall, r, p)
-        r1 = walls.push(chain, wall, r, p, kappa)
+        r1 = chain.push(wall, r, p, kappa)
         other = flights.other_hit(chain, wall, r, r1 - r)
         # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-        later = other.time <= 1.0 and not uzawa.has_limit(chain, other.wall, self.law, r)
+        later = other.time <= 1.0 and not chain.of(other.wall, False, uzawa.has_limit, self.law, r)
         later = later or uzawa.meets_later(chain, wall, self.law, r, p)
-        return not walls.pushes(chain, wall, kappa) or kappa == 0.0 or later
+        return not chain.pushes(wall, kappa) or kappa == 0.0 or later
 
     @outlined
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
@@ -275,4 +274,4 @@ class CutSteps(Numbers):
         # A hit in the last instant of a frame is met again in the next one.
         met = met & (hit.wall >= 0.0) & (left > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-        return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+        return contract.Flight(select(met, chain.settle(hit.wall, r), r), lane.v, left, select(met, wall, -1.0))

@@ -8,7 +8,6 @@ from ..contact.force import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
-from ..surfaces import fold as walls
 from . import fixed_step
 
 
@@ -75,7 +74,7 @@ class VerletNumbers(fixed_step.Numbers):
 
     def contact(self, chain, gravity, lane, wall, solution):
         step = self.step(chain, gravity, lane)
-        new = (wall >= 0.0) & (not walls.outside(self.before(chain, lane.left), -1.0, lane.r))
+        new = (wall >= 0.0) & (not self.before(chain, lane.left).outside(-1.0, lane.r))
         taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
         return fixed_step.contact(lane, wall, taken)
 

@@ -13,10 +13,10 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
 from ..surfaces import flights, safe
 from ..surfaces.drive import Drive, Pose, Swing
-from ..surfaces.fold import Chain
 from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
 from ..surfaces.relative import flight_of
+from ..surfaces.walls import Walls
 from .reach import Seen, reach_of
 
 
@@ -58,7 +58,7 @@ class Falling(Posed):
         return self.body.falling_hit(way, speed, pull - self.pose.acceleration)
 
 
-_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+_AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 class Freedom(Record):
@@ -109,7 +109,7 @@ class Freedom(Record):
 
 def march(wall, flight, longest):
     """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
-    found = safe.march(Chain(wall, None), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    found = safe.march(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
     return found.time, found.wall >= 0.0
 
 
@@ -222,7 +222,7 @@ class Sprung(Shifted):
         away, speed = found.shift - self.pull / (rate * rate), found.velocity / rate
         most = math.sqrt(square(away) + square(speed))
         bounds = rate * most, rate * rate * most, rate * rate * rate * most
-        swings, jerks = Chain(Swing(away, speed, rate), None), Vec(bounds[2], bounds[2], bounds[2])
+        swings, jerks = (Swing(away, speed, rate),), Vec(bounds[2], bounds[2], bounds[2])
         return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
 
     def hardest(self, walls):

@@ -19,8 +19,7 @@ from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
-from ..surfaces.flights import NEVER
-from ..surfaces.moving import Marched, at
+from ..surfaces.moving import Marched
 from .freedoms import Flight
 from .walls import all_stay, first_hit, reach_of_all, renew_all, settle_all, strike
 
@@ -82,11 +81,9 @@ class Rule(NamedTuple):
 
 def _given_hit(chain, gravity, r, v, left):
     """The first hit with the walls that do not react."""
-    if chain is None:
-        return NEVER
     if isinstance(chain, Marched):
         return safe.first_hit(chain, gravity, r, v, left)
-    return flights.first_hit(at(chain, left), gravity, r, v)
+    return flights.first_hit(chain.at(left), gravity, r, v)
 
 
 def _aim(scenery, queue, i, end):
@@ -135,7 +132,7 @@ def _bounce(scenery, queue, i, wall, left):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
     energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    bounce = exact(scenery.laws, at(scenery.given, left), scenery.pull, wall, r, v, energy)
+    bounce = exact(scenery.laws, scenery.given.at(left), scenery.pull, wall, r, v, energy)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
     queue.impulse[owner, i] += m * bounce.impulse

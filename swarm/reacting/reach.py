@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from ..kernel.jit import select
 from ..kernel.vector import Vec, dot, norm, square
 from ..surfaces.course import rise_time
-from ..surfaces.fold import each
 from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
@@ -40,8 +39,8 @@ def clear_of(body, r):
     if isinstance(body, SolidNumbers):
         # How far the point is out of the part that it is farthest from.
         clear = 0.0
-        for part in reversed(each(body.parts)):
-            clear = max(_out_of(part.first, r), clear)
+        for part in reversed(body.parts):
+            clear = max(_out_of(part, r), clear)
         return clear
     return body.clearance(r)
 

@@ -14,7 +14,6 @@ from ..errors import SceneError
 from . import approach, march, newton
 from .contract import Smooth
 from .fields.members import Members
-from .fold import each
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface
@@ -69,8 +68,8 @@ def _asked_of(wall: Any, asked: tuple[str, ...]) -> Iterator[tuple[Any, tuple[st
     yield wall, asked
     if isinstance(wall, SolidNumbers):
         falls = tuple(one for one in asked if one in ("falling_hit", "safe_time"))
-        for link in each(wall.parts):
-            yield from _asked_of(link.first, (*_OF_PARTS, *falls))
+        for part in wall.parts:
+            yield from _asked_of(part, (*_OF_PARTS, *falls))
 
 
 def _lacking(wall: Any, name: str) -> Iterator[str]:

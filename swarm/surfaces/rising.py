@@ -15,7 +15,6 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, norm, square, times, total
 from .course import rise_time
-from .fold import each
 from .levels import Between, Level
 from .relative import Bounds, Seen
 from .rotation import Rotated
@@ -141,8 +140,7 @@ def _slab_step(body, seen, longest):
 def _entry_step(body, seen, longest):
     """Of the part that the particle is least deep in: outside of one part is outside of the body."""
     found = Step(math.inf, 0.0, 0.0)
-    for link in reversed(each(body.parts)):
-        part = link.first
+    for part in reversed(body.parts):
         here = safe_step(part, seen, longest)
         # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
         depth = part.gap_of(part.inner(seen.r))

@@ -14,7 +14,7 @@ from swarm.contact import impulse
 from swarm.contact import regularisation as laws
 from swarm.contact.impulse import Step
 from swarm.kernel.vector import Vec, vec
-from swarm.surfaces.fold import Chain
+from swarm.surfaces.walls import Walls
 
 mp.mp.dps = 50
 some_laws = pytest.mark.parametrize("law", [LAWS["1.0"], LAWS["1.5"], LAWS["2.0"]], ids=["1", "1.5", "2"])
@@ -132,7 +132,7 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
     """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""
     step = Contact(name, law, **step, reachable=True)
-    chain = Chain(step.surface, None)
+    chain = Walls((step.surface,))
     expected, _ = step.careful()
     kappa, unsolved = call(impulse.guess, chain, 0, law, step.step()), True
     for _ in range(impulse.NEWTON_STEPS):

@@ -8,7 +8,6 @@ from ...kernel.arrays import next_of, scratch
 from ...kernel.jit import long_kernel, select
 from ...kernel.vector import Vec
 from ...status import Status
-from ...surfaces import fold as walls
 from . import blow, hold, instant, lead
 from .arrays import PACES, Held, Lanes, Pace
 from .contacts import point_of
@@ -258,12 +257,12 @@ def _look(touching, chains, lanes, pace, c):
                         for i in range(count):
                             c[x, i] += b * lanes.r1[q, x, i]
         for i in range(count):
-            pace.out[i] = pace.out[i] | walls.outside(chains[0], -1.0, Vec(c[0, i], c[1, i], c[2, i]))
+            pace.out[i] = pace.out[i] | chains[0].outside(-1.0, Vec(c[0, i], c[1, i], c[2, i]))
     # What a point carries is looked at one body after the other: a wall of thousands of bodies is none of theirs.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):
-            pace.out[i] = pace.out[i] | (walls.distance(chains[1], wall, point_of(touching, lanes.r1, k, i)) > 0.0)
+            pace.out[i] = pace.out[i] | (chains[1].distance(wall, point_of(touching, lanes.r1, k, i)) > 0.0)
 
 
 def _commit(lanes, pace, whole):

@@ -7,7 +7,6 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import Vec, dot
-from ...surfaces import fold as walls
 from .contacts import MOST_CONTACTS, direction, near, point_of, width
 
 # Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
@@ -108,7 +107,7 @@ def _blow(body, chain, lanes, state, contacts, bounces, which):
     _apply(body, (name, frame, wide), across, (answer, p), v, i)
     lost = 0.0
     for a in range(found):
-        state.impulse[walls.row(chain, float(name[a, 1])), number] += p[wide * a]
+        state.impulse[chain.row(float(name[a, 1])), number] += p[wide * a]
         if p[wide * a] > 0.0:
             state.impacts[number] += 1
     if bounces == 0.0 or not _is_elastic(touching, (name, found)):
@@ -164,7 +163,7 @@ def _rigid(body, chain, r, i, rows):
     for a in range(system.shape[0]):
         y = _velocity(body, r, a, i)
         if a >= ties.links:
-            y = walls.unit_normal(chain, float(touching.walls + a - ties.links), y)
+            y = chain.unit_normal(float(touching.walls + a - ties.links), y)
         across[a, 0], across[a, 1], across[a, 2] = y.x, y.y, y.z
         for b in range(a + 1):
             s = ties.couplings[_name(body, a), _name(body, b)] * dot(y, _vector(across, b))

@@ -2,7 +2,6 @@
 
 from ...kernel.jit import outlined
 from ...kernel.vector import Vec, dot
-from ...surfaces import fold as walls
 from .contacts import point_of
 
 
@@ -13,7 +12,7 @@ def turn(body, chain, lanes, i, r1):
     for g in range(touching.guides):
         k, row = touching.points + g, tied.ends.shape[0] + g
         y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i)
-        n = walls.step_normal(chain, float(touching.walls + g), y0, y1)
+        n = chain.step_normal(float(touching.walls + g), y0, y1)
         lanes.d[row, 0, i], lanes.d[row, 1, i], lanes.d[row, 2, i] = n.x, n.y, n.z
 
 
@@ -26,9 +25,9 @@ def guide(body, chain, lanes, pace, i):
     for g in range(touching.guides):
         k, row, wall = touching.points + g, count + g, float(touching.walls + g)
         y0, y1 = point_of(touching, lanes.ra, k, i), point_of(touching, lanes.r1, k, i)
-        n = walls.unit_normal(chain, wall, y1)
+        n = chain.unit_normal(wall, y1)
         lanes.y1[row, 0, i], lanes.y1[row, 1, i], lanes.y1[row, 2, i] = n.x, n.y, n.z
-        lanes.f[row, i] = dot(vector_of(lanes.d, row, i), y1 - y0) + walls.distance(chain, wall, y0)
+        lanes.f[row, i] = dot(vector_of(lanes.d, row, i), y1 - y0) + chain.distance(wall, y0)
         for other in range(tied.start[row], row + 1):
             c = half * tied.couplings[row + touching.points, name_of(body, other)]
             lanes.a[row, other, i] = c * dot(n, vector_of(lanes.d, other, i))

@@ -14,7 +14,6 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import Vec, cross, dot, norm
-from ...surfaces import fold as walls
 from . import blow, instant
 from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, near, point_of, width
 from .contract import Contacts
@@ -201,7 +200,7 @@ class HardContacts(Contacts):
         frame = held.frame[i]
         for a in range(pace.held[i]):
             k, wall = held.name[i, a, 0], held.name[i, a, 1]
-            n = walls.step_normal(chain, float(wall), point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
+            n = chain.step_normal(float(wall), point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
             frame[a, 0, 0], frame[a, 0, 1], frame[a, 0, 2] = n.x, n.y, n.z
             if touching.friction[wall] > 0.0:
                 t = Vec(frame[a, 1, 0], frame[a, 1, 1], frame[a, 1, 2])
@@ -229,7 +228,7 @@ class HardContacts(Contacts):
             for d in range(wide):
                 gap[wide * a + d] = dot(direction(held.frame[i], 3 * a + d), y1 - y0)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
-            away = walls.distance(chain, float(wall), y0)
+            away = chain.distance(float(wall), y0)
             gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
             off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)
@@ -247,7 +246,7 @@ class HardContacts(Contacts):
         pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
     def gap_gradient(self: Any, wall, y):
-        return walls.unit_normal(self.chain, wall, y)
+        return self.chain.unit_normal(wall, y)
 
     @outlined
     def judge(self: Any, i):
@@ -261,7 +260,7 @@ class HardContacts(Contacts):
         number, pushes = pace.body[i], False
         for a in range(pace.held[i]):
             pushes = pushes or held.press[i, 3 * a] > 0.0
-            state.impulse[walls.row(chain, float(held.name[i, a, 1])), number] += held.impulse[i, a]
+            state.impulse[chain.row(float(held.name[i, a, 1])), number] += held.impulse[i, a]
         state.dissipated[number] += held.lost[i]
         state.sliding[number] += pace.step[i]
         if not pushes:

@@ -16,7 +16,6 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import ZERO, square
-from ...surfaces import fold as walls
 from . import hold, instant
 from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, index_of, near, point_of, solve_dense, span
 from .contract import Contacts
@@ -32,9 +31,19 @@ class Soft(NamedTuple):
     deepest: float  # gap [m] that stores the tolerance
 
 
+def _normal(chain, wall, r0, r1):
+    """The discrete gradient of the gap of a wall."""
+    return chain.of(wall, ZERO, _normal_of, r0, r1)
+
+
 def _normal_of(surface, r0, r1):
     rise, _curvature = surface.gap_slope(surface.inner(r0), surface.inner(r1))
     return rise * surface.inner_gradient(r0, r1)
+
+
+def _gap(chain, wall, r):
+    """The gap of a wall."""
+    return chain.of(wall, 0.0, _gap_of, r)
 
 
 def _gap_of(surface, r):
@@ -47,10 +56,6 @@ _PATIENT, _LARGER = 30, 1e2
 _ROUND_OFF = 8.0
 # By how much the directions of ties may still change, in units of round-off of a place.
 _SETTLED = 8.0
-
-# The discrete gradient of a gap, and the gap.
-_normal = walls.of_wall(_normal_of, ZERO)
-_gap = walls.of_wall(_gap_of, 0.0)
 
 
 def _lengths(ties, lanes, a, i):
