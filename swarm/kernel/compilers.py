@@ -16,7 +16,7 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-# Frames that a trace may nest, in less than 512 kB of a stack for 1600.
+# Frames that a trace may nest; 1600 take less than 512 kB of a stack.
 _DEEPEST = 10_000
 
 # LLVM's levels: for one function by itself, and for a module.
