@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact import corner, reflection, uzawa
-from .contact.records import Step
+from .contact.impulse import Step
 from .contact.regularisation import regularisation
 from .errors import RunError, SceneError
 from .kernel.gravity import accelerated, displacement

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contact.energy import contact_energy
+from .kernel.arrays import scratch
 from .kernel.gravity import potential
-from .kernel.jit import kernel, scratch, select
+from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .particles import Floats, State, has_escaped
 from .scene import Scene

@@ -8,7 +8,7 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, largest, norm
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction
-from .records import Step
+from .impulse import Step
 
 _EPSILON = 2.220446049250313e-16
 # Sweeps over the walls; a corner of 90 degrees takes three.
@@ -98,5 +98,5 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
 def constraints(chain, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
     for k, wall in enumerate(chain.walls):
-        start = contact_impulse.start_gap(0.0, wall, r, wall.inner(r))
+        start = contact_impulse.start_of(0.0, wall, r)
         into[k] = law.constraint(start.gap)

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, square
 from ..surfaces.fields.grid import block_of, in_block, size_of
@@ -46,7 +47,7 @@ def meets(chain, ends, held, path, near):
 
 @outlined
 def _meets_one(field, ends, number, held, path, near):
-    """The same of the bodies of a field that has so many walls before it."""
+    """`meets` of the bodies of a field that has so many walls before it."""
     grid = members_of(field).grid
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
@@ -136,7 +137,7 @@ def arrival(chain, held, path, near, left):
 
 @outlined
 def _first_of(members, number, held, path, near, later):
-    """The first of that and of all that a step meets of a field that has so many walls before it."""
+    """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
     grid, found = members.grid, later
     block = block_of_path(grid, path, near)
     for k in range(size_of(block)):
@@ -166,7 +167,7 @@ def _arrival_later(chain, held, path, near, left):
 
 @outlined
 def _arrival_among(field, ends, chain, number, held, path, near, left):
-    """The same at the bodies of a field, which is `ends` at the end of the step."""
+    """`arrival` at the bodies of a field, which is `ends` at the end of the step."""
     found = Arrival(math.inf, -1.0)
     grid = members_of(field).grid
     block = block_of_path(grid, own_path(field, ends, path), near)
@@ -254,7 +255,7 @@ def bisected(has_happened, given, low, high):
 
 
 def at_part(path, s):
-    """Where the cubic through both ends of a step is."""
+    """The place on the cubic through both ends of a step."""
     r0, a, b, c = cubic(path)
     return r0 + s * (a + s * (b + s * c))
 

@@ -37,7 +37,7 @@ def contact_energy(law, chain, over_mass, r):
 
 
 def energy_uncertainty(chain, law, over_mass, r, s):
-    """How far the stored energy per mass moves when each coordinate of r moves by that of s, to first order.
+    """The change of the stored energy per mass when each coordinate of r moves by that of s, to first order.
 
     With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
     """

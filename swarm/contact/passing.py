@@ -1,14 +1,14 @@
-"""Where a particle comes into an opening of its wall, and closed walls at the same place, which close it."""
+"""Particles that come into openings of their walls, and closed walls at the same place, which close these."""
 
 import math
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
 from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
 from ..surfaces.openings import is_open, outside
 from ..surfaces.walls import Field
-from . import laws as wall_laws
 from .crossing import at_part, bisected, block_of_path
 from .events import TOUCH
 from .reflection import relative, wall_velocity
@@ -51,7 +51,7 @@ def hit_wall(openings, rules, chain, motion, wall, near):
     r, v = motion
     if not is_open(openings, wall, r, near):
         return wall
-    moving, touch = wall_laws.moving(rules.laws), TOUCH * rules.size + near
+    moving, touch = rules.laws.moving, TOUCH * rules.size + near
     number = numbers_near(chain, r)
     found, soonest = wall, math.inf
     for i in range(number.size):
@@ -131,7 +131,7 @@ def part_until_open(openings, rules, chain, held, path, near):
 
 @outlined
 def _part_uncovered(openings, rules, chain, wall, path, near):
-    """The same of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
+    """`part_until_open` of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
     low = _part(openings, wall, path, near)
     if not low < math.inf or not _is_covered(openings, rules, chain, wall, at_part(path, low), near):
         return low
@@ -177,7 +177,7 @@ def _way_into_any(members, path, near):
 
 @outlined
 def _way_in(volume, path, near):
-    """The same of one volume, whose distance is looked at at some places of the step and where it is least."""
+    """`_way_into` of one volume, whose distance is looked at at some places of the step and where it is least."""
     reach = _reach(path)
     if not outside(volume, path.r1) <= reach:
         return math.inf

@@ -1,4 +1,4 @@
-"""P, the projection of a vector on what no touched wall forbids: a half-space, the edge of two walls, a corner."""
+"""P, the projection of a vector on the directions that touched walls allow: a half-space, an edge, a corner."""
 
 import math
 from typing import Any
@@ -26,7 +26,7 @@ class Touch(Record):
 
 
 class Edge(Record):
-    """Of two walls i and j: e along their edge, m = e x n_i, and n_j = cosine n_i + sine m."""
+    """The edge of two walls i and j: e along their edge, m = e x n_i, and n_j = cosine n_i + sine m."""
 
     e: Vec
     m: Vec

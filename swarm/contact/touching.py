@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import flights
 from ..surfaces.near import count_near, list_near, until_others
-from . import laws as wall_laws
 from . import reflection
+from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
@@ -34,10 +35,10 @@ NEEDS = ("first_hit", "unit_normal", "inner_gradient", "distance", "settle")
 
 
 class Contacts(Record):
-    """How impacts are taken."""
+    """The settings of an impact."""
 
     contact_step: Any  # None or h
-    laws: Any  # None or `Laws`
+    laws: Laws
     shortest: float  # flight: the particle slides instead of shorter ones [s]
     touch: float  # distance within which walls hold a sliding particle too [m]
 
@@ -51,7 +52,7 @@ class Moving(Record):
 
 
 class Landing(Record):
-    """The particle after the impact, the time it took, and twice its energy per mass."""
+    """A particle after its impact, the time it took, and twice its energy per mass."""
 
     r: Vec
     v: Vec
@@ -96,7 +97,7 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
-    laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
+    laws, r, moving = method.laws, flight.r, method.laws.moving
     carried, chain = chain, chain.at(flight.left)
     number = numbers_near(chain, r)
     count = number.size
@@ -225,11 +226,11 @@ def _landed(laws, chain, touch, given, r, v, twice_energy):
     Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
     would reflect the rest.
     """
-    if laws is None:
+    if not laws.change_energy:
         return v, twice_energy
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
-        lossy[i] = touch.touched[i] and 1.0 + wall_laws.restitution_of(laws, touch.number[i]) < 2.0
+        lossy[i] = touch.touched[i] and 1.0 + laws.restitution_of(touch.number[i]) < 2.0
     put_normals(chain, touch, lossy, r, r)
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u

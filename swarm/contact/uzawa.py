@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.arrays import scratch
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec
 from . import corner, impulse
@@ -39,21 +40,17 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
     return multiplier + miss * select(use, stretch * (1.0 - _SHORT), 1.0)
 
 
-def _start_of(surface, r):
-    return impulse.start_gap(0.0, surface, r, surface.inner(r))
-
-
 def has_limit(surface, law, r):
     """Whether the loop has a limit: State I with Phi'(0) > 0.
 
     Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
     """
-    return (_start_of(surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
+    return (impulse.start_of(0.0, surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
 
 def multiplier_of(surface, law, r, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
-    start = _start_of(surface, r)
+    start = impulse.start_of(0.0, surface, r)
     slope, _curvature = surface.gap_slope(start.q, start.q)
     return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 

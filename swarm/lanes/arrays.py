@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..contact.events import ARRIVED, EVENT
-from ..contact.laws import loses
 from ..contact.uzawa import RECORDS
-from ..kernel.jit import Array, index, next_of, outlined, select
+from ..kernel.arrays import index, next_of
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
@@ -247,7 +247,7 @@ def retire(method, chain, lanes, k, share):
     if method.dissipates:
         # Each particle knows its energy: what it has lost is accounted for with it.
         now = 0.5 * lane.twice
-        if loses(method.laws):
+        if method.laws.loses:
             state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, lanes.impulse, k))
         state.energy[i] = now
     phase = ARRIVED if state.contacts is None else _phase_after(state.contacts, i, lane.left, lanes.wall[k])

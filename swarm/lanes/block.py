@@ -9,8 +9,9 @@ import numpy as np
 
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
+from ..kernel.arrays import index
 from ..kernel.gravity import potential
-from ..kernel.jit import index, kernel, outlined, select
+from ..kernel.jit import kernel, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import put, square
 from ..methods import contract as methods
@@ -161,7 +162,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
         solve(method, chain, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if method.thermal is not None:
+    if method.laws.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
     some_arrived, some_hard = False, False

@@ -12,8 +12,9 @@ from ..contact import crossing, events
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
 from ..surfaces.near import count_near, list_near
@@ -83,7 +84,7 @@ def _corner(laws, chain, gravity, held, r, least):
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
     # What is left of the pull in the frame of the particle
     rest = _solved(a, b, c, *(chain.outward_acceleration(wall, r, u, pull) for wall in held))
-    friction = wall_laws.friction(laws)
+    friction = laws.friction
     p, q, s = tuple(_force(friction, *one) for one in zip(held, (a, b, c), (u - v, u - w, u - x), strict=True))
     load = _parts(p, q, s, rest)
     holds = (load.x > least) & (load.y > least) & (load.z > least)
@@ -136,7 +137,7 @@ def is_carried(method, chain, gravity, p):
     if held.first < 0.0:
         return False
     u = _corner(method.laws, now, gravity, held, p.r, 0.0).u
-    part = events.GRAZING if wall_laws.loses(method.laws) else _NO_SPEED
+    part = events.GRAZING if method.laws.loses else _NO_SPEED
     return square(p.v - u) <= part * part * events.own_speed2(p)
 
 

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from ..contact import crossing, hold
-from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.passing import may_pass
 from ..contact.reflection import relative, wall_velocity
@@ -23,7 +22,7 @@ SLOWEST = 1e-24
 
 def compose(kind, method, chain, gravity, lanes, live):
     """One composed step of every live lane, from its r, v and a to its r1 and v1."""
-    friction, moving = method.friction, wall_laws.moving(method.laws)
+    friction, moving = method.laws.friction, method.laws.moving
     rubs = friction is not None
     for i in range(live):
         _start(method, chain, gravity, lanes, i)
@@ -96,7 +95,7 @@ def _start(method, chain, gravity, lanes, i):
 
 def _longest(method, chain, wall, motion):
     """A time within which a particle that slides with friction surely does not stop on its first wall."""
-    (r, v, a), friction = motion, method.friction
+    (r, v, a), friction = motion, method.laws.friction
     if moves(method):
         v, a = v - chain.velocity(wall, r), a - chain.acceleration(wall, r)
     return slides.longest(friction, v, a)
@@ -132,7 +131,7 @@ def end_steps(kind, method, chain, gravity, lanes, live):
 
 def _end_step(kind, method, chain, gravity, lanes, i):
     lane, laws = lanes.lane(i), method.laws
-    moving, held = wall_laws.moving(laws), lane.held(kind)
+    moving, held = laws.moving, lane.held(kind)
     start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
@@ -168,7 +167,7 @@ def _end_step(kind, method, chain, gravity, lanes, i):
     lane.r, lane.v, lane.a = either(fine, r1, r0), either(fine, v1, v0), either(fine, force.acceleration, a0)
     lane.press = select(fine, force.n, lane.press)
     lane.press_second = select(fine, force.m, lane.press_second)
-    if wall_laws.friction(laws) is not None:
+    if laws.friction is not None:
         slip = relative(wall_velocity(moving, now, lane.first, r1), v1)
         lanes.event[i] |= select(fine & (square(slip) <= SLOWEST * scale2), STOPPED, 0)
     # Near an apex steps become shorter without end, in time or, of a slow particle, in length.

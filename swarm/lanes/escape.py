@@ -2,7 +2,8 @@
 
 from ..contact import crossing
 from ..contact.passing import hit_wall, open_wall_at, open_wall_of
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import column
 from ..surfaces.openings import is_open
 from . import log as impact_log

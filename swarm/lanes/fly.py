@@ -1,6 +1,6 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
-from ..kernel.jit import index
+from ..kernel.arrays import index
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.moving import Carried, Marched, Strided

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contact import laws as wall_laws
 from ..contact.reflection import relative, wall_velocity
-from ..kernel.jit import Array, index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
 from .table import LANES, Rows
@@ -172,7 +172,7 @@ def _add(log, method, chain, state, particle, struck):
     k = _add_struck(log, state, particle, struck)
     if log.slip is not None:
         now = chain.at(struck.left)
-        u = wall_velocity(wall_laws.moving(method.laws), now, struck.wall, struck.r)
+        u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
         n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
         _put(log.slip, k, before - dot(before, n) * n)
 

@@ -3,13 +3,13 @@
 import numpy as np
 
 from ..contact import events, touching
-from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
 from ..contact.reflection import given, wall_velocity
+from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
-from ..kernel.jit import long_kernel, outlined, scratch
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
@@ -71,7 +71,7 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    is_hot = method.thermal is not None
+    is_hot = method.laws.thermal is not None
     if is_hot and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
     settles = _settles(method, carried, gravity, p)
@@ -90,9 +90,9 @@ def _decide(method, chain, gravity, share, i):
         for watch in share.watches():
             watch.add_row(method, carried, state, i, struck)
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
-        _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
-    u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
-    book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), wall_laws.loses(method.laws))
+        _spare(method.laws.moving, chain, state, i, found, wall)
+    u = wall_velocity(method.laws.moving, chain, wall, r)
+    book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), method.laws.loses)
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
     if phase == FLYING:
@@ -112,7 +112,7 @@ def _decide(method, chain, gravity, share, i):
 
 def _settles(method, chain, gravity, p):
     """Whether the walls around a particle hold it."""
-    if wall_laws.moving(method.laws) is not None:
+    if method.laws.moving is not None:
         return is_carried(method, chain, gravity, p)
     return events.settles(method, chain, gravity, p, scratch((2, chain.length()), np.float64))
 
@@ -201,7 +201,7 @@ def careful_block(method, chain, gravity, share):
 def _rest(method, chain, gravity, share, i, p, held):
     """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
-    loses = method.laws is not None
+    loses = method.laws.change_energy
     for s in range(held.shape[1]):
         taken = held[1, s] if loses else 0.0
         contacts.load[s, i] = held[0, s]
@@ -231,11 +231,11 @@ def _step(method, chain, gravity, share, i):
         return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, chain.length()), np.float64)
-    if wall_laws.moving(method.laws) is None and events.settles(method, now, gravity, p, held):
+    if method.laws.moving is None and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
         return
     # Step by step, where places on its way are looked at.
-    if wall_laws.moving(method.laws) is not None and state.openings is None and state.period is None:
+    if method.laws.moving is not None and state.openings is None and state.period is None:
         phase = carry(method, chain, gravity, state, i, p)
         if phase != NOT_CARRIED:
             contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
@@ -256,7 +256,7 @@ def _step(method, chain, gravity, share, i):
     for s in range(chain.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
-    book_step(chain, state, i, contacts.met[i], change, given_work, wall_laws.loses(method.laws))
+    book_step(chain, state, i, contacts.met[i], change, given_work, method.laws.loses)
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import copy_row, index, scratch, select
+from ..kernel.arrays import copy_row, index, scratch
+from ..kernel.jit import select
 from ..kernel.record import Record
 from ..surfaces.fields.members import gathered, width
 from ..surfaces.moving import Carried

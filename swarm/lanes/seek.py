@@ -6,7 +6,8 @@ the tables, whose rows are looked up, and vectorises nothing.
 
 import numpy as np
 
-from ..kernel.jit import Array, copy_row, index, outlined, select, unwritten
+from ..kernel.arrays import copy_row, index, unwritten
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import flights

@@ -8,10 +8,10 @@ ends at the instant to round-off. A lane writes what it gives its walls step by 
 import numpy as np
 
 from ..contact import events, hold
-from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
-from ..kernel.jit import index, long_kernel, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
 from .arrays import following_particle, goes_on_by, speed2_scale
@@ -124,7 +124,7 @@ def _load(kind, method, chain, gravity, share, lanes, i, p):
     if begins:
         held, now = lane.held(kind), chain.at(left)
         # Frames show the speed that is kept across the walls too.
-        v = held.split_at(now, hold.drift(wall_laws.moving(method.laws), held, now, r), r, v).along
+        v = held.split_at(now, hold.drift(method.laws.moving, held, now, r), r, v).along
     lane.r, lane.v = r, v
     phase = set_going(kind, method, chain, gravity, state, lanes, i)
     if phase != phase_of(kind):
@@ -145,7 +145,7 @@ def _retire(kind, method, chain, share, lanes, i, phase):
         v = with_kept(kind, chain.at(lane.left), lane)
     if phase == FLYING:
         now, r = chain.at(lane.left), lane.r
-        u = wall_velocity(wall_laws.moving(method.laws), now, lane.first, r)
+        u = wall_velocity(method.laws.moving, now, lane.first, r)
         v = events.off_the_wall(now, lane.first, r, v, u)
     put(share.state.position, 0, p, lane.r)
     put(share.state.velocity, 0, p, v)

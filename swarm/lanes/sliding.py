@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from ..contact import hold
-from ..contact import laws as wall_laws
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
@@ -99,7 +98,7 @@ def phase_of(kind):
 
 def moves(method):
     """Whether a wall moves: a constant for the compiler."""
-    return wall_laws.moving(method.laws) is not None
+    return method.laws.moving is not None
 
 
 @outlined
@@ -124,7 +123,7 @@ def account(method, chain, state, lanes, i):
     state.contacts.sliding[lanes.particle[i]] += lane.h
     push(chain, state, lanes, i, lane.impulse, lane.impulse_second)
     lane.trials = 0.0
-    if method.friction is not None:
+    if method.laws.friction is not None:
         lose(state, lanes, i, lane.work)
     if moves(method):
         work(chain, state, lanes, i, lanes.gained[i], lane.given_by_second)

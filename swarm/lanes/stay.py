@@ -4,7 +4,6 @@ Until then another wall may come, and strike it.
 """
 
 from ..contact import crossing, hold
-from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.events import ARRIVED, EVENT
 from ..contact.projection import ALLOWED
@@ -100,7 +99,7 @@ def _rubs(kind, laws, now, lane, r, slowest):
     if not isinstance(kind, hold.Two):
         return False
     slip = lane.v - now.velocity(lane.second, r)
-    return wall_laws.of_wall(wall_laws.friction(laws), lane.second) > 0.0 and square(slip) > slowest
+    return laws.friction_of(lane.second) > 0.0 and square(slip) > slowest
 
 
 @outlined

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel.jit import index, spaced
+from ..kernel.arrays import index, spaced
 from ..kernel.vector import column, put
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.

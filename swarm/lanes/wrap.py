@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..contact.events import ARRIVED, EDGE, FLYING, HELD
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import column, dot, put
 from ..surfaces.axes import length_of
 from ..surfaces.period import has_left, into, keeps_walls

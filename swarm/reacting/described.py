@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.laws import NONE
 from ..kernel.vector import Vec, vec
 from ..motion import Guide, Rotation, Translation, pose, unit_axis
 from ..scene import Scene
@@ -27,7 +28,7 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
         Walls(()) if given is None else given.chain(moment),
-        None if given is None else given.laws(),
+        (given.laws() if given else None) or NONE,
         np.flatnonzero(~reacts),
         _reacting(scene),
         scene.pull(),

@@ -1,4 +1,4 @@
-"""How a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
+"""The ways in which a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
 
 Between two impacts its motion is known. What impacts may make of it is bounded by a lease: until the wall has left it,
 the velocity stays within a width of a middle one, so that what was said of far particles holds.
@@ -7,7 +7,8 @@ the velocity stays within a width of a middle one, so that what was said of far 
 import math
 from typing import Any, NamedTuple, cast
 
-from ..kernel.jit import Array, index, select
+from ..kernel.arrays import index
+from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
 from ..surfaces import flights, safe
@@ -61,7 +62,7 @@ _AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf
 
 
 class Freedom(Record):
-    """How a wall may move, with its `row` among the `walls` and its `lightness`, 1/M or 1/I. Times are of the frame."""
+    """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
 
     def pose(self, walls, t):
         """Its `Pose` at a time."""
@@ -107,7 +108,7 @@ class Freedom(Record):
 
 
 def march(wall, flight, longest):
-    """The same of a wall that is met by safe steps, within so long [s]."""
+    """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
     found = safe.march(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
     return found.time, found.wall >= 0.0
 

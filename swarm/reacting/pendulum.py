@@ -7,7 +7,7 @@ From one lease to the next the angle of a pendulum is its Taylor polynomial. Its
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import index
+from ..kernel.arrays import index
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from ..surfaces.course import rise_time
 from ..surfaces.drive import Drive, Pose, Rows, Turn

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.laws import Laws
 from ..contact.reflection import Energy, exact
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
-from ..kernel.jit import Array, index, long_kernel, outlined, select
+from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
@@ -36,10 +38,10 @@ _NEAR = 1e-6
 
 
 class Scenery(NamedTuple):
-    """What particles meet: walls that do not react, their laws and their numbers in the scene; those that do."""
+    """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
 
-    given: Any  # their `Walls`
-    laws: Any
+    given: Any  # None, or the walls
+    laws: Laws
     owners: Array  # (given walls,)
     reacting: Any
     pull: Any  # gravity, or None
@@ -169,7 +171,7 @@ def _soon(clock):
 
 @long_kernel
 def predict(scenery, freedoms, queue, clock, rule, first, last):
-    """What is next for the particles from `first` to before `last`; no other is touched.
+    """Find the next events of the particles from `first` to before `last`; no other is touched.
 
     At the start of a frame also when they meet walls that do not react.
     """
@@ -211,7 +213,7 @@ def _until(freedoms):
 
 
 def _list(queue, close, i):
-    """How many are listed, with particle i if it is near."""
+    """The number of those that are listed, with particle i if it is near."""
     if queue.near[i] and not queue.listed[i]:
         queue.listed[i] = True
         queue.close[close] = i

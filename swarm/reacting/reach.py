@@ -1,4 +1,4 @@
-"""How soon a particle may meet a wall that reacts, whatever others do to the wall within its lease.
+"""The times until which a particle surely does not meet a wall that reacts, whatever happens within its lease.
 
 In the frame that moves with the middle velocity of the lease the wall stays within the width times the time of where it
 is: for a plane and a ball the first time at which a flight is as near as that is the root of a parabola.
@@ -46,7 +46,7 @@ def clear_of(body, r):
 
 
 def _out_of(part, r):
-    """How far a point is out of a part at least; below 0 inside."""
+    """A lower bound of the distance of a point outside of a part; below 0 inside."""
     if isinstance(part, Rotated):
         return _out_of(part.body, part.vector_in(r))
     if isinstance(part, (PlaneNumbers, SlabNumbers, SphereNumbers)):

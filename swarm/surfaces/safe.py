@@ -3,8 +3,9 @@
 import math
 from typing import Any
 
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
-from ..kernel.jit import index, outlined, select
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from ..motion import Guide

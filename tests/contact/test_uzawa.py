@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.contact import uzawa
-from swarm.contact.records import Step
+from swarm.contact.impulse import Step
 from swarm.contact.regularisation import regularisation
 from swarm.kernel.vector import vec
 from swarm.surfaces.walls import Walls, all_walls

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import long_kernel, next_of, scratch, select
+from ...kernel.arrays import next_of, scratch
+from ...kernel.jit import long_kernel, select
 from ...kernel.vector import Vec
 from ...status import Status
 from . import blow, hold, instant, lead

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import Vec, dot
 from .contacts import MOST_CONTACTS, direction, near, point_of, width
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import Vec, cross, dot, norm
 from . import blow, instant
 from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, near, point_of, width

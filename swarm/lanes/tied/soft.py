@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import ZERO, square
 from . import hold, instant
 from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, index_of, near, point_of, solve_dense, span

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import index, outlined, select
+from ...kernel.arrays import index
+from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
 from ..course import rise_time

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from ...kernel import cache
-from ...kernel.jit import index, kernel
+from ...kernel.arrays import index
+from ...kernel.jit import kernel
 from ...kernel.vector import Vec, vec
 from .grid import MARGIN, Floats, Grid, cells_of
 from .members import gathered

@@ -103,7 +103,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
 
 
 class LongKernelCompiler(KernelCompiler):
-    """The same for a `_LongKernel`."""
+    """Numba's compiler for a `_LongKernel`."""
 
     library = _LongKernel
 
