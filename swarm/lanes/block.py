@@ -21,11 +21,11 @@ from . import log as impact_log
 from .accounts import book_heat
 from .arrays import following_particle, goes_on_by, leave, load, move, retire
 from .escape import let_out_lanes
-from .fly import go
-from .picked import of_lane, pick, picks
+from .flight import go
+from .hit_member import of_lane, pick, picks
+from .periodic import return_lanes
 from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
-from .wrap import return_lanes
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8

@@ -16,11 +16,11 @@ from ..kernel.vector import column, put
 from ..status import Status
 from ..surfaces.moving import at
 from .arrays import following_particle, goes_on_by, speed2_scale
-from .compose import compose, end_steps
-from .ends import decide, set_going
+from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, account, phase_of, with_kept
+from .sliding_ends import decide, set_going
+from .sliding_step import compose, end_steps
 from .table import LANES, LOOK, with_distances
-from .wrap import return_particle, return_sliding
 
 
 @long_kernel

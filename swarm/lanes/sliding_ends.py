@@ -14,10 +14,10 @@ from ..kernel.vector import ZERO, square
 from ..surfaces import fold as walls
 from ..surfaces.moving import at
 from ..surfaces.period import part_until
-from .compose import SHORTEST, twice_after
 from .escape import is_at_opening
 from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK, account, lose, moves, phase_of, push, work
-from .stay import stay
+from .sliding_step import SHORTEST, twice_after
+from .sticking import stay
 
 # Times that a step is cut before the lane is given up: it takes four or so.
 _MOST_TRIALS = 100

@@ -14,8 +14,8 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, norm, square
 from ..surfaces import fold as walls
 from ..surfaces.moving import at, during
-from .compose import SLOWEST
 from .sliding import AGAIN, phase_of, push, work
+from .sliding_step import SLOWEST
 
 # Halvings of the interval in which a wall lets a particle go that rests on it.
 _HALVINGS = 60

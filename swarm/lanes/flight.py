@@ -6,7 +6,7 @@ from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fold import Field, count_in_fields, others
 from ..surfaces.moving import Marched, Strided, at
 from ..surfaces.period import cut
-from .seek import hit_of_lane, keep_hit, seek
+from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.

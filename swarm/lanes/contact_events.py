@@ -20,8 +20,8 @@ from .accounts import book, book_heat, book_step, book_work, lose
 from .arrays import booked, following_particle, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of, met_wall
+from .periodic import return_particle
 from .table import LANES
-from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
