@@ -19,7 +19,6 @@ from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from . import log as impact_log
 from .accounts import book_heat
-from .arrays import following_particle, goes_on_by, leave, load, move, retire
 from .escape import let_out_lanes
 from .flight import go
 from .hit_member import of_lane, pick, picks
@@ -50,50 +49,49 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
     lanes, state, picked = with_distances(lanes), share.state, picks(chain)
-    following, stop, drawn, live, passes = impact_log.gone_on(share.log)
+    place, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
-        following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
-        if following == stop:
+        place = share.following(FLYING, place)
+        if place.is_end():
             break
-        load(method, chain, lanes, index(live), share, following)
+        lanes.load(method, chain, share, place.i, index(live))
         lanes.lane(live).looked_particle = -1.0
-        following += 1
-        live += 1
+        place, live = place.after(), live + 1
     while live > 0:
-        status = _halts(share, lanes, following, stop, drawn, live, passes)
+        status = _halts(share, lanes, place, live, passes)
         if status != Status.DONE.value:
-            return status, live, drawn
+            return status, live, place.drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
         if some_hard or passes % LOOK == 0:
             status, lane = _rare(hard, method, chain, gravity, state, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
-                return status, lanes.particle[lane], drawn
+                return status, lanes.particle[lane], place.drawn
         count_sweeps(state.multipliers, lanes, live)
         if not (some_arrived or some_hard):
             continue
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
         for k in range(marked_lanes(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
-            retire(method, chain, lanes, lane, share)
-            following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
-            if following < stop:
-                load(method, chain, lanes, lane, share, following)
-                following += 1
+            lanes.retire(method, chain, share, lane)
+            place = share.following(FLYING, place)
+            if place.i < place.stop:
+                lanes.load(method, chain, share, place.i, lane)
+                place = place.after()
             else:
                 live -= 1
-                move(chain, lanes, live, lane)
-    return Status.DONE.value, 0, drawn
+                lanes.move(chain, live, lane)
+    return Status.DONE.value, 0, place.drawn
 
 
-def _halts(share, lanes, following, stop, drawn, live, passes):
+def _halts(share, lanes, place, live, passes):
     """Whether the call ends before the next pass."""
     if passes >= share.halt[0]:
-        leave(lanes, live)
+        lanes.leave(live)
         return Status.INTERRUPTED.value
     if impact_log.is_full(share.log):
-        impact_log.keep_going(share.log, following, stop, drawn, live, passes)
+        impact_log.keep_going(share.log, place, live, passes)
         return Status.LOG_FULL.value
     return Status.DONE.value
 
@@ -117,19 +115,18 @@ def _look(method, chain, state, lanes, live):
     # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
     most_hits = 0.1 * MOST_HITS if isinstance(chain, Carried) else MOST_HITS
     for i in range(live):
-        lane = lanes.lane(i)
-        status, p, left = Status.DONE.value, float(lanes.particle[i]), lane.left
-        still = goes_on_by(method, lane.v, left) >= lane.looked_left - left
+        lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
         if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
-        elif lane.looked_particle == p and still and lane.looked_hits == lane.hits:
+        elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], lane.r)
             if state.contacts is not None:
                 state.contacts.left[lanes.particle[i]] = lane.left
             return status, i
-        lane.looked_particle, lane.looked_left, lane.looked_hits = p, left, lane.hits
+        lane.look(p)
+        lane.looked_hits = lane.hits
     return Status.DONE.value, 0
 
 

@@ -17,7 +17,7 @@ from ..surfaces.moving import Carried, at
 from ..surfaces.near import count_near, list_near
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
-from .arrays import booked, following_particle, speed2_scale
+from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
 from .escape import let_out_at, let_out_of, met_wall
 from .periodic import return_particle
@@ -27,8 +27,6 @@ from .table import LANES
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
-# A call goes on with its next particle: no status.
-_GOES_ON = -1
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -36,27 +34,30 @@ _MOVED = 1e-9
 @long_kernel
 def meet_block(method, chain, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
-    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
+    return _one_by_one(EVENT, _decide, (method, chain, gravity), share)
+
+
+@long_kernel
+def careful_block(method, chain, gravity, share):
+    """A short step of each particle that several walls hold: (status, particle, drawn)."""
+    return _one_by_one(CAREFUL, _take_care, (method, chain, gravity), share)
+
+
+def _one_by_one(phase, advance, scene, share):
+    """Advance the particles in a phase that a thread draws, as long as they move on."""
+    place, _live, done = impact_log.gone_on(share.log)
     while True:
-        following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
-        status = _ends(share, following, stop, drawn, done)
-        if status != _GOES_ON:
-            return status, 0, drawn
-        if not _decide(method, chain, gravity, share, following):
-            return Status.STALLED.value, following, drawn
-        following, done = following + 1, done + 1
-
-
-def _ends(share, following, stop, drawn, done):
-    """The status with which a call ends before its next particle, or that it goes on."""
-    if following == stop:
-        return Status.DONE.value
-    if done // LANES >= share.halt[0]:
-        return Status.INTERRUPTED.value
-    if impact_log.is_full(share.log):
-        impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-        return Status.LOG_FULL.value
-    return _GOES_ON
+        place = share.following(phase, place)
+        if place.is_end():
+            return Status.DONE.value, 0, place.drawn
+        if done // LANES >= share.halt[0]:
+            return Status.INTERRUPTED.value, 0, place.drawn
+        if impact_log.is_full(share.log):
+            impact_log.keep_going(share.log, place, 0, done)
+            return Status.LOG_FULL.value, 0, place.drawn
+        if not advance(*scene, share, place.i):
+            return Status.STALLED.value, place.i, place.drawn
+        place, done = place.after(), done + 1
 
 
 @outlined
@@ -177,25 +178,18 @@ def _spare(moving, chain, state, i, found, wall):
     state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
 
 
-@long_kernel
-def careful_block(method, chain, gravity, share):
-    """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
-    while True:
-        following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
-        status = _ends(share, following, stop, drawn, done)
-        if status != _GOES_ON:
-            return status, 0, drawn
-        _step(method, chain, gravity, share, following)
-        if share.state.period is not None:
-            return_particle(share.state.period, chain, share.state, following)
-        contacts = share.state.contacts
-        closed = isinstance(chain, Carried) and _have_closed(
-            chain, method, column(share.state.position, 0, following), contacts.left[following]
-        )
-        if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:
-            return Status.STALLED.value, following, drawn
-        following, done = following + 1, done + 1
+# --- Short steps -----------------------------------------------------------------------------------------
+
+
+def _take_care(method, chain, gravity, share, i):
+    """A short step of particle i; whether it moves on."""
+    state, contacts = share.state, share.state.contacts
+    _step(method, chain, gravity, share, i)
+    if state.period is not None:
+        return_particle(state.period, chain, state, i)
+    r = column(state.position, 0, i)
+    closed = isinstance(chain, Carried) and _have_closed(chain, method, r, contacts.left[i])
+    return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
 
 
 @outlined

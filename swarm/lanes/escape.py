@@ -15,7 +15,7 @@ def _escape(share, p, wall, r, v, left):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
     share.state.escape_time[p] = share.moment - left
     if share.log is not None:
-        impact_log.add_escape(share.log, share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
+        share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
 
 
 def let_out_lanes(openings, method, chain, share, lanes, live):

@@ -15,7 +15,7 @@ from ..kernel.jit import index, long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
 from ..surfaces.moving import at
-from .arrays import following_particle, goes_on_by, speed2_scale
+from .arrays import Place, speed2_scale
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, account, phase_of, with_kept
 from .sliding_ends import decide, set_going
@@ -30,21 +30,18 @@ def slide_block(kind, method, chain, gravity, share, lanes):
     Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
     """
     lanes = with_distances(lanes)
-    following, stop, drawn, live, passes = 0, 0, 0, 0, 0
-    while live < LANES:
-        following, stop, drawn, loaded = _refill(
-            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn, passes)
-        )
-        if not loaded:
-            break
-        lanes.lane(live).looked_particle = -1.0
-        live += 1
+    place, live, passes, loaded = Place(0, 0, 0), 0, 0, True
+    while live < LANES and loaded:
+        place, loaded = _refill(kind, method, chain, gravity, share, lanes, live, (place, passes))
+        if loaded:
+            lanes.lane(live).looked_particle = -1.0
+            live += 1
     while live > 0:
         status, particle = _over(method, share, lanes, live, passes)
         if status != Status.DONE.value:
             for i in range(live):
                 _retire(kind, method, chain, share, lanes, i, phase_of(kind))
-            return status, particle, drawn
+            return status, particle, place.drawn
         passes += 1
         compose(kind, method, chain, gravity, lanes, live)
         end_steps(kind, method, chain, gravity, lanes, live)
@@ -55,14 +52,12 @@ def slide_block(kind, method, chain, gravity, share, lanes):
             phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
             if phase != phase_of(kind):
                 _retire(kind, method, chain, share, lanes, i, phase)
-                following, stop, drawn, loaded = _refill(
-                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn, passes)
-                )
+                place, loaded = _refill(kind, method, chain, gravity, share, lanes, i, (place, passes))
                 if not loaded:
                     live -= 1
                     lanes.move(live, i)
     # A halt may have kept it from loading more.
-    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, drawn
+    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, place.drawn
 
 
 @outlined
@@ -70,14 +65,12 @@ def _over(method, share, lanes, live, passes):
     """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0
-    if passes % LOOK != 0:
-        return Status.DONE.value, 0
-    for i in range(live):
-        lane, p = lanes.lane(i), lanes.particle[i]
-        left = lane.left
-        if lane.looked_particle == float(p) and goes_on_by(method, lane.v, left) >= lane.looked_left - left:
-            return Status.TIMELESS.value, p
-        lane.looked_particle, lane.looked_left = float(p), left
+    if passes % LOOK == 0:
+        for i in range(live):
+            lane, p = lanes.lane(i), lanes.particle[i]
+            if lane.stands(method, float(p)):
+                return Status.TIMELESS.value, p
+            lane.look(float(p))
     return Status.DONE.value, 0
 
 
@@ -95,20 +88,19 @@ def _next_phase(kind, method, chain, gravity, state, lanes, i):
 
 @outlined
 def _refill(kind, method, chain, gravity, share, lanes, i, at):
-    """The next particle that slides into lane i: (particle, stop, draws) to go on from, and whether there is one.
+    """The next particle that slides into lane i: the `Place` to go on from, and whether there is one.
 
     None after a halt: what is loaded may rest or fly at once, one particle after the other.
     """
-    following, stop, drawn, passes = at
-    while True:
-        if passes >= share.halt[0]:
-            return following, stop, drawn, False
-        following, stop, drawn = following_particle(share, phase_of(kind), following, stop, drawn)
-        if following == stop:
-            return following, stop, drawn, False
-        following += 1
-        if _load(kind, method, chain, gravity, share, lanes, i, following - 1):
-            return following, stop, drawn, True
+    place, passes = at
+    while passes < share.halt[0]:
+        place = share.following(phase_of(kind), place)
+        if place.is_end():
+            return place, False
+        place = place.after()
+        if _load(kind, method, chain, gravity, share, lanes, i, place.i - 1):
+            return place, True
+    return place, False
 
 
 @outlined

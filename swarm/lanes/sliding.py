@@ -10,7 +10,7 @@ from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..surfaces import fold as walls
-from .table import STRIDE, Rows, copy_lane, table
+from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
 LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES = 1, 2, 4, 8, 16, 32, 64
@@ -20,11 +20,8 @@ AGAIN = -1
 _named = Rows()
 
 
-class Sliding(Record):
+class Sliding(Advanced):
     """A particle that slides, in its lane. What its second wall has is 0 where it has none."""
-
-    rows: Array
-    i: int
 
     r, v, a = _named.vector(), _named.vector(), _named.vector()
     # The numbers of its walls, -1 for none, and how they press on it.
