@@ -7,7 +7,6 @@ from ..kernel.vector import column
 from ..surfaces.moving import at
 from ..surfaces.openings import is_open
 from . import log as impact_log
-from .sliding import with_kept
 from .table import marked_lanes
 
 
@@ -35,15 +34,15 @@ def let_out_lanes(openings, method, chain, share, lanes, live):
 
 
 @outlined
-def is_at_opening(openings, kind, method, chain, state, lanes, i):
+def is_at_opening(slide, now, i):
     """Whether a lane that slides is where a wall that holds it is open: it is at that wall then, as if it flew."""
-    lane = lanes.lane(i)
-    r = lane.r
-    wall = open_wall_of(openings, method, chain, lane.held(kind), r, crossing.near(method, r))
+    lanes, lane = slide.lanes, slide.lanes.lane(i)
+    near = crossing.near(slide.method, lane.r)
+    wall = open_wall_of(lanes.openings, slide.method, now, slide.held(lane), lane.r, near)
     if wall < 0.0:
         return False
-    state.contacts.met[lanes.particle[i]] = wall
-    lane.v = with_kept(kind, chain, lane)
+    slide.state.contacts.met[lanes.particle[i]] = wall
+    lane.v = slide.with_kept(now, lane)
     lane.keep = 0.0
     return True
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..contact import hold
 from ..contact import laws as wall_laws
+from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
@@ -49,10 +50,6 @@ class Sliding(Advanced):
     change, before = _named.vector(), _named.vector()
     ALL = _named.count
 
-    def held(self, kind):
-        """The walls that hold it."""
-        return kind.of_lane(self.first, self.second)
-
 
 class Lanes(Record):
     """Arrays of one column a lane."""
@@ -90,63 +87,79 @@ def empty(period: Any = None, openings: Any = None) -> Lanes:
     )
 
 
-def phase_of(kind):
-    """The phase of particles that one wall holds, or two."""
-    return EDGE if isinstance(kind, hold.Two) else HELD
+class Slide(Record):
+    """A call of the kernel of what slides: on which walls, one or two, by which method, and in which lanes."""
 
+    kind: Any
+    method: Any
+    chain: Any
+    gravity: Any
+    state: Any
+    lanes: Lanes
 
-def moves(method):
-    """Whether a wall moves: a constant for the compiler."""
-    return wall_laws.moving(method.laws) is not None
+    def phase(self):
+        """The phase of particles that one wall holds, or two."""
+        return EDGE if isinstance(self.kind, hold.Two) else HELD
 
+    def moving(self):
+        """The walls' numbers where some move, else None."""
+        return wall_laws.moving(self.method.laws)
 
-@outlined
-def with_kept(kind, chain, lane):
-    """The velocity of a lane with the speed that it keeps across its walls."""
-    v, keep = lane.v, lane.keep
-    if not keep > 0.0:
-        return v
-    held = lane.held(kind)
-    taken = held.split_at(chain, None, lane.r, v)
-    return v + keep * held.inward(taken.n, taken.m)
+    def moves(self):
+        """Whether a wall moves: a constant for the compiler."""
+        return self.moving() is not None
 
+    def held(self, lane):
+        """The walls that hold a lane."""
+        return self.kind.of_lane(lane.first, lane.second)
 
-# --- Accounts --------------------------------------------------------------------------------------------
+    def force(self, lane, now, r, v):
+        """The force on a lane at a place, from the walls of this instant."""
+        return slides.force(self.method.laws, self.held(lane), now, self.gravity, r, v)
 
+    @outlined
+    def with_kept(self, now, lane):
+        """The velocity of a lane with the speed that it keeps across its walls."""
+        v, keep = lane.v, lane.keep
+        if not keep > 0.0:
+            return v
+        held = self.held(lane)
+        taken = held.split_at(now, None, lane.r, v)
+        return v + keep * held.inward(taken.n, taken.m)
 
-def account(method, chain, state, lanes, i):
-    """Book a step that is taken."""
-    if not lanes.unsolved[i]:
-        return
-    lane = lanes.lane(i)
-    state.contacts.sliding[lanes.particle[i]] += lane.h
-    push(chain, state, lanes, i, lane.impulse, lane.impulse_second)
-    lane.trials = 0.0
-    if method.friction is not None:
-        lose(state, lanes, i, lane.work)
-    if moves(method):
-        work(chain, state, lanes, i, lanes.gained[i], lane.given_by_second)
+    # --- Accounts
 
+    def account(self, i):
+        """Book a step that is taken."""
+        lanes, lane = self.lanes, self.lanes.lane(i)
+        if not lanes.unsolved[i]:
+            return
+        self.state.contacts.sliding[lanes.particle[i]] += lane.h
+        self.push(i, lane.impulse, lane.impulse_second)
+        lane.trials = 0.0
+        if self.method.friction is not None:
+            self.lose(i, lane.work)
+        if self.moves():
+            self.work(i, lanes.gained[i], lane.given_by_second)
 
-def push(chain, state, lanes, i, first, second):
-    """Impulses per mass to the walls that hold a lane."""
-    lane, p = lanes.lane(i), lanes.particle[i]
-    state.impulse[walls.row(chain, lane.first), p] += first * state.mass[p]
-    if lane.second >= 0.0:
-        state.impulse[walls.row(chain, lane.second), p] += second * state.mass[p]
+    def push(self, i, first, second):
+        """Impulses per mass to the walls that hold a lane."""
+        state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
+        state.impulse[walls.row(self.chain, lane.first), p] += first * state.mass[p]
+        if lane.second >= 0.0:
+            state.impulse[walls.row(self.chain, lane.second), p] += second * state.mass[p]
 
+    def work(self, i, twice, second):
+        """Book twice the work per mass of walls that move, and of it that of the second wall."""
+        state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
+        behind = state.impulse.shape[0] // 2
+        state.energy[p] = 0.5 * lane.twice
+        state.impulse[behind + walls.row(self.chain, lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+        if lane.second >= 0.0:
+            state.impulse[behind + walls.row(self.chain, lane.second), p] += 0.5 * second * state.mass[p]
 
-def work(chain, state, lanes, i, twice, second):
-    """Book twice the work per mass of walls that move, and of it that of the second wall."""
-    lane, p, behind = lanes.lane(i), lanes.particle[i], state.impulse.shape[0] // 2
-    state.energy[p] = 0.5 * lane.twice
-    state.impulse[behind + walls.row(chain, lane.first), p] += 0.5 * (twice - second) * state.mass[p]
-    if lane.second >= 0.0:
-        state.impulse[behind + walls.row(chain, lane.second), p] += 0.5 * second * state.mass[p]
-
-
-def lose(state, lanes, i, twice):
-    """Book twice the energy per mass that a lane has lost; its row knows what is left."""
-    p = lanes.particle[i]
-    state.energy[p] = 0.5 * lanes.lane(i).twice
-    state.dissipated[p] += 0.5 * twice * state.mass[p]
+    def lose(self, i, twice):
+        """Book twice the energy per mass that a lane has lost; its row knows what is left."""
+        state, p = self.state, self.lanes.particle[i]
+        state.energy[p] = 0.5 * self.lanes.lane(i).twice
+        state.dissipated[p] += 0.5 * twice * state.mass[p]
