@@ -161,17 +161,26 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
     if method.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
+    some_arrived, some_hard = _make_contacts(method, chain, gravity, watches, lanes, picked, live)
+    for watch in watches:
+        watch.add_rows(method, chain, state, lanes, live)
+    return some_arrived, some_hard
+
+
+def _make_contacts(method, chain, gravity, watches, lanes, picked, live):
+    """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = method.walls_of(of_lane(chain, picked, i), lane.left)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
-        arrived, hard = _end(method, chain, lanes, i, contact)
+        arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
+        _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
+        _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
+        lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
-    for watch in watches:
-        watch.add_rows(method, chain, state, lanes, live)
     return some_arrived, some_hard
 
 
@@ -198,24 +207,15 @@ def _exchange_heat(method, chain, gravity, share, lanes, live):
                 lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 
 
-def _end(method, chain, lanes, i, contact):
-    """The end of a lane's contact: (whether it reached the end of the frame, whether it is hard)."""
-    _put_contact(method, lanes, i, contact)
-    _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-    _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
-    lanes.wall[i] = contact.wall
-    hard = (contact.wall <= methods.HARD) & (not method.holds)
-    return contact.lasts | (not (contact.left > 0.0)), hard
-
-
 def _put_contact(method, lanes, i, contact):
-    """A lane after its contact, its impacts and its energy where contacts change that, and whether it has arrived."""
+    """A lane after its contact, its impacts and its energy where contacts change that; whether it has arrived."""
     lane = lanes.lane(i)
     lane.put_end(contact)
     lane.hits += contact.hits
     if method.dissipates:
         lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
+    return contact.lasts | (not (contact.left > 0.0))
 
 
 def _add_impulse(chain, impulse, i, wall, given):

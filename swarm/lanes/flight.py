@@ -14,28 +14,7 @@ _STRIDES = 3
 
 
 def go(method, chain, gravity, lanes, live):
-    """Every lane to its next contact, or to the end of the frame."""
-    met = method.landed_on(chain)
-    if met is None:
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, flights.NEVER)
-    elif isinstance(met, Field):
-        _meet_others(others(chain), gravity, count_in_fields(chain), lanes, live)
-        seek(chain, 0.0, gravity, lanes, live)
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, hit_of_lane(lanes, i))
-    elif isinstance(met, Strided):
-        _stride(method, chain, gravity, lanes, live)
-    elif isinstance(met, Marched):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            _flight(method, chain, gravity, lanes, i, safe.first_hit(chain, gravity, lane.r, lane.v, lane.left))
-    else:
-        _fly(method, chain, gravity, lanes, live)
-
-
-def _fly(method, chain, gravity, lanes, live):
-    """The same where no wall is of a field, and those that move do so uniformly.
+    """Every lane to its next contact, or to the end of the frame.
 
     A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
     an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
@@ -43,29 +22,39 @@ def _fly(method, chain, gravity, lanes, live):
     110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
     a particle: the angular momentum in a sphere drifted five times as fast.)
     """
+    met = method.landed_on(chain)
+    _search(met, chain, gravity, lanes, live)
+    for i in range(index(live)):
+        _flight(method, chain, gravity, lanes, i, _first_hit(met, chain, gravity, lanes.lane(i), lanes, i))
+
+
+def _search(met, chain, gravity, lanes, live):
+    """What of the first hits is found in loops of their own."""
+    if isinstance(met, Field):
+        free, before = others(chain), count_in_fields(chain)
+        _search(free, free, gravity, lanes, live)
+        for i in range(index(live)):
+            keep_hit(lanes, i, _first_hit(free, free, gravity, lanes.lane(i), lanes, i), before)
+        seek(chain, 0.0, gravity, lanes, live)
+    elif isinstance(met, Strided):
+        _stride(chain, gravity, lanes, live)
+    elif met is not None and not isinstance(met, Marched) and not _is_closed(gravity, chain):
+        _go_by_steps(chain, gravity, lanes, live)
+
+
+def _first_hit(met, chain, gravity, lane, lanes, i):
+    """The first hit of a lane with the walls that the method lands on."""
+    if met is None:
+        return flights.NEVER
+    if isinstance(met, Field):
+        return hit_of_lane(lanes, i)
+    if isinstance(met, Strided):
+        return strides.end(lanes.course, i)
+    if isinstance(met, Marched):
+        return safe.first_hit(chain, gravity, lane.r, lane.v, lane.left)
     if _is_closed(gravity, chain):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            _flight(method, chain, gravity, lanes, i, flights.first_hit(at(chain, lane.left), gravity, lane.r, lane.v))
-    else:
-        _go_by_steps(chain, gravity, lanes, live)
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, flights.end(at(chain, lanes.lane(i).left), lanes.course, 0, i))
-
-
-def _meet_others(chain, gravity, before, lanes, live):
-    """The first hits with the walls that are in no field; these have so many walls before them."""
-    if chain is None:
-        for i in range(index(live)):
-            keep_hit(lanes, i, flights.NEVER, 0.0)
-    elif _is_closed(gravity, chain):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            keep_hit(lanes, i, flights.first_hit(chain, gravity, lane.r, lane.v), before)
-    else:
-        _go_by_steps(chain, gravity, lanes, live)
-        for i in range(index(live)):
-            keep_hit(lanes, i, flights.end(chain, lanes.course, 0, i), before)
+        return flights.first_hit(at(chain, lane.left), gravity, lane.r, lane.v)
+    return flights.end(at(chain, lane.left), lanes.course, 0, i)
 
 
 def _is_closed(gravity, chain):
@@ -73,8 +62,8 @@ def _is_closed(gravity, chain):
     return gravity is None and flights.in_steps(chain) is None
 
 
-def _stride(method, chain, gravity, lanes, live):
-    """The same where walls move in any way, by safe steps in lanes."""
+def _stride(chain, gravity, lanes, live):
+    """Safe steps of all lanes to walls in any motion."""
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
@@ -86,8 +75,6 @@ def _stride(method, chain, gravity, lanes, live):
         for i in range(index(live)):
             lane = lanes.lane(i)
             strides.stride(chain, gravity, course, i, lane.r, lane.v, lane.left, False)
-    for i in range(index(live)):
-        _flight(method, chain, gravity, lanes, i, strides.end(course, i))
 
 
 def _go_by_steps(chain, gravity, lanes, live):
