@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from ..contact import events, touching
+from ..contact import crossing, events, touching
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
+from ..contact.passing import hit_wall, open_wall_at
 from ..contact.reflection import given, wall_velocity
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined, scratch
@@ -15,11 +16,12 @@ from ..status import Status
 from ..surfaces import fold as walls
 from ..surfaces.moving import Carried, at
 from ..surfaces.near import count_near, list_near
+from ..surfaces.openings import is_open
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
-from .escape import let_out_at, let_out_of, met_wall
+from .escape import escape
 from .periodic import return_particle
 from .table import LANES
 
@@ -119,19 +121,22 @@ def _settles(method, chain, gravity, p):
     return events.settles(method, chain, gravity, p, scratch((2, walls.length(chain)), np.float64))
 
 
+@outlined
 def _let_out(method, chain, share, i, r, v, left):
     """Whether particle i has escaped, since the wall that it has met is open there."""
-    openings, met = share.state.openings, share.state.contacts.met
-    met[i] = met_wall(openings, method, chain, met[i], r, v)
-    if not let_out_of(openings, method, share, i, met[i], r, left):
+    openings, met, near = share.state.openings, share.state.contacts.met, crossing.near(method, r)
+    # Where this one is open, a closed one at the same place.
+    met[i] = hit_wall(openings, method, chain, (r, v), met[i], near)
+    if not is_open(openings, met[i], r, near):
         return False
-    _leave(share, i)
+    _leave(share, i, met[i], r, v, left)
     return True
 
 
 @outlined
-def _leave(share, i):
-    """Particle i has escaped."""
+def _leave(share, i, wall, r, v, left):
+    """Particle i has escaped through a wall."""
+    escape(share, i, wall, r, v, left)
     contacts = share.state.contacts
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
@@ -221,9 +226,11 @@ def _step(method, chain, gravity, share, i):
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
     now = at(chain, left)
-    if state.openings is not None and let_out_at(state.openings, method, now, share, i, r, left):
-        _leave(share, i)
-        return
+    if state.openings is not None:
+        wall = open_wall_at(state.openings, method, now, r, crossing.near(method, r))
+        if wall >= 0.0:
+            _leave(share, i, wall, r, v, left)
+            return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, walls.length(chain)), np.float64)
     if wall_laws.moving(method.laws) is None and events.settles(method, now, gravity, p, held):
