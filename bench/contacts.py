@@ -15,7 +15,7 @@ import numpy as np
 
 import swarm
 from swarm import scene_file
-from swarm.lanes.arrays import LANES
+from swarm.lanes.table import LANES
 from swarm.methods.base import Method
 from swarm.run.engine import Run
 from swarm.surfaces import Surface

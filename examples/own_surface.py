@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import swarm
 from swarm.kernel.vector import Symmetric, Vec, absolute, total
-from swarm.surfaces import Surface
-from swarm.surfaces.contract import Smooth
+from swarm.surfaces import Smooth, Surface
 
 
 class SuperellipsoidNumbers(Smooth):

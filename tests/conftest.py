@@ -4,7 +4,9 @@ import contextlib
 import functools
 import resource
 import signal
+import types
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, reject, settings
@@ -13,6 +15,8 @@ from hypothesis import strategies as st
 import swarm
 from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
+from swarm.kernel import cache
+from swarm.kernel.jit import inlined
 from swarm.kernel.vector import Vec, vec
 from swarm.run import ledger, tiers
 from swarm.surfaces.fold import Chain
@@ -233,3 +237,9 @@ def files_limited_to(size):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, handler)
+
+
+def compiled(function):
+    """A function as a kernel of its own, which is kept in no cache."""
+    helper = types.FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
+    return numba.njit(error_model="numpy")(cache.calling(inlined(helper)))

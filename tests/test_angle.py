@@ -3,9 +3,9 @@
 import math
 
 import mpmath
-import numba
 import numpy as np
 import pytest
+from conftest import compiled
 
 from swarm.kernel.angle import sine_and_versine
 
@@ -48,6 +48,6 @@ def test_an_odd_and_an_even_function():
 
 
 def test_the_same_compiled():
-    compiled = numba.njit(lambda angle: sine_and_versine(angle))
+    in_kernel = compiled(sine_and_versine)
     for angles in ANGLES.values():
-        assert all(compiled(angle) == sine_and_versine(angle) for angle in angles.tolist())
+        assert all(in_kernel(angle) == sine_and_versine(angle) for angle in angles.tolist())

@@ -94,11 +94,10 @@ KERNEL = """
 from own_surface import Superellipsoid
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import Vec
-from swarm.surfaces import contract
 
 @kernel
 def time_of_hit(surface, r, v):
-    return contract.first_hit(surface, r, v)[0]
+    return surface.first_hit(r, v)[0]
 
 numbers = Superellipsoid((0.3, 0.4, 0.5)).numbers()
 print(time_of_hit(numbers, Vec(0.0, 0.0, 0.0), Vec(1.0, 0.0, 0.0)), sum(time_of_hit.stats.cache_hits.values()))

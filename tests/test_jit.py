@@ -19,17 +19,17 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import LAWS, METHODS, call, every_surface, numbers_of, rarely, scene_of
+from conftest import LAWS, METHODS, call, compiled, every_surface, numbers_of, rarely, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
 import swarm
-from swarm.contact import regularisation
 from swarm.kernel import cache
 from swarm.kernel import jit as _jit
-from swarm.kernel.gravity import Gravity, Nothing, accelerated, displacement, potential
+from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import kept, select
 from swarm.kernel.parts import _DEEPEST, deep
+from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.run.engine import Run
 from swarm.scene import MOST_WALLS
@@ -40,7 +40,6 @@ PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(
     bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing is compiled that could be compared"
 )
-compiled = numba.njit(error_model="numpy")
 
 
 # --- The same in Python and in kernels -------------------------------------------------------------------
@@ -161,41 +160,44 @@ def test_the_power_law_is_nearly_the_same_compiled():
     assert in_kernel == pytest.approx(flat(call(every_function_of_a_law, law, 0.1, 0.3)), rel=1e-13)
 
 
-# --- Dispatch --------------------------------------------------------------------------------------------
+# --- Methods ---------------------------------------------------------------------------------------------
 
 
-@_jit.by_type
+class Thing(Record):
+    """The base of several classes."""
+
+    def kind(self, number):
+        return -1.0
+
+
+class Heavy(Thing):
+    x: float
+
+    def kind(self, number):
+        return self.x + number
+
+
+class Heavier(Heavy):
+    def kind(self, number):
+        return 2.0 * super().kind(number)
+
+
 def kind_of(thing, number):
-    return -1.0
+    return 2.0 if thing is None else thing.kind(number)
 
 
-@kind_of.register(Gravity)
-def _(thing, number):
-    return thing.x + number
+THINGS = [(Heavy(4.0), 14.0), (Heavier(4.0), 28.0), (None, 2.0), (Thing(), -1.0)]
 
 
-@kind_of.register(Nothing)
-def _(thing, number):
-    return 2.0
-
-
-@kind_of.register(float)
-def _(thing, number):
-    return 3.0
-
-
-DISPATCH = [(Gravity(4.0, 0.0, 0.0), 14.0), (None, 2.0), (1.5, 3.0), (regularisation.Linear(1.0), -1.0)]
-
-
-@pytest.mark.parametrize(("thing", "answer"), DISPATCH, ids=repr)
-def test_by_type_in_python(thing, answer):
+@pytest.mark.parametrize(("thing", "answer"), THINGS, ids=repr)
+def test_methods_in_python(thing, answer):
     assert kind_of(thing, 10.0) == answer
 
 
 @compiled_only
-@pytest.mark.parametrize(("thing", "answer"), DISPATCH, ids=repr)
-def test_by_type_in_kernels(thing, answer):
-    assert compiled(lambda thing, number: kind_of(thing, number))(thing, 10.0) == answer
+@pytest.mark.parametrize(("thing", "answer"), THINGS, ids=repr)
+def test_methods_in_kernels(thing, answer):
+    assert _jit.kernel(kind_of)(thing, 10.0) == answer
 
 
 def select_all(a, b):
@@ -635,6 +637,7 @@ LAYERS = [
     ["lanes", "reacting"],
     ["methods"],
     ["scene"],
+    ["volume"],
     ["particles"],
     ["contact"],
     ["surfaces"],

@@ -7,14 +7,13 @@ import mpmath
 import numba
 import numpy as np
 import pytest
-from conftest import directions
+from conftest import compiled, directions
 from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.kernel import random
 from swarm.kernel.vector import Vec, dot, norm, square, vec
 
-compiled = numba.njit(error_model="numpy")
 SEED, SPEED2 = 20_070_630, 0.3
 LEAST = 2.0**-53  # the smallest uniform number, and the distance of the largest from 1
 # Of so many standard errors one sample in 16 000 is wrong by chance, and the seed is fixed.

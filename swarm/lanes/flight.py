@@ -4,7 +4,7 @@ from ..kernel.jit import index
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fold import Field, count_in_fields, others
-from ..surfaces.moving import Marched, Strided, at
+from ..surfaces.moving import Carried, Marched, Strided, at
 from ..surfaces.period import cut
 from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
@@ -58,8 +58,8 @@ def _first_hit(met, chain, gravity, lane, lanes, i):
 
 
 def _is_closed(gravity, chain):
-    """Whether the first hit has a closed form: flights are straight, and no wall is met by steps."""
-    return gravity is None and flights.in_steps(chain) is None
+    """Whether the first hit has a closed form: flights are straight, and walls that move, or none is met by steps."""
+    return gravity is None and (isinstance(chain, Carried) or flights.in_steps(chain) is None)
 
 
 def _stride(chain, gravity, lanes, live):

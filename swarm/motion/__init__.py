@@ -1,10 +1,10 @@
 """Motions of led points and of walls: those that a user gives, and the poses of walls that follow."""
 
 from .given import Led, Motion, Oscillation, Rotation, Sum, Translation, led, parts_of, unit_axis
-from .poses import Pose, displacement, pose
+from .poses import Pose, pose
 from .wall import Guide, Path, Placed, WallMotion, parts_of_wall, require_freedom, table_of
 
 __all__ = [
     "Guide", "Led", "Motion", "Oscillation", "Path", "Placed", "Pose", "Rotation", "Sum", "Translation", "WallMotion",
-    "displacement", "led", "parts_of", "parts_of_wall", "pose", "require_freedom", "table_of", "unit_axis",
+    "led", "parts_of", "parts_of_wall", "pose", "require_freedom", "table_of", "unit_axis",
 ]  # fmt: skip

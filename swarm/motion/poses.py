@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .given import Floats, Oscillation, Rotation, Translation, parts_of, unit_axis
-from .wall import Guide, Path, Placed, WallMotion
+from .given import Floats, Rotation, parts_of, unit_axis
+from .wall import Path, Placed, WallMotion
 
 
 class Pose(NamedTuple):
@@ -51,16 +51,11 @@ def pose(motion: "WallMotion | None", time: float) -> Pose:
             center, turn, half = np.array(one.center), _turned_by(one, one.rate * time), 0.5 * one.rate * time
             x, y, z = (math.sin(half) * unit_axis(one)).tolist()
             quaternion = (math.cos(half), x, y, z)
+        elif isinstance(one, Path):
+            found = found + one.displacement(time)
         else:
-            found = found + displacement(one, time)
+            found = found + one.harmonic((0.0, 0.0, 0.0)).position(time)
     return Pose(found, turn, center, quaternion)
-
-
-def displacement(motion: "Translation | Oscillation | Path | Guide", time: float) -> Floats:
-    """The displacement (3,) of a wall at a time [s]."""
-    if isinstance(motion, Path):
-        return motion.displacement(time)
-    return motion.harmonic((0.0, 0.0, 0.0)).position(time)
 
 
 def _turned_by(rotation: Rotation, angle: float) -> Floats:

@@ -45,17 +45,22 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         # Of springs each point may be in every wall at once.
         known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
         return _task_of_bodies(known, particles.copy(), method, options)
-    if not isinstance(method, Impact) or method.contact_step > 0.0:
-        name = "a contact_step" if isinstance(method, Impact) else type(method).__name__
-        scene = scene.apart(name)
-    if getattr(method, "dt", None) is not None and isinstance(method, Impact):
+    if not isinstance(method, Impact):
+        scene = scene.apart(type(method).__name__)
+    elif method.contact_step > 0.0:
+        scene = scene.apart("a contact_step")
+    if isinstance(method, Impact) and method.dt is not None:
         raise SceneError(
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
         )
     _require_instants(scene, particles, method, options)
     # The arrays of Particles may have been changed since it checked them.
     particles = _in_the_cell(scene, particles.copy(), options.times.until)
-    _require_period(scene, method)
+    if scene.period is not None and not method.knows_period():
+        raise SceneError(
+            f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
+            f"{scene.period}; use Impact() with contact_step = 0"
+        )
     _require_precision(scene, particles, options)
     check_surfaces(method, scene)
     if options.compile != "never":
@@ -73,7 +78,6 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
 
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
-    """A run of bodies, checked."""
     _require_method_of_bodies(scene, bodies, method, options)
     if scene.period is not None:
         raise SceneError(
@@ -94,16 +98,14 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     if options.compile != "never":
         require_compiled(scene.surfaces)
     if len(bodies.body.contacts):
-        _require_inside(
-            scene, Particles(*(np.ascontiguousarray(bodies.contact_points().reshape(3, -1)) for _ in range(2)))
-        )
+        touching = bodies.contact_points().reshape(3, -1)
+        _require_inside(scene, Particles(touching, touching))
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
 
 
 def _require_walls_of_bodies(scene: Scene) -> None:
-    """Raise a `SceneError` where a surface has what bodies do not know."""
     for i, surface in enumerate(scene.surfaces):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
@@ -125,7 +127,6 @@ def _require_walls_of_bodies(scene: Scene) -> None:
 
 
 def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where the method does not know bodies, or an argument of it none."""
     if not isinstance(method, (Impact, Penalty, AugmentedLagrangian)) or method.dt is None:
         raise SceneError(
             f"bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {method}; give "
@@ -139,8 +140,8 @@ def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, opti
     if isinstance(method, Penalty):
         if len(bodies.body.contacts):
             velocity = np.tensordot(bodies.body.contacts, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
-            both = bodies.contact_points(), velocity
-            check_solids(scene, Particles(*(np.ascontiguousarray(one.reshape(3, -1)) for one in both)), method.dt)
+            touching = Particles(bodies.contact_points().reshape(3, -1), velocity.reshape(3, -1))
+            check_solids(scene, touching, method.dt)
         method.span("until", options.times.until)
         assert options.times.every is not None
         method.span("every", options.times.every)
@@ -172,7 +173,6 @@ def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLa
 
 
 def _require_motions(scene: Scene, until: float) -> None:
-    """Raise a `SceneError` where the motion of a wall is not known for the whole run."""
     for i, surface in enumerate(scene.surfaces):
         require_angles(f"surfaces[{i}].motion", surface.motion, until)
         for one in parts_of(surface.motion):
@@ -221,15 +221,6 @@ def _require_countable(scene: Scene, particles: Particles, until: float) -> None
             )
 
 
-def _require_period(scene: Scene, method: Method) -> None:
-    """Raise a `SceneError` where a method does not know that the scene repeats."""
-    if scene.period is not None and not method.knows_period():
-        raise SceneError(
-            f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
-            f"{scene.period}; use Impact() with contact_step = 0"
-        )
-
-
 def _require_precision(scene: Scene, start: Particles, options: RunOptions) -> None:
     """Raise a `SceneError` where files that are asked for in float32 would not tell particles apart."""
     if options.precision == "float32" and (options.trajectory is not None or options.impacts is not None):
@@ -259,7 +250,9 @@ def _require_no_log(instead: str, options: RunOptions) -> None:
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:
-    outside = scene.outside(particles.position, _ON_THE_WALL * _magnitude(scene, particles))
+    # Their magnitude sets the round-off of a position on a wall.
+    magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
+    outside = scene.outside(particles.position, _ON_THE_WALL * magnitude)
     if outside.size:
         first = int(outside[0])
         point = particles.position[:, first : first + 1]
@@ -295,8 +288,3 @@ def _require_normals(scene: Scene, particles: Particles) -> None:
                 f"at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the velocity "
                 f"{tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
             )
-
-
-def _magnitude(scene: Scene, particles: Particles) -> float:
-    """Magnitude that sets the round-off of a position on a wall."""
-    return max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())

@@ -61,7 +61,7 @@ class Run(BaseRun):
         self._booked = lanes.booked(self._chain)
         self.state = state_of(scene, particles, method, self._booked)
         observables.start_energies(scene, self._law, self.state)
-        self._moment = 0.0
+        self._moment, self._faces = 0.0, scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._draws = math.ceil(n / self._size)
@@ -190,7 +190,7 @@ class Run(BaseRun):
         """The walls of the frame that ends at a moment [s]."""
         self._moment = moment = self._method.instant(moment)
         if self._scene.moves():
-            self._chain = self._scene.chain(moment)
+            self._chain, self._faces = self._scene.chain(moment), self._scene.open_faces(moment)
 
     def share_done(self, span: float) -> float:
         left = self._halted.time_left()
@@ -243,7 +243,7 @@ class Run(BaseRun):
 
     def _escaping(self) -> tuple[Any, ...]:
         """Arguments of `count_escaped`."""
-        return self._chain, self._gravity, self._far, self._scene.open_faces(self._moment), self.state
+        return self._chain, self._gravity, self._far, self._faces, self.state
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         draws, mine = self._drawing(), self._empty_lanes()

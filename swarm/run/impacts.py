@@ -100,16 +100,14 @@ class Impacts:
     def hand_over(self, log: Log) -> None:
         """Have what is in a log written, and the log filled again."""
         count = int(log.filled[0])
-        rows = _columns(log, count)
+        rows, written = _columns(log, count), log if count > _FEW else None
         with self._counting:
             self.total += count
-        if count <= _FEW:
+        if written is None:
             rows = {name: array.copy() for name, array in rows.items()}
             self._spare.put(log)
-            if count:
-                self.queue(lambda: self._write(rows, None))
-        else:
-            self.queue(lambda: self._write(rows, log))
+        if count:
+            self.queue(lambda: self._write(rows, written))
 
     def _write(self, rows: Rows, log: Log | None) -> None:
         try:

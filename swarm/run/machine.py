@@ -19,13 +19,13 @@ from .compiling import Compilations
 from .impacts import log_of
 from .options import Task
 from .outputs import recorder_of, writer_of
+from .progress import Display, display
 from .runs import run_of
 from .session import Session
-from .tally import Tally, Watched, tally_of
+from .tally import Tally, Watched
 
 if TYPE_CHECKING:
     from ..output.background import Background
-    from .progress import Display
 
 _LOG = logging.getLogger("swarm")
 # The observable that holds the sums over chunks of a shard: those of all shards are joined from it.
@@ -105,21 +105,16 @@ def carry_out(task: Task, session: Session) -> End:
         return _end(task, session, run, kept, tally)
 
 
-class _Begun(NamedTuple):
-    """A run and who observes it."""
-
-    run: BaseRun
-    writer: "Background | None"
-    show: "Display"
-    watched: Watched
-
-
 @contextlib.contextmanager
-def _begun(task: Task, session: Session) -> Iterator[_Begun]:
-    """A run at its start or its checkpoint; until the context ends signals stop it, and its files are locked."""
-    from .progress import display  # rich is imported only when it is shown
+def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched]]:
+    """A run at its start or its checkpoint, its `Background` writer or None, and who else observes it.
 
-    recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task))
+    Until the context ends signals stop the run, and its files are locked.
+    """
+    recorder, watched = (
+        recorder_of(task),
+        Watched(log_of(task), Tally(task.scene) if task.options.member_impacts else None),
+    )
     runs: list[BaseRun] = []
 
     def stop() -> None:
@@ -134,7 +129,7 @@ def _begun(task: Task, session: Session) -> Iterator[_Begun]:
         runs.append(run := run_of(task, watched))
         compilations.calls = run.calls
         session.restore(run)
-        yield _Begun(run, writer_of(task, session, recorder, watched.log), show, watched)
+        yield run, writer_of(task, session, recorder, watched.log), show, watched
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:
@@ -156,7 +151,7 @@ def warn_open() -> None:
     _LOG.warning("the scene is open: particles may fly to infinity; the observable 'escaped' counts them")
 
 
-def _meanwhile(session: Session, writer: "Background | None", show: "Display") -> tuple[float, float]:
+def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
     """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
     return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
-from ..output import paths
+from ..output import checkpoint, paths
+from ..output.lock import only_writer
 from ..version import VERSION
 from .base import BaseRun
 from .impacts import Impacts
@@ -20,7 +21,6 @@ from .options import RunOptions, Task
 
 if TYPE_CHECKING:
     from ..output.background import Background
-    from ..output.checkpoint import Arrays, Job
 
 
 class Session:
@@ -36,11 +36,13 @@ class Session:
         self._end = math.inf if options.walltime is None else self._began + options.walltime
         self._due = self._began + self._every
         self._stops = False
-        self._trajectory, self._path = options.trajectory, options.checkpoint_file()
+        # Of a run without a trajectory they are None, and so is its `Job`.
+        self._trajectory: Any = options.trajectory
+        self._path: Any = options.checkpoint_file()
+        self._job: Any = None
         # What identifies the run besides its texts, for the trajectory.
         self.identity: dict[str, Any] = {}
-        self._job: Job | None = None
-        self._arrays: Arrays | None = None
+        self._arrays: checkpoint.Arrays | None = None
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
 
@@ -55,7 +57,7 @@ class Session:
     @property
     def first(self) -> int:
         """The first frame that this session writes."""
-        return 0 if self._arrays is None or self._job is None else self._job.frame + 1
+        return 0 if self._arrays is None else int(self._job.frame) + 1
 
     def prepare(self, task: Task, log: Impacts | None) -> None:
         """Find where this session starts: at 0 s with a new file or, to resume, at the checkpoint if there is one.
@@ -69,20 +71,18 @@ class Session:
         if self._trajectory is None and log is None:
             return
         self._hold(task, log)
-        if self._trajectory is None or self._path is None or not self._resumes:
+        if self._trajectory is None or not self._resumes:
             return
         overwrite, until = task.options.overwrite, task.options.until
         if self._path.exists():
-            self._resume(self._trajectory, until)
+            self._resume(until)
         elif self._trajectory.exists() and not overwrite:
-            self._refuse_to_restart(self._trajectory, until)
+            self._refuse_to_restart(until)
         if log is not None:
             self._find_log(task.options.impacts, overwrite)
 
     def _hold(self, task: Task, log: Impacts | None) -> None:
         """Lock the files of the run, and describe it."""
-        from ..output import checkpoint
-        from ..output.lock import only_writer
         from ..output.writer import body_text, descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
@@ -94,7 +94,7 @@ class Session:
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
             self._held.enter_context(only_writer(impacts, "log of impacts"))
-        if self._trajectory is None or self._path is None:
+        if self._trajectory is None:
             return
         paths.check_target(self._trajectory, overwrite or self._resumes)
         self._held.enter_context(only_writer(self._trajectory))
@@ -113,8 +113,6 @@ class Session:
             return
         from ..output.impact_log import load_impacts
 
-        assert self._job is not None
-        assert self._path is not None
         with load_impacts(path) as before:
             there = dataclasses.replace(self._job, **before.identity)
             there.require_same(self._job, path)
@@ -122,11 +120,11 @@ class Session:
                 return  # a kill came before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._path)
 
-    def _refuse_to_restart(self, trajectory: Path, until: float) -> None:
+    def _refuse_to_restart(self, until: float) -> None:
         """Raise an error that says what the trajectory without a checkpoint is."""
         from ..output.trajectory import load
 
-        assert self._job is not None
+        trajectory = self._trajectory
         with load(trajectory) as before:
             texts: dict[str, Any] = before.descriptions
             identity: dict[str, Any] = {"particles": before.count, "start": before.start, "seed": before.seed}
@@ -145,12 +143,10 @@ class Session:
             f"{frames} frames of {trajectory}; to do so, overwrite it with --overwrite"
         )
 
-    def _resume(self, trajectory: Path, until: float) -> None:
-        from ..output import checkpoint
+    def _resume(self, until: float) -> None:
         from ..output.trajectory import load
 
-        assert self._job is not None
-        assert self._path is not None
+        trajectory = self._trajectory
         saved, arrays = checkpoint.read(self._path)
         if checkpoint.SHARDS in arrays:
             raise SceneError(f"{self._path} is of a run on a cluster; resume it on one, by cluster= or --cluster")
@@ -173,10 +169,8 @@ class Session:
 
     def restore(self, run: BaseRun) -> None:
         """Put the run into the state of the checkpoint."""
-        if self._arrays is not None and self._job is not None and self._path is not None:
-            from ..output.checkpoint import require_fit
-
-            require_fit(self._path, self._arrays, run.arrays())
+        if self._arrays is not None:
+            checkpoint.require_fit(self._path, self._arrays, run.arrays())
             if self._log is not None:
                 self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)
@@ -190,7 +184,7 @@ class Session:
         """
         job = self._job
         for number, before, moment in times:
-            if self._arrays is not None and job is not None:
+            if self._arrays is not None:
                 for frame, saved in ((job.frame, job.time), (job.frame + 1, job.following)):
                     if number == frame and saved is not None and saved != moment:
                         raise SceneError(
@@ -211,7 +205,8 @@ class Session:
 
     def wall_time(self) -> float:
         """Seconds of all sessions of the run."""
-        return time.monotonic() - self._began + (0.0 if self._job is None else self._job.wall_time)
+        before: float = 0.0 if self._job is None else self._job.wall_time
+        return time.monotonic() - self._began + before
 
     def look(
         self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
@@ -233,14 +228,7 @@ class Session:
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
 
-    def _save(
-        self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
-    ) -> None:
-        from ..output import checkpoint
-
-        assert self._job is not None
-        assert self._path is not None
-        assert writer is not None
+    def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
         # A checkpoint is never ahead of the frames.
         writer.drain()
         job = dataclasses.replace(

@@ -11,7 +11,7 @@ from ..particles import Particles
 from ..scene import Scene
 from . import machine
 from .admission import task_of
-from .options import RunOptions
+from .options import RunOptions, Task
 from .result import Result
 from .session import Session
 
@@ -121,26 +121,18 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
 def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Result:
     """`simulate` with its keywords as `RunOptions`."""
+    carried: Callable[[Task, Any], machine.End] = machine.carry_out
+    session: Session
     if options.cluster is None:
         session = Session(options)
-        task = task_of(scene, particles, method, options)
-        end = machine.carry_out(task, session)
     else:
         from . import cluster  # `distributed` takes half a second to import
 
-        sharded = cluster.Sharded(options)
-        task = task_of(scene, particles, method, options)
-        end = cluster.carry_out(task, sharded)
+        session, carried = cluster.Sharded(options), cluster.carry_out
+    task = task_of(scene, particles, method, options)
+    end = carried(task, session)
+    bodies = None if task.bodies is None else task.bodies.moved(end.particles)
     return Result(
-        end.particles,
-        end.observables,
-        end.wall_time,
-        options.trajectory,
-        end.multipliers,
-        end.impacts,
-        end.escape_time,
-        end.members,
-        None if task.bodies is None else task.bodies.moved(end.particles),
-        scene,
-        method,
-    )
+        end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
+        end.escape_time, end.members, bodies, scene, method,
+    )  # fmt: skip

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from ..lanes.log import Counts
 from ..scene import Scene
 from .impacts import Impacts
-from .options import Task
 
 
 class Tally:
@@ -46,8 +45,3 @@ class Watched(NamedTuple):
 
     log: Impacts | None = None
     tally: Tally | None = None
-
-
-def tally_of(task: Task) -> Tally | None:
-    """The tally of a run, if it has one."""
-    return Tally(task.scene) if task.options.member_impacts else None

@@ -49,7 +49,7 @@ def check(scene: Scene, particles: Particles, method: Method, until: float, ever
         # They may start in a narrow corner and leave it: then the volume around decides.
         found = max(found, _of_volume(scene, particles, impact))
     if every > _MOST_A_FRAME * found.between:
-        i = scene.owners()[found.wall]
+        i = int(scene.members()[0, found.wall])
         raise SceneError(
             f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
             f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "

@@ -1,17 +1,15 @@
 """The surfaces by their kind in a scene file.
 
-To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a NamedTuple of its numbers,
-for kernels. For the type of the numbers register, with contract.py, which describes all functions: `phi`, `gradient`
-and one of `first_hit`, `course`, `near` and `bend`; for `Impact`, which slides along walls, and methods with steps in
-contact also `hessian`, and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES.
-examples/own_surface.py is a complete surface; if a method needs a function that is missing, an error says so before the
-run.
+To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a record derived from
+`Smooth`, for kernels. Of the methods that contract.py describes it gives `phi`, `gradient` and one of `first_hit`,
+`course`, `near` and `bend`; for `Impact`, which slides along walls, and methods with steps in contact also `hessian`,
+and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES. examples/own_surface.py
+is a complete surface; if something is missing, an error says so before the run.
 """
 
-# First, so that what follows from `near`, from `bend` and from `hessian` is registered with them.
+# First: what a surface is made of imports it in turn.
 from . import approach as _approach  # noqa: F401
-from . import march as _march  # noqa: F401
-from . import newton as _newton  # noqa: F401
+from .contract import Smooth as Smooth
 from .data.sampled import Sampled
 from .fields.boxes import Boxes
 from .fields.capsules import Capsules

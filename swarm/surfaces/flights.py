@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Field, count, each, member, outside
+from .fold import Chain, Field, count, each, member, outside
 
 
 class Hit(NamedTuple):
@@ -78,10 +78,10 @@ _WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
 def in_steps(chain):
     """A number where a straight flight to any wall of a chain takes steps in lanes: a type for the compiler.
 
-    None where its hit has a closed form, or is asked for as a whole.
+    None where its hit has a closed form, or is asked for as a whole, as of walls that move.
     """
     steps = None
-    for link in each(chain):
+    for link in each(chain) if isinstance(chain, Chain) else ():
         steps = link.first.in_steps if steps is None else steps
     return steps
 

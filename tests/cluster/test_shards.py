@@ -104,10 +104,13 @@ def on_a_cluster(monkeypatch):
             folder, bounds = session.begin(task, count)
             for k in range(len(bounds) - 1):
                 assert worker.advance(folder, k) == ("complete", "")
-            joined.write(folder, task, bounds, session.identity)
+            observables = joined.write(folder, task, bounds, session.identity)
             end = shards.joined_end(folder, task, bounds)
             session.finish()
-        return end._replace(observables=machine.read_back(options.trajectory))
+        written = machine.read_back(options.trajectory)
+        assert list(observables) == list(written)
+        assert all(the_same(values, written[name]) for name, values in observables.items())
+        return end._replace(observables=observables)
 
     return carried
 

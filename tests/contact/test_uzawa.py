@@ -121,7 +121,8 @@ def test_the_limit_is_the_reflection(name, acceleration, **contact):
     loop = Loop([Described(surface)], start, free, acceleration, c=stiff(surface, start, 10.0)).run()
     assert loop.converged
     assert loop.stored <= 1e-28
-    assert loop.end == pytest.approx(chord, rel=0.0, abs=1e-12)
+    # Over the seam of a rod, where its curvature jumps, the secants end 3e-12 along the wall from the chord's end.
+    assert loop.end == pytest.approx(chord, rel=0.0, abs=5e-12)
     assert abs(gap(surface, loop.end)) <= 1e-14
     assert loop.energy_error() <= 1e-12 + 1e-14 / contact["length"]
 

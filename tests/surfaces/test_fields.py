@@ -3,10 +3,10 @@
 import math
 import tomllib
 
-import numba
 import numpy as np
 import pytest
 import tomli_w
+from conftest import compiled
 
 import swarm
 from swarm import checks, scene_file, tables
@@ -72,7 +72,7 @@ def first_through_cells(scene, gravity, r, v):
     raise AssertionError("no end")
 
 
-@numba.njit(error_model="numpy")
+@compiled
 def compiled_hit(gravity, wall, r, v):
     return flights.hit(gravity, wall, r, v)
 

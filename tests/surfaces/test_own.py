@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import call
+from conftest import call, compiled
 
 import swarm
 from swarm import tables
@@ -362,7 +362,9 @@ def test_a_constant_that_changes_is_another_surface():
     assert flights == [1.0, 2.0]
 
 
-first_hit_of = numba.njit(error_model="numpy")(lambda surface, r, v: surface.first_hit(r, v))
+@compiled
+def first_hit_of(surface, r, v):
+    return surface.first_hit(r, v)
 
 
 def test_the_class_is_named_by_the_code():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from compared import Inner, Record, assert_the_same, bits, compiled_only, in_kernel
 
-from swarm.kernel import jit as _jit
+from swarm.kernel import record as records
 from swarm.kernel.jit import inlined, outlined
 from swarm.kernel.trace.frame import UNROLLED
 
@@ -368,52 +368,69 @@ def test_helpers_in_loops_of_helpers(is_outlined):
         assert bits(traced(*case)) == bits(nests(*case)), case
 
 
-@_jit.by_type
-def weight(thing, x):
-    return x
+class Weight(records.Record):
+    """What a helper asks of things of several classes."""
 
+    is_light = False
 
-@weight.register(Record)
-def _(thing, x):
-    if thing.inner.flag:
-        return thing.x
-    return x * thing.n
-
-
-@weight.register(type(None))
-def _(thing, x):
-    return 0.5
-
-
-@weight.register(float)
-def _(thing, x):
-    return thing + x
-
-
-@_jit.by_type_outlined
-def weighed(chain, x, n):
-    return x
-
-
-@weighed.register(tuple)
-def _(chain, x, n):
-    if len(chain) == 0:
+    def of(self, x):
         return x
-    x = weight(chain[0], x)
-    if x > 100.0:
-        return -1.0
-    return weighed(chain[1:], x + 1.0, n) if n > 0 else x
+
+    def weighed(self, x, n):
+        return self.of(x)
 
 
-CHAIN = (Record(3.0, 2, Inner(0.0, True)), None, 1.5, 7, Record(3.0, 2, Inner(0.0, False)))
+class Half(Weight):
+    is_light = True
+
+    def of(self, x):
+        return 0.5
+
+
+class Product(Weight):
+    factor: float
+    flag: bool
+
+    @property
+    def twice(self):
+        return 2.0 * self.factor
+
+    def of(self, x):
+        if self.flag:
+            return self.twice
+        return x * self.factor
+
+    def weighed(self, x, n):
+        if n > 1:
+            return super().weighed(x, n) + 1.0
+        return Weight.weighed(self, x, n)
+
+
+class Larger(Product):
+    def of(self, x):
+        return super().of(x) if x > 0.0 else 1.0 + super().of(-x)
+
+
+def weighed(chain, x, n):
+    for one in chain:
+        if one is None or one.is_light:
+            continue
+        x = one.weighed(x, n)
+        if x > 100.0:
+            return -1.0
+    return x
+
+
+CHAIN = (Product(3.0, True), None, Half(), Weight(), Larger(3.0, False), Larger(0.5, True))
 
 
 def over_a_chain(chain, x, n):
     return weighed(chain, x, n)
 
 
-def test_functions_chosen_by_classes_over_a_chain():
-    traced = in_kernel(over_a_chain)
+@pytest.mark.parametrize("is_outlined", [False, True], ids=["inlined", "outlined"])
+def test_methods_of_records_over_a_tuple(is_outlined):
+    traced = in_kernel(over_a_chain, is_outlined)
     for case in cases():
         assert bits(traced(CHAIN, *case)) == bits(over_a_chain(CHAIN, *case)), case
 
@@ -426,7 +443,7 @@ def is_one_thing(thing, x):
     return thing * x
 
 
-@pytest.mark.parametrize("thing", [None, CHAIN[0], 2.5], ids=["none", "record", "number"])
+@pytest.mark.parametrize("thing", [None, Record(3.0, 2, Inner(0.0, True)), 2.5], ids=["none", "record", "number"])
 def test_decisions_that_are_known_leave_one_way(thing):
     traced = in_kernel(is_one_thing)
     for x in NUMBERS:

@@ -234,7 +234,7 @@ def trace_kernels(made):
     """Trace the kernels of a run, without LLVM."""
     count = 0
     for kernel, arguments in made.calls():
-        helper = helpers.Helper(kernel.py_func, lambda _, function=kernel.py_func: function, outlined=False)
+        helper = helpers.Helper(kernel.py_func, kernel.py_func, outlined=False)
         context = kernel.targetdescr.typing_context
         context.refresh()
         with deep():

@@ -17,19 +17,18 @@ import secrets
 import threading
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from numpy.typing import NDArray
 
 from ... import interrupt
 from ...errors import RunError, SceneError, WallTimeError
 from ...frames import Frame
-from .. import machine
 from ..machine import End, warn_open
-from ..options import RunOptions, Task
+from ..options import Task
+from ..progress import Display, display
 from . import connection, joined, shards, worker
 from .sharded import Sharded
-
-if TYPE_CHECKING:
-    from ..progress import Display
 
 _COMPLETE, _FAILED = "complete", "failed"
 # Seconds from one checkpoint of a shard to the next where the options name none; from one look at the shards to the
@@ -39,8 +38,9 @@ _SAVED, _GLANCE, _TOLD, _FOLLOWS = 60.0, 0.2, 1.0, 1.0
 _READING = 0.1
 
 
-def require_options(options: RunOptions) -> None:
-    """Raise a SceneError where options do not go with a cluster."""
+def _require_shards(task: Task) -> None:
+    """Raise a SceneError where options do not go with a cluster, or all that is advanced depends on one another."""
+    options = task.options
     if options.trajectory is None:
         raise SceneError("trajectory must be given with a cluster, whose shards it joins, got none; add trajectory=")
     if options.recording is not None or options.live:
@@ -53,12 +53,7 @@ def require_options(options: RunOptions) -> None:
             f"impacts must be None with a cluster, whose shards keep no common log, got {options.impacts}; run without "
             "a cluster"
         )
-
-
-def require_independent(task: Task) -> None:
-    """Raise a SceneError where what the run advances is not independent of one another."""
-    if task.scene.reacts():
-        i = next(i for i, surface in enumerate(task.scene.surfaces) if surface.reacts())
+    for i in (i for i, surface in enumerate(task.scene.surfaces) if surface.reacts()):
         raise SceneError(
             f"surfaces[{i}] must not react with a cluster: through a wall that has a mass or an inertia every particle "
             "depends on all others, so that they cannot be shards; give the wall a motion in place of it, or run "
@@ -74,15 +69,12 @@ def carry_out(task: Task, session: Sharded) -> End:
         RunError: a shard failed.
         KeyboardInterrupt, WallTimeError: it was stopped; its shards have saved their checkpoints.
     """
-    require_options(task.options)
-    require_independent(task)
+    _require_shards(task)
     if task.scene.is_open():
         warn_open()
     target = Path(task.options.trajectory).absolute()
     saved = task.options.checkpoint or _SAVED
     task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))
-    from ..progress import display
-
     stopped = threading.Event()
     with session, interrupt.taken_by(stopped.set):
         session.prepare_shards(task)
@@ -90,16 +82,16 @@ def carry_out(task: Task, session: Sharded) -> End:
             connection.require_same_versions(client)
             connection.require_shared(client, target.parent)
             one = _Run(task, session, client, stopped, show)
-            one.wait()
+            observables = one.wait()
         end = shards.joined_end(one.folder, task, one.bounds)
         session.finish()
-        return end._replace(observables=machine.read_back(target), wall_time=session.wall_time())
+        return end._replace(observables=observables, wall_time=session.wall_time())
 
 
 class _Run:
     """The shards of a run, handed out."""
 
-    def __init__(self, task: Task, session: Sharded, client: Any, stopped: threading.Event, show: "Display") -> None:
+    def __init__(self, task: Task, session: Sharded, client: Any, stopped: threading.Event, show: Display) -> None:
         if stopped.is_set():
             raise KeyboardInterrupt
         self._task, self._session, self._client, self._stopped, self._show = task, session, client, stopped, show
@@ -125,8 +117,8 @@ class _Run:
         else:
             self._shares[said["shard"]] = said["share"]
 
-    def wait(self) -> None:
-        """Wait for all shards, and join what they have stored, also where they were stopped or one failed."""
+    def wait(self) -> dict[str, NDArray[Any]]:
+        """The observables of all frames, when all shards have ended: they are joined also where some were stopped."""
         failed, stops, told = "", False, -math.inf
         try:
             while self._left:
@@ -146,8 +138,10 @@ class _Run:
         finally:
             self._client.unsubscribe_topic(self._token)
             self._client.cancel(list(self._left))
-        frames, moment = joined.write(self.folder, self._task, self.bounds, self._session.identity)
+        seen = joined.write(self.folder, self._task, self.bounds, self._session.identity)
         self._follow()
+        frames = len(seen["time"]) if seen else 0
+        moment = float(seen["time"][-1]) if seen else 0.0
         if stops:
             self._session.keep(max(0, frames - 1), moment)
         if failed:
@@ -156,6 +150,7 @@ class _Run:
             raise KeyboardInterrupt
         if stops:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+        return seen
 
     def _outcome(self, future: Any, k: int) -> tuple[str, str]:
         """What became of a shard: its state, and the sentence of a failure."""

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import observables
 from ...lanes.arrays import booked
 from ...output.trajectory import load
 from ...output.writer import TrajectoryWriter
 from .. import energies
-from ..machine import CHUNK_SUMS
+from ..machine import CHUNK_SUMS, Columns
 from ..options import Task
 from . import shards
 
@@ -76,7 +77,6 @@ class JoinedWriter(TrajectoryWriter):
     """
 
     def __init__(self, folder: Path, task: Task, bounds: list[int], frames: int, identity: dict[str, Any]) -> None:
-        assert task.options.trajectory is not None
         self._folder, self._bounds, self._frames = folder, bounds, frames
         super().__init__(
             task.options.trajectory, task.options.storage, task.scene, task.method, task.bodies or task.particles,
@@ -118,19 +118,19 @@ class JoinedWriter(TrajectoryWriter):
         group.create_virtual_dataset("value", layout)
 
 
-def write(folder: Path, task: Task, bounds: list[int], identity: dict[str, Any]) -> tuple[int, float]:
-    """Write the frames that every shard holds in place of an earlier file: how many they are, and the last time [s].
+def write(folder: Path, task: Task, bounds: list[int], identity: dict[str, Any]) -> dict[str, NDArray[Any]]:
+    """Write the frames that every shard holds in place of an earlier file: their observables.
 
     If there is none nothing is written.
     """
-    seen = seen_of(folder, task, bounds)
+    seen, kept = seen_of(folder, task, bounds), Columns()
     head = list(itertools.islice(seen, 1))
-    if not head:
-        return 0, 0.0
-    frames, last = head[0][0], 0.0
-    with JoinedWriter(folder, task, bounds, frames, identity) as put:
-        nothing: Any = None
-        numbered = enumerate(one for _frames, one in itertools.chain(head, seen))
-        while some := list(itertools.islice(numbered, _AT_ONCE)):
-            put([(k, last := one["time"], nothing, one) for k, one in some])
-    return frames, last
+    if head:
+        with JoinedWriter(folder, task, bounds, head[0][0], identity) as put:
+            nothing: Any = None
+            numbered = enumerate(one for _frames, one in itertools.chain(head, seen))
+            while some := list(itertools.islice(numbered, _AT_ONCE)):
+                put([(k, one["time"], nothing, one) for k, one in some])
+                for _k, one in some:
+                    kept.add(one)
+    return kept.arrays()

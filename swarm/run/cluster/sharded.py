@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from . import shards
 class Sharded(Session):
     """As `Session`; its checkpoint holds the bounds of the shards, which have checkpoints of their own."""
 
-    _bounds: list[int] | None = None
+    # Those of the session before, or of this one once it has begun.
+    _bounds: Any = None
 
     def prepare_shards(self, task: Task) -> None:
         """Find where this session starts, as `Session.prepare`.
@@ -24,24 +26,21 @@ class Sharded(Session):
             SceneError, CompleteError, FileError: as there.
         """
         self._hold(task, None)
-        assert self._trajectory is not None
-        assert self._path is not None
         self._times = np.array([task.options.times.until, task.options.times.every])
         if self._resumes and self._path.exists():
-            self._find_shards(self._path)
+            self._find_shards()
         elif task.options.overwrite:
             return
         elif self._resumes and self._trajectory.exists():
-            self._refuse_to_restart(self._trajectory, task.options.until)
+            self._refuse_to_restart(task.options.until)
         elif (folder := shards.folder_of(self._trajectory)).exists():
             raise SceneError(
                 f"{folder} holds the shards of another run; resume that with --resume, choose another name for the "
                 "trajectory, or overwrite it (--overwrite, overwrite=True)"
             )
 
-    def _find_shards(self, path: Path) -> None:
-        assert self._job is not None
-        saved, arrays = checkpoint.read(path)
+    def _find_shards(self) -> None:
+        path, (saved, arrays) = self._path, checkpoint.read(self._path)
         if checkpoint.SHARDS not in arrays:
             raise SceneError(f"{path} is of a run without a cluster; resume it without one")
         saved.require_same(self._job, path)
@@ -61,7 +60,6 @@ class Sharded(Session):
 
     def begin(self, task: Task, count: int) -> tuple[Path, list[int]]:
         """The folder of the shards and their bounds, those of the session before or so many new ones."""
-        assert self._trajectory is not None
         folder = shards.folder_of(self._trajectory)
         if self._bounds is None:
             self._bounds = shards.bounds_of(len(task.particles if task.bodies is None else task.bodies), count)
@@ -73,8 +71,6 @@ class Sharded(Session):
 
     def keep(self, frame: int, moment: float) -> None:
         """Save what a later session needs besides the checkpoints of the shards."""
-        assert self._job is not None
-        assert self._path is not None
         job = dataclasses.replace(self._job, frame=frame, time=moment, wall_time=self.wall_time())
         checkpoint.save(
             self._path, job, {checkpoint.SHARDS: np.array(self._bounds), "times": self._times}, self._owners
@@ -82,7 +78,5 @@ class Sharded(Session):
 
     def finish(self) -> None:
         """Remove what only an unfinished run needs."""
-        assert self._trajectory is not None
-        assert self._bounds is not None
         paths.checkpoint_of(self._trajectory).unlink(missing_ok=True)
         shards.tidy(shards.folder_of(self._trajectory), len(self._bounds) - 1)

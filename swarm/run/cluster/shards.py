@@ -141,17 +141,18 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
     with open(folder / "whole.pickle", "rb") as file:
         whole: Whole = cloudpickle.load(file)
     first, last = whole.bounds[k : k + 2]
-    options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
     files = {name: folder / f"{name}.npy" for name in _ARRAYS}
     arrays = {name: np.load(file, mmap_mode="r") for name, file in files.items() if file.exists()}
-    common = whole.scene, whole.method, options
+    bodies = None
     if whole.body is None:
-        mine = {name: array[..., first:last] for name, array in arrays.items()}
-        return Task(common[0], Particles(**mine), *common[1:], None, first, whole.start), len(whole.bounds) - 1
-    shape = 3, len(whole.body), -1
-    position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
-    bodies = Bodies.unchecked(whole.body, position, velocity)
-    return Task(common[0], bodies.particles(), *common[1:], bodies, first, whole.start), len(whole.bounds) - 1
+        particles = Particles(**{name: array[..., first:last] for name, array in arrays.items()})
+    else:
+        shape = 3, len(whole.body), -1
+        position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
+        bodies = Bodies.unchecked(whole.body, position, velocity)
+        particles = bodies.particles()
+    options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
+    return Task(whole.scene, particles, whole.method, options, bodies, first, whole.start), len(whole.bounds) - 1
 
 
 def write_end(path: Path, end: End) -> None:

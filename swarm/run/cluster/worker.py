@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import functools
 import os
 import socket
 import time
@@ -35,15 +36,12 @@ def run(folder: str, k: int, token: str) -> tuple[str, str]:
     """Run shard k: ("complete" or "stopped", ""), or ("failed", its sentence). A task of Dask."""
     from distributed import get_worker
 
-    worker = get_worker()
+    tell = functools.partial(get_worker().log_event, token)
 
     def report(moment: float, until: float) -> None:
-        worker.log_event(token, {"shard": k, "share": moment / until})
+        tell({"shard": k, "share": moment / until})
 
-    def compiling(sentence: str) -> None:
-        worker.log_event(token, {"compiling": sentence})
-
-    return advance(Path(folder), k, token, report, compiling)
+    return advance(Path(folder), k, token, report, lambda sentence: tell({"compiling": sentence}))
 
 
 def advance(

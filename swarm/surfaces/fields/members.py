@@ -35,6 +35,9 @@ class Members(Record):
     table: Array  # (members, width) the numbers of each
     grid: Grid
 
+    # As of a wall: what is asked before it is known which one is meant.
+    flat = False
+
     def count(self):
         """How many they are."""
         return float(self.table.shape[0])
