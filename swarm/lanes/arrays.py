@@ -88,7 +88,7 @@ class Lanes(NamedTuple):
 
     @outlined
     def _pick_up(self, halted, i, k):
-        """What a halt left of particle i into lane k; whether there is any."""
+        """Particle i into lane k as a halt left it, if one did; whether one did."""
         first, last = 0, halted.particle.size
         while first < last:
             middle = (first + last) // 2
@@ -152,7 +152,7 @@ class Halted(Record):
     rows: Array  # (ROWS + booked, particles) the lane's rows, then its impulses
 
     def time_left(self):
-        """What is left of the frame of each."""
+        """The time left of the frame of each."""
         return self.rows[Flying.left.row]
 
 
@@ -205,6 +205,11 @@ class Share(NamedTuple):
     def watches(self):
         """The log and the counts of impacts, if the run has any."""
         return tuple(one for one in (self.log, self.counts) if one is not None)
+
+    def note_impact(self, method, chain, i, struck):
+        """Log and count an impact of particle i, a `log.Struck`."""
+        for watch in self.watches():
+            watch.add_row(method, chain, self.state, i, struck)
 
     def hand_over(self, i, phase):
         """Leave particle i to the kernel of a phase."""

@@ -64,7 +64,7 @@ def _one_by_one(phase, advance, scene, share):
 
 @outlined
 def _decide(method, chain, gravity, share, i):
-    """What becomes of particle i; whether it moves on."""
+    """Decide whether particle i goes on along its walls, or flies; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     carried, chain = chain, at(chain, left)
@@ -75,10 +75,9 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    is_hot = method.thermal is not None
-    if is_hot and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
+    if method.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
-    settles = _settles(method, carried, gravity, p)
+    moving, settles = wall_laws.moving(method.laws), _settles(method, carried, gravity, p)
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -90,12 +89,10 @@ def _decide(method, chain, gravity, share, i):
     state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
-        struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
-        for watch in share.watches():
-            watch.add_row(method, carried, state, i, struck)
+        share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, left, found.impulse))
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
-        _spare(wall_laws.moving(method.laws), chain, state, i, found, wall)
-    u = wall_velocity(wall_laws.moving(method.laws), chain, wall, r)
+        _spare(moving, chain, state, i, found, wall)
+    u = wall_velocity(moving, chain, wall, r)
     book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), wall_laws.loses(method.laws))
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
@@ -160,8 +157,7 @@ def _exchange_heat(method, chain, gravity, share, i):
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
-    for watch in share.watches():
-        watch.add_row(method, chain, state, i, struck)
+    share.note_impact(method, chain, i, struck)
     state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)

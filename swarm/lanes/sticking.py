@@ -1,4 +1,4 @@
-"""What rests where walls move: it goes with its wall as long as friction, or a balance of forces, holds it there.
+"""Particles that rest where walls move: each goes with its wall as long as friction, or a balance of forces, holds it.
 
 Until then another wall may come, and strike it.
 """

@@ -83,7 +83,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
 
 
 def _judge(contacts, i):
-    """What becomes of a lane after its trial."""
+    """The action of a lane after its trial."""
     rule, pace = contacts.rule, contacts.pace
     pace.fresh[i] = False
     if pace.body[i] < 0 or 0 < pace.waits[i] <= _WAITS:

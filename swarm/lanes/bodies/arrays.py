@@ -13,7 +13,7 @@ Counts = NDArray[np.int64]
 
 
 class Ties(NamedTuple):
-    """What ties the points of a body: rows of links, then of springs, then of edges of the elastic strain.
+    """The ties between the points of a body: rows of links, then of springs, then of edges of the elastic strain.
 
     The vector of a row is y = r_a - r_b.
     """

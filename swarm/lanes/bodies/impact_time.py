@@ -93,7 +93,7 @@ def _inside(rule, pace, i, gap):
 
 
 def _weight(gap, before):
-    """What an end that stays counts when the other moves again (Anderson and Bjorck)."""
+    """The weight of an end of the bracket that stays when the other moves again (Anderson and Bjorck)."""
     weight = 1.0 - gap / before
     return weight if weight > 0.0 else 0.5
 
