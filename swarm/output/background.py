@@ -71,7 +71,7 @@ def _some(state: State, kept: slice) -> State:
 
 
 def _copied(state: State) -> list[str]:
-    """What the writers take of a state, as far as it is there."""
+    """The parts of a state that writers take, as far as it has them."""
     return [name for name in KEPT if getattr(state, name) is not None]
 
 

@@ -59,7 +59,7 @@ def red_green_blue(packed: Colours) -> Floats:
 
 
 def ties(axes: Any, lines: tuple[Floats, Colours], faces: tuple[Floats, Colours]) -> list[Any]:
-    """What ties the points of bodies: faces, or else lines, if there are any; returns what draws them.
+    """The faces of bodies, or else their lines, if there are any; returns their artists.
 
     Lines (S, 2, 3), wider the fewer there are, have colours (S,), 0xRRGGBBAA; triangles (T, 3, 3), which are shaded,
     have those of their corners (T, 3).
@@ -88,7 +88,7 @@ def particles(
     """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale.
 
     The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none. The axes end at the
-    corners of the box; None: around all that is drawn. Returns what draws the dots, and the wires of each wall.
+    corners of the box; None: around all that is drawn. Returns the artists of the dots, and of the wires of each wall.
     """
     points = np.asarray(positions)
     axes.computed_zorder = False  # the particles would hide the solids among them

@@ -1,4 +1,4 @@
-"""What pictures and recordings show of a run: some of its particles, or some of its bodies, whole."""
+"""The particles, or the bodies, of a run that pictures and recordings show."""
 
 import math
 
@@ -15,7 +15,7 @@ _FLAT = 1e-6
 
 
 class Drawn:
-    """Which particles or bodies are shown, evenly chosen, and what ties their points together.
+    """The particles or bodies that are shown, evenly chosen, and the lines and faces between their points.
 
     A body with faces is shown by its contact points, its faces and the edges between them, another by its points and
     its bonds.

@@ -50,5 +50,5 @@ def has_open(path: Path) -> bool:
 
 
 def _open() -> list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]]:
-    """Those that are open still."""
+    """The files that are open still."""
     return [(found, identity) for found, identity in _opened if found()]

@@ -8,7 +8,7 @@ A frame is in memory at a time. 10 000 particles and 500 frames take, read and w
 import contextlib
 import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from .. import checks
 from ..errors import SceneError
@@ -17,14 +17,11 @@ from . import paths
 from .exported import Exported, Progress
 from .replaced import named_when_whole
 
-if TYPE_CHECKING:
-    from .trajectory import Trajectory
-
 SUFFIXES = (".vtkhdf", ".xyz", ".gsd")
 
 
 def export(
-    trajectory: "Trajectory",
+    trajectory: Any,
     path: str | Path,
     frames: slice | int | None,
     particles: int,
@@ -38,18 +35,13 @@ def export(
     if kind not in SUFFIXES:
         raise SceneError(f"export: expected a file name that ends in {', '.join(SUFFIXES)}, got {target}")
     checks.flag("surfaces", surfaces)
-    chosen = Exported(trajectory, frames, particles)
+    chosen = Exported(trajectory, frames, particles, progress)
     targets = [target]
     if kind == ".vtkhdf" and surfaces and trajectory.scene.surfaces:
         targets.append(target.with_suffix(".surfaces.vtkhdf"))
     for one in targets:
         paths.check_distinct({"export": one}, {"trajectory": trajectory.path})
         paths.check_target(one, overwrite, "export")
-
-    def told(done: int) -> None:
-        if progress is not None:
-            progress(done, len(chosen.numbers))
-
     # What is missing is found before anything is written.
     with needed_by(f"an export as {kind}", "gsd"):
         form = importlib.import_module(f".{kind[1:]}", __package__)
@@ -59,5 +51,5 @@ def export(
                 from . import walls
             drawn = walls.shapes(chosen)
             walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
-        form.write(chosen, stack.enter_context(named_when_whole(target)), told)
+        form.write(chosen, stack.enter_context(named_when_whole(target)))
     return targets

@@ -1,7 +1,7 @@
-"""What of a trajectory is exported: some of its frames, and some of its particles or bodies, frame by frame."""
+"""The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from .. import checks
 from ..errors import SceneError
 from .stored import whole
-
-if TYPE_CHECKING:
-    from .trajectory import Trajectory
 
 # Is called with how many frames are written, and how many there are to write.
 Progress = Callable[[int, int], None]
@@ -39,13 +36,13 @@ class Exported:
         periods: the lengths of the cell that repeats, 0 where none does.
     """
 
-    def __init__(self, trajectory: "Trajectory", frames: slice | int | None, particles: int) -> None:
+    def __init__(self, trajectory: Any, frames: slice | int | None, particles: int, progress: Progress | None) -> None:
         """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
 
         Raises:
             SceneError: there is no such frame, or the file keeps no particles.
         """
-        self.trajectory = trajectory
+        self.trajectory, self._progress = trajectory, progress
         trajectory.require_frames()
         self.numbers = _numbers(frames, len(trajectory))
         self.times = trajectory.times[list(self.numbers)]
@@ -60,14 +57,16 @@ class Exported:
         self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
 
     def __len__(self) -> int:
-        """How many particles a frame has."""
+        """Number of particles of a frame."""
         return len(self.ids)
 
     def moments(self) -> Iterator[Moment]:
-        """The frames one after the other."""
-        for number, time in zip(self.numbers, self.times.tolist(), strict=True):
+        """The frames one after the other, each of which is written when the next is asked for."""
+        for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
             held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}
             yield Moment(number, time, held.pop("position"), held.pop("velocity"), held)
+            if self._progress is not None:
+                self._progress(done + 1, len(self.numbers))
 
 
 def _numbers(frames: slice | int | None, n: int) -> range:

@@ -1,4 +1,4 @@
-"""What a trajectory or a log of impacts holds, and whether its run went well: texts by their names."""
+"""The content of a trajectory or a log of impacts, and whether its run went well: texts by their names."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from ..observables import drift
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
-    """What a `Trajectory` holds, and whether the run went well."""
+    """The content of a `Trajectory`, and whether the run went well."""
     times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
     last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
     rows = {
@@ -26,7 +26,7 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
 
 
 def of_log(log: Any) -> dict[str, str]:
-    """What an `ImpactLog` holds."""
+    """The content of an `ImpactLog`."""
     times, scene = log.times, log.scene
     which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
     return {
@@ -54,7 +54,7 @@ def of_scene(scene: Any) -> dict[str, str]:
 
 
 def of_meshes(scene: Any) -> dict[str, str]:
-    """How far the surfaces of a `Scene` are from the meshes that they were made from; nothing where none was."""
+    """Distances of the surfaces of a `Scene` from the meshes that they were made from; nothing where none was."""
     surfaces = () if scene is None else scene.surfaces
     made = {i: one for i, one in enumerate(surfaces) if getattr(one, "mesh_error", None) is not None}
     said = [

@@ -7,7 +7,6 @@ schema has no box that does not repeat. Frames have the step number, and log/tim
 log/particles/impacts, and log/particles/escape_time where there are openings. Images are int32.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 
 import gsd.hoomd
@@ -19,7 +18,7 @@ from .exported import Exported, Moment
 from .origin import origin_of
 
 
-def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
+def write(chosen: Exported, path: Path) -> None:
     """Write the particles."""
     scene = chosen.trajectory.scene
     low, high = np.array(scene.bounds())
@@ -28,9 +27,8 @@ def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
     center[repeats] = 0.5 * (low[repeats] + high[repeats])
     needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low - center), abs(high - center)), 0.0)
     with gsd.hoomd.open(str(path), "w") as file:
-        for done, moment in enumerate(chosen.moments()):
+        for moment in chosen.moments():
             file.append(_frame(chosen, moment, center, needed))
-            told(done + 1)
 
 
 def _frame(

@@ -82,7 +82,7 @@ class ImpactLog(Stored):
         self._surface, self._member = surface[()].astype(np.int32), member[()].astype(np.int32)
 
     def __len__(self) -> int:
-        """How many impacts there are, of complete frames."""
+        """Number of impacts, of complete frames."""
         return self._rows
 
     def __repr__(self) -> str:
@@ -103,7 +103,7 @@ class ImpactLog(Stored):
             return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})
 
     def counts(self) -> NDArray[np.int64]:
-        """How many impacts there are on each surface, with a last row of each particle that passed an opening."""
+        """Number of impacts on each surface, with a last row of each particle that passed an opening."""
         counts = np.zeros(self._surfaces(), np.int64)
         for k in range(0, self._rows, _AT_ONCE):
             with self._reading(f"its rows from {k} on"):
@@ -113,7 +113,7 @@ class ImpactLog(Stored):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What identifies the run."""
+        """The values that identify the run."""
         texts = {name: self._text(name) for name in ("scene", "method", "kept")}
         return {**texts, "particles": self.count, "start": self.start, "seed": self.seed}
 
@@ -203,7 +203,7 @@ class ImpactLog(Stored):
         return int(self._surface.max()) + 1 if len(self._surface) else 0
 
     def _part(self, rows: slice, wanted: tuple[Any, Any], span: tuple[float, float]) -> NDArray[Any]:
-        """What is wanted of some rows."""
+        """The wanted ones of some rows."""
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
             particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
@@ -225,7 +225,7 @@ class ImpactLog(Stored):
 
 
 def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
-    """Which of n are wanted."""
+    """Whether each of n is wanted."""
     if numbers is None:
         return np.ones(n, np.bool_)
     listed = numbers if isinstance(numbers, (Sequence, np.ndarray)) else [numbers]

@@ -31,7 +31,7 @@ Rows = dict[str, NDArray[Any]]
 
 
 def about(scene: Scene, method: Method, kept: str, identity: dict[str, Any]) -> dict[str, Any]:
-    """What a log says of its run: group/name -> text, number or array."""
+    """The description of a run in its log: group/name -> text, number or array."""
     surface, member = scene.members()
     arrays: dict[str, Any] = {}
     texts = {name: text for name, text in descriptions(scene, method, Storage(), arrays).items() if name != "storage"}

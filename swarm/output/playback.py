@@ -143,7 +143,7 @@ class Playback:
         return corners[self._triangles], colours[self._triangles]
 
     def _row(self, entity: str, name: str, number: int) -> Any:
-        """What a column holds of a frame, as nested lists; none if it has no such frame."""
+        """The entry of a frame in a column, as nested lists; empty if there is none."""
         column, row = self._rows.get((entity, name), {}).get(number, (None, 0))
         return [] if column is None else column[row].as_py()
 

@@ -27,7 +27,7 @@ _FILE, _CELL, _SERIES = (17.0, 7.6), 2.5, 0.64
 
 @dataclass(frozen=True)
 class Content:
-    """What a picture shows of a run.
+    """The part of a run that a picture shows.
 
     Attributes:
         name: of the file, or "".
@@ -58,7 +58,7 @@ def draw(trajectory: Any, target: Path) -> None:
 
 
 def content_of(trajectory: Any) -> Content:
-    """What a picture shows of a `Trajectory`."""
+    """The part of a `Trajectory` that a picture shows."""
     trajectory.require_frames()
     last = len(trajectory) - 1
     numbers = {"start": 0, "end": last} if last else {"start": 0}
@@ -103,13 +103,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
     lines = series.lines_of(content.scene, content.method, shapes, content.body)
-    before: series.Seen = None
-    rows = []
-    for k, moment in enumerate(times):
-        now = {name: column[k] for name, column in seen.items()}
-        rows.append([line.value(moment, now, before) for line in lines])
-        before = moment, now
-    values = {line.path: column for line, column in zip(lines, np.array(rows).T, strict=True)}
+    values = {line.path: line.values(times, seen) for line in lines}
     shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
     views = series.views_of(shown)
     count = len(views) + bool(content.frames)  # one more is for the speeds
@@ -144,7 +138,7 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
 
 
 def _speeds(axes: Any, content: Content) -> None:
-    """How many particles have which speed, at the start and at the end."""
+    """Histograms of the speeds, at the start and at the end."""
     top = 1.05 * max(frame.fastest() for frame in content.frames.values()) or 1.0
     for name, frame in content.frames.items():
         speeds = np.sqrt((frame.velocity**2).sum(axis=0))

@@ -1,4 +1,4 @@
-"""What becomes of a trajectory in Python: pictures, films, a viewer, tables, labelled arrays, and other formats."""
+"""Views of a trajectory in Python: pictures, films, a viewer, tables, labelled arrays, and other formats."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

@@ -50,7 +50,7 @@ _LATEST = 9.2e9
 
 @dataclass(frozen=True)
 class Settings:
-    """What a recording shows.
+    """The choices of a recording.
 
     Args:
         particles: the most that are recorded, evenly chosen; of bodies, the most points, and bodies are whole.
@@ -104,8 +104,9 @@ class RecordingWriter:
                 f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
             )
         self._scale, self._values = colours.colouring(settings.color, scene, method, start)
-        self._before: series.Seen = None
-        self._rows: list[tuple[int, float, list[float]]] = []
+        # The number, the time and the observables of frames whose time series are still to be sent, and of that before.
+        self._rows: list[tuple[int, float, dict[str, Any]]] = []
+        self._before: list[tuple[int, float, dict[str, Any]]] = []
         self._due = 0.0
         self._failed = False
         self._url = viewer.live_url(settings.live) if settings.live else None
@@ -160,9 +161,7 @@ class RecordingWriter:
             shown.append(position - self._center[:, None])
             colour.append(packed)
             lines.append(tints)
-            values = [line.value(moment, seen, self._before) for line in self._series]
-            self._rows.append((number, moment, values))
-            self._before = moment, seen
+            self._rows.append((number, moment, seen))
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
@@ -212,13 +211,17 @@ class RecordingWriter:
 
     def _send_rows(self) -> None:
         """Send the time series of the frames since the last call."""
+        known = self._before + self._rows
         if self._rows:
-            numbers, times = (np.array([row[part] for row in self._rows]) for part in (0, 1))
-            for line, values in zip(self._series, np.array([row[2] for row in self._rows]).T, strict=True):
-                known = ~np.isnan(values)
-                if known.any():
-                    self._send(line.path, numbers[known], times[known], rr.Scalars.columns(scalars=values[known]))
-        self._rows = []
+            numbers, times = (np.array([row[part] for row in known]) for part in (0, 1))
+            seen = {name: np.array([row[2][name] for row in known]) for name in known[0][2]}
+            for line in self._series:
+                values = line.values(times, seen)
+                new = ~np.isnan(values)
+                new[: len(self._before)] = False
+                if new.any():
+                    self._send(line.path, numbers[new], times[new], rr.Scalars.columns(scalars=values[new]))
+        self._before, self._rows = known[-1:], []
         self._due = time.monotonic() + _PATIENCE
 
     def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:

@@ -1,11 +1,13 @@
 """The time series that recordings and plots show, from the observables of frames."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..bodies.body import Body
 from ..methods import Method
+from ..particles import Floats
 from ..scene import Scene
 from .shapes import Shape
 
@@ -27,9 +29,6 @@ VIEWS = {
 # Views that pictures leave out where all values are 0.
 RARE = ("sliding",)
 
-# A frame's time [s] and its observables.
-Seen = tuple[float, dict[str, Any]] | None
-
 
 @dataclass(frozen=True)
 class Line:
@@ -46,19 +45,17 @@ class Line:
     logarithm: bool = False
     per: float | None = None
 
-    def value(self, moment: float, seen: dict[str, Any], before: Seen) -> float:
-        """The value at a frame, whose time and observables these are; NaN where there is none."""
-        now = self._in(seen)
-        if self.logarithm:
-            return math.log10(max(now, 10.0**NOTHING))
-        if self.per is None:
-            return now
-        return math.nan if before is None else (now - self._in(before[1])) / ((moment - before[0]) * self.per)
-
-    def _in(self, seen: dict[str, Any]) -> float:
+    def values(self, times: Floats, seen: dict[str, Any]) -> Floats:
+        """The values at frames, whose times [s] and observables these are; NaN at the first where they are rates."""
         # Files of older versions have no "sliding", and runs of particles no "work".
-        value = seen.get(self.observable, 0.0)
-        return float(value if self.surface is None else value[self.surface])
+        column = np.asarray(seen.get(self.observable, np.zeros(len(times))), np.float64)
+        if self.surface is not None:
+            column = column[:, self.surface]
+        if self.logarithm:
+            return np.asarray(np.log10(np.maximum(column, 10.0**NOTHING)))
+        if self.per is None:
+            return column
+        return np.diff(column, prepend=np.nan) / (np.diff(times, prepend=np.nan) * self.per)
 
 
 def group_of(path: str) -> str:

@@ -89,7 +89,7 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
 
 
 def since_start(scene: Scene, i: int, position: Floats, orientation: Floats) -> tuple[Floats, Floats]:
-    """How surface i has turned and moved since the start: what was at x0 is at turn x0 + way.
+    """The turn and the way of surface i since the start: its point that was at x0 is at turn x0 + way.
 
     `position` and `orientation` are its observables at a frame, `wall_position` and `wall_orientation`.
     """
@@ -117,7 +117,7 @@ def _axes(box: Corners, count: int) -> list[Floats]:
 
 
 def _mesh(values: Floats, box: Corners) -> Mesh:
-    """Where the values at the points of a grid in the box are 0."""
+    """The level 0 of values at the points of a grid in the box."""
     if not values.min() < 0.0 < values.max():
         return _NOTHING
     low, high = box
@@ -213,7 +213,7 @@ class _Walls:
         return mesh, self._owner(middles) if len(triangles) else np.empty(0, np.int64)
 
     def _part(self, i: int, found: tuple[Mesh, NDArray[np.int64]]) -> Mesh:
-        """Those triangles that lie on surface i, with their vertices only."""
+        """The triangles that lie on surface i, with their vertices only."""
         (vertices, triangles, normals), owner = found
         kept, places = np.unique(triangles[owner == i], return_inverse=True)
         return vertices[kept], places.reshape(-1, 3), normals[kept]
@@ -234,7 +234,7 @@ class _Walls:
         return owner
 
     def _wires(self, i: int, vertices: Floats) -> list[Floats]:
-        """Where planes across the three axes cut surface i, from end to end."""
+        """The curves in which planes across the three axes cut surface i, from end to end."""
         first, last = vertices.min(axis=0), vertices.max(axis=0)
         low, high = _around(vertices, self.box)
         curves = []

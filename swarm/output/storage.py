@@ -1,4 +1,4 @@
-"""Which particles a trajectory keeps, and in which form."""
+"""The particles that a trajectory keeps, and their form."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _COMPRESSIONS = ("none", "gzip", "lzf")
 
 @dataclass(frozen=True)
 class Storage:
-    """What a trajectory keeps of every frame; observables are always kept in full.
+    """The part of every frame that a trajectory keeps; observables are always kept in full.
 
     Args:
         frames: "all" particles, "none", or k: every k-th one, beginning with the first.

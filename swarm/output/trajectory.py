@@ -109,7 +109,7 @@ class Trajectory(Presented):
             return Particles(position, velocity, everything["mass"][()], image)
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
-        """What frame k holds of each particle as it is on file, a row each: "position", "velocity", "impacts", ..."""
+        """The columns of frame k as they are on file, a row a particle: "position", "velocity", "impacts", ..."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
@@ -139,7 +139,7 @@ class Trajectory(Presented):
             return Bodies.of_run(body, points.position.reshape(shape), points.velocity.reshape(shape))
 
     def impacts(self, k: int) -> NDArray[np.int64]:
-        """How many impacts each of the particles of frame k has had since the start, (N,)."""
+        """Number of impacts of each of the particles of frame k since the start, (N,)."""
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
@@ -150,7 +150,7 @@ class Trajectory(Presented):
         return np.asarray(counts)
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
-        """When each of the particles of frame k has passed an opening of a wall [s], (N,); NaN of those inside."""
+        """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
         k, name = self._number(k), f"particles/all/{layout.ESCAPES}"
         with self._reading(f"the escapes of frame {k}") as file:
             kept = len(file["particles/all/mass"])

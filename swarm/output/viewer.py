@@ -96,7 +96,7 @@ class _Viewer:
 
 
 def no_driver() -> str | None:
-    """Why the viewer cannot draw here, or None: it needs a Vulkan driver, which may be a software driver."""
+    """The reason why the viewer cannot draw here, or None: it needs a Vulkan driver, which may be a software driver."""
     if sys.platform != "linux":
         return None
     named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")

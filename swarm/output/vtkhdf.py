@@ -6,7 +6,6 @@ follow one another, and Steps says where those of each begin; what does not chan
 fails if steps are also at its root, while that of VTK 9.7 shows the first step for ever if they are not.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +20,14 @@ VERSION = (2, 0)
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
-def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
+def write(chosen: Exported, path: Path) -> None:
     """Write the particles; bonds of bodies are lines."""
     n, frames = len(chosen), len(chosen.numbers)
-    moments = chosen.moments()
     with h5py.File(path, "w") as file:
         root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, n)
         steps = timed(root, chosen, n)
         values: dict[str, Any] = {}
-        for done, moment in enumerate(moments):
+        for done, moment in enumerate(chosen.moments()):
             columns = {"position": moment.position, "velocity": moment.velocity, **moment.more}
             for name, column in columns.items():
                 if name not in values:
@@ -38,7 +36,6 @@ def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
                     if name != "position":
                         steps[f"PointDataOffsets/{name}"] = n * np.arange(frames)
                 values[name][done * n : (done + 1) * n] = column
-            told(done + 1)
         for name, constant in (("id", chosen.ids), ("mass", chosen.mass)):
             root[f"PointData/{name}"], steps[f"PointDataOffsets/{name}"] = constant, np.zeros(frames, np.int64)
 

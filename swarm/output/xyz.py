@@ -4,7 +4,6 @@ Species are X. Lattice and Origin are there where the scene repeats: in a direct
 the length of the scene. Numbers have as many digits as give the same bits again.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -17,13 +16,13 @@ _NAMES = {"position": "pos", "velocity": "velo", "mass": "mass"}
 _KINDS = {"f": "R", "i": "I"}
 
 
-def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
+def write(chosen: Exported, path: Path) -> None:
     """Write the particles."""
     alike = bool((chosen.mass == chosen.mass[0]).all())
     cell = _cell(chosen)
     encode = msgspec.json.Encoder().encode
     with open(path, "wb") as file:
-        for done, moment in enumerate(chosen.moments()):
+        for moment in chosen.moments():
             columns = {"position": moment.position, "velocity": moment.velocity, "id": chosen.ids, **moment.more}
             columns |= {} if alike else {"mass": chosen.mass}
             about = [cell, "Properties=species:S:1"]
@@ -36,11 +35,10 @@ def write(chosen: Exported, path: Path, told: Callable[[int], None]) -> None:
             # A writer of JSON is three times as fast as formatting by Python, with the same digits: [[1.5,2],[...]].
             rows = encode(list(zip(*numbers, strict=True)))
             file.write(b"X " + rows[2:-2].replace(b"],[", b"\nX ").replace(b",", b" ").replace(b"null", b"nan") + b"\n")
-            told(done + 1)
 
 
 def _cell(chosen: Exported) -> str:
-    """What says which cell repeats."""
+    """The keys of the cell that repeats."""
     periods, scene = chosen.periods, chosen.trajectory.scene
     if not periods.any():
         return 'pbc="F F F"'

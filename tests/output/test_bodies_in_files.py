@@ -384,5 +384,5 @@ def test_work_of_anchors_is_no_drift(tmp_path):
     with swarm.load(tmp_path / "run.h5") as trajectory:
         assert observables.drift(trajectory.observables) == 0.0
         lines = {line.path: line for line in series.lines_of(BOX, METHOD, [], trajectory.body)}
-    assert lines["/energy/work"].value(1.0, {"work": 0.25}, None) == 0.25
+    assert lines["/energy/work"].values(np.array([1.0]), {"work": np.array([0.25])}) == [0.25]
     assert "/link_error" not in lines

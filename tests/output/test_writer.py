@@ -88,7 +88,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
     So many chunks that the index of chunks grows several times: in HDF5's ordinary mode a kill in the middle of that
     loses half of them.
     """
-    path, image, batch, frames = tmp_path / "run.h5", tmp_path / "image.h5", 7, 420 if compression == "none" else 140
+    path, image, batch, frames = tmp_path / "run.h5", tmp_path / "image.h5", 7, 420 if compression == "none" else 84
     logs, real = [], h5py.File
 
     def logged(name, mode, **options):
@@ -122,7 +122,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
             file.flush()
             done = max([number for written, number in reported if written <= k + 1], default=0)
             # One that follows a change of the index is worth more than a hundred that append.
-            if done == 0 or (done % (10 * batch) and done < frames - 20 * batch):
+            if done == 0 or (done % (10 * batch) and done < frames - 11 * batch):
                 continue
             cases += 1
             assert done <= require_frames(image, done) <= done + batch
