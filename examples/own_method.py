@@ -3,7 +3,7 @@
     python examples/own_method.py
 
 It is `swarm.Impact` without its care: nothing restores the energy from round-off, walls are elastic, and a particle
-that grazes its wall takes as many impacts as that takes. swarm/methods/contract.py says what a method may register.
+that grazes its wall takes as many impacts as that takes. swarm/methods/contract.py says what a method may have.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,7 @@ from swarm.kernel.jit import select
 from swarm.kernel.vector import dot
 from swarm.methods import contract
 from swarm.methods.base import Method
-from swarm.status import Status
-from swarm.surfaces import flights, fold
+from swarm.surfaces import flights
 
 
 @dataclass(frozen=True)
@@ -44,15 +43,12 @@ class MirrorNumbers(contract.MethodNumbers):
         return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
 
     def contact(self, chain, gravity, lane, wall, solution):
-        n = fold.unit_normal(chain, wall, lane.r)
+        n = chain.unit_normal(wall, lane.r)
         b = dot(lane.v, n)
         # v1 = v0 - 2 (v0.n) n where v0.n > 0
         impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
         hits = select(wall >= 0.0, 1.0, 0.0)
         return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0, False)
-
-    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
-        return contract.Contact(lane.r, lane.v, lane.left, wall, 0.0, 0.0, 0.0, False), Status.STALLED.value
 
 
 if __name__ == "__main__":

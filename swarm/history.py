@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contact import corner, reflection, uzawa
-from .contact.records import Step
+from .contact.impulse import Step
 from .contact.regularisation import regularisation
 from .errors import RunError, SceneError
 from .kernel.gravity import accelerated, displacement
@@ -18,7 +18,6 @@ from .particles import Particles
 from .scene import Scene
 from .status import Status
 from .surfaces import flights
-from .surfaces import fold as walls
 
 Floats = NDArray[np.float64]
 
@@ -155,7 +154,7 @@ def _at_the_wall(scene: Scene, start: Start) -> Start:
     hit = flights.first_hit(chain, None, start.r, start.v)
     if not np.isfinite(hit.time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
-    return Start(walls.settle(chain, hit.wall, start.r + hit.time * start.v), start.v)
+    return Start(chain.settle(hit.wall, start.r + hit.time * start.v), start.v)
 
 
 def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
@@ -191,11 +190,11 @@ def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactH
     rows, r0 = _Rows(scene, start, mass, method.contact_step), start.r
     wall = flights.first_hit(chain, None, r0, start.v).wall
     kappa = reflection.chord(chain, wall, r0, rows.step.p)
-    r1 = walls.push(chain, wall, r0, rows.step.p, kappa)
+    r1 = chain.push(wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
-    reactions[int(wall), :3] = kappa * np.array(walls.inner_gradient(chain, wall, r0, r1))
+    reactions[int(wall), :3] = kappa * np.array(chain.inner_gradient(wall, r0, r1))
     # The limit of Uzawa's loop with exponent 1.
-    multiplier[int(wall)] = uzawa.multiplier_of(chain, wall, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
+    multiplier[int(wall)] = chain.of(wall, 0.0, uzawa.multiplier_of, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
     rows.add(multiplier, np.zeros(count), reactions, 0.0)
     return rows.history(True)
 

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contact.energy import contact_energy
+from .kernel.arrays import scratch
 from .kernel.gravity import potential
-from .kernel.jit import kernel, scratch, select
+from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .particles import Floats, State, has_escaped
 from .scene import Scene
 from .surfaces import flights
-from .surfaces.fold import Field, each
-from .surfaces.moving import at
+from .surfaces.walls import Field
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
@@ -28,9 +28,8 @@ _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PE
 def penetration(chain, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
     deepest = 0.0
-    for link in reversed(each(chain)):
-        is_field = isinstance(link, Field)
-        distance = link.first.deepest_in_cell(r) if is_field else link.first.distance(r)
+    for wall in reversed(chain.walls):
+        distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
         deepest = select(distance > deepest, distance, deepest)
     return deepest
 
@@ -66,7 +65,7 @@ def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: F
     """
     stored = np.zeros(len(mass))
     if law is not None:
-        chain = at(scene.chain(), 0.0)
+        chain = scene.chain().at(0.0)
         # Few particles are in a wall, and its law takes one number.
         for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
             stored[i] = contact_energy(law, chain, 1.0 / mass[i], column(position, 0, i))
@@ -112,10 +111,10 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                 for j in range(min(_COLUMNS, end - left)):
                     i = left + j
                     m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
-                    e = _energies(law, at(chain, 0.0), gravity, m, r, v)
+                    e = _energies(law, chain.at(0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(at(chain, 0.0), r))
+                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(chain.at(0.0), r))
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * _whole_fall(state.period, state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
@@ -165,7 +164,7 @@ def _escapes(period, gravity, chain, r, v):
     # With a period, one that hits no wall of its cell may hit those of others.
     if period is not None or gravity is not None:
         return False
-    return (flights.first_hit(at(chain, 0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
+    return (flights.first_hit(chain.at(0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
 def drift(seen: dict[str, Any]) -> float:

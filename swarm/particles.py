@@ -158,7 +158,7 @@ class State(NamedTuple):
     period: Any = None  # `Period` of the cell
     # Where a wall has openings:
     escape_time: Floats | None = None  # (N,) when each has passed one [s], NaN of those that are inside
-    openings: Any = None  # `Openings` of the walls
+    openings: Any = None  # None, or each `Opening` of the walls
 
 
 def has_escaped(escape_time, i):

@@ -18,16 +18,16 @@ from .kernel.vector import Vec
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.data.known import require_known
-from .surfaces.fields.grouped import Order, chain_in, order_of
+from .surfaces.fields.grouped import Order, order_of, walls_in
 from .surfaces.fields.many import in_straight_flights, members_of
 from .surfaces.fields.members import Members
-from .surfaces.fold import Chain, Field
 from .surfaces.free import cell_in
 from .surfaces.images import Lengths, corners_of, images_of, lengths_of
-from .surfaces.moving import Carried, carried
-from .surfaces.openings import Openings, openings_in, require_few, volumes_of
+from .surfaces.moving import carried
+from .surfaces.openings import Opening, openings_in, require_few, volumes_of
 from .surfaces.period import Period
 from .surfaces.surface import Surface
+from .surfaces.walls import Walls
 from .volume import Volume
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
@@ -165,7 +165,7 @@ class Scene(Volume):
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity, self.period)
 
-    def chain(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Chain | Field | Carried | None:
+    def chain(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
         """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
 
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
@@ -175,7 +175,7 @@ class Scene(Volume):
             return carried(fields, others, moment)
         if own is None:
             return self._chain
-        return chain_in(self.order, self._pieces, self._groups, own, lambda members: members)
+        return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""
@@ -204,19 +204,16 @@ class Scene(Volume):
         )
         return None if laws == (None, None, None, None) else laws
 
-    def openings(self) -> Openings | None:
+    def openings(self) -> tuple[Opening, ...] | None:
         """The openings of every wall of the chain as kernels take them, None where there are none."""
         return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self.owners_of_pieces])
 
-    def _of_walls(self, values: list[Any], neutral: Any) -> Chain | Span | None:
-        """The value of the owner of every wall as a chain, None where all are neutral."""
+    def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
+        """The value of the owner of every wall, None where all are neutral."""
         if all(value == neutral for value in values):
             return None
-        chain: Chain | Span | None = None
-        for i, walls in reversed(self.order.spans(self._pieces)):
-            value = values[self.owners_of_pieces[i]]
-            chain = Chain(value, chain) if walls == 1 else Span(value, float(walls), chain)
-        return chain
+        spans = ((values[self.owners_of_pieces[i]], walls) for i, walls in self.order.spans(self._pieces))
+        return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
 
     def owners(self) -> list[int]:
         """The surface that each row of the chain belongs to, one for a field."""
@@ -235,13 +232,13 @@ class Scene(Volume):
         return any(surface.reacts() for surface in self.surfaces)
 
     @cached_property
-    def _chain(self) -> Chain | Field | None:
+    def _chain(self) -> Walls:
         """The chain for particles where nothing moves."""
 
         def taken(members: Members) -> Members:
             return in_straight_flights(members, self.period is not None) if self.gravity is None else members
 
-        return chain_in(self.order, self._pieces, self._groups, (), taken)
+        return walls_in(self.order, self._pieces, self._groups, (), taken)
 
     def __getstate__(self) -> dict[str, Any]:
         # Whoever has a copy makes a chain of its own: `apart` of other walls, a worker of what is compiled there.

@@ -19,8 +19,8 @@ from swarm.kernel import cache
 from swarm.kernel.jit import inlined
 from swarm.kernel.vector import Vec, vec
 from swarm.run import ledger, tiers
-from swarm.surfaces.fold import Chain
 from swarm.surfaces.rotation import Rotated
+from swarm.surfaces.walls import Walls
 
 settings.register_profile(
     "swarm",
@@ -181,7 +181,7 @@ def side_of(surface):
 
 def chord_of(surface, point, free):
     """kappa of the step from a point on the surface that ends on it."""
-    return call(reflection.chord, Chain(surface, None), 0.0, point, free)
+    return call(reflection.chord, Walls((surface,)), 0.0, point, free)
 
 
 def exponent_of(law):

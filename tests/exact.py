@@ -88,10 +88,7 @@ def levels(walls, kind, position, velocity, half_pull=None):
     wall = walls[0]
     body = wall.body if isinstance(wall, Rotated) else wall
     if isinstance(body, SolidNumbers):
-        parts, rest = [], body.parts
-        while rest is not None:
-            parts, rest = [*parts, rest.first.level_of(rest.first.inner(path))], rest.rest
-        return 1, parts
+        return 1, [part.level_of(part.inner(path)) for part in body.parts]
     if isinstance(body, (TorusNumbers, CapsuleNumbers)):
         path = wall.vector_in(path) if isinstance(wall, Rotated) else path
         return (_torus if isinstance(body, TorusNumbers) else _capsule)(body, *(path - body.center))

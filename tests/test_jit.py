@@ -24,17 +24,17 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
 import swarm
-from swarm.kernel import cache
+from swarm.kernel import arrays, cache
 from swarm.kernel import jit as _jit
+from swarm.kernel.arrays import kept
+from swarm.kernel.compilers import _DEEPEST, deep
 from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
-from swarm.kernel.jit import kept, select
-from swarm.kernel.parts import _DEEPEST, deep
+from swarm.kernel.jit import select
 from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.run.engine import Run
 from swarm.scene import MOST_WALLS
 from swarm.surfaces import flights
-from swarm.surfaces import fold as chain
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(
@@ -66,17 +66,17 @@ def every_function_of_a_surface(surface, r, v, pull, kappa):
 
 def every_function_of_a_chain(whole, r, v, pull, kappa):
     return (
-        chain.length(whole),
+        whole.length(),
         flights.first_hit(whole, None, r, v),
         flights.first_hit(whole, Gravity(pull.x, pull.y, pull.z), r, v),
         flights.hit_of(whole, None, 1.0, r, v),
         flights.other_hit(whole, 0.0, r, v),
-        chain.unit_normal(whole, 2.0, r),
-        chain.outside(whole, 1.0, r),
-        chain.push(whole, 1.0, r, v, kappa),
+        whole.unit_normal(2.0, r),
+        whole.outside(1.0, r),
+        whole.push(1.0, r, v, kappa),
         flights.free_time(None, whole, r, v),
         flights.free_time(Gravity(pull.x, pull.y, pull.z), whole, r, v),
-        chain.touched(whole, r, v),
+        whole.touched(r, v),
     )
 
 
@@ -219,7 +219,7 @@ def test_select(first):
 
 @_jit.outlined
 def used_up(i):
-    numbers, flags = _jit.scratch((2, 3), np.float64), _jit.scratch(5, np.bool_)
+    numbers, flags = arrays.scratch((2, 3), np.float64), arrays.scratch(5, np.bool_)
     clean = numbers.shape == (2, 3) and flags.size == 5 and numbers.sum() == 0.0 and not flags.any()
     numbers[1, 2], flags[4] = i, True
     return clean and numbers[1].sum() == i and not flags[:4].any()
@@ -251,7 +251,7 @@ def summed(tables):
         tables.second[1, i] = tables.first[2, i] + tables.row[i]
 
 
-SPACED = _jit.spaced(24)
+SPACED = arrays.spaced(24)
 
 
 def summed_with_distances(tables):
@@ -342,7 +342,7 @@ def in_all_directions(n, **laws):
 
 
 def takes_steps(walls, r):
-    return flights.in_steps(walls) is not None or chain.outside(walls, -1.0, r)
+    return walls.in_steps() is not None or walls.outside(-1.0, r)
 
 
 @pytest.fixture
@@ -542,7 +542,7 @@ sys.path.insert(0, {root!r})
 import numpy as np
 import swarm
 from swarm import observables
-from swarm.kernel import cache
+from swarm.kernel import arrays, cache
 logging.basicConfig(level="INFO", format="%(message)s")
 with cache.kernels_compiled(lambda sentence: None):
     from swarm.run.engine import Run

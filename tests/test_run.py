@@ -9,7 +9,8 @@ import pytest
 import swarm
 from swarm import observables
 from swarm.contact import events
-from swarm.kernel.jit import kernel, next_of
+from swarm.kernel.arrays import next_of
+from swarm.kernel.jit import kernel
 from swarm.lanes import arrays as lanes
 from swarm.lanes.table import LANES
 from swarm.run.engine import Run

@@ -164,14 +164,9 @@ def test_any_number_of_solids_of_one_kind_are_a_scene():
 # --- Laws of walls ---------------------------------------------------------------------------------------
 
 
-def entries(chain):
-    """The entries of a chain, in order."""
-    return [] if chain is None else [chain.first, *entries(chain.rest)]
-
-
-def by_surface(scene, chain):
-    """The entries of a chain with the surface of each, in the order of the surfaces."""
-    return sorted(zip(scene.owners(), entries(chain), strict=True))
+def by_surface(scene, given):
+    """What is given of each wall with the surface of each, in the order of the surfaces."""
+    return sorted(zip(scene.owners(), given, strict=True))
 
 
 def test_a_scene_without_a_law_has_none():

@@ -12,12 +12,12 @@ from swarm.run.stack import threads_with
 LARGE = """
 import numba
 import numpy as np
-from swarm.kernel import jit
+from swarm.kernel import arrays
 from swarm.run.stack import threads_with
 
 @numba.njit(nogil=True)
 def sum_of(size):
-    values = jit.scratch(size, np.float64)
+    values = arrays.scratch(size, np.float64)
     total = 0.0
     for k in range(size):
         values[k] = k

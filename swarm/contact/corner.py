@@ -6,10 +6,9 @@ Each wall is solved with the reactions of the others held, until the end of the 
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, largest, norm
-from ..surfaces.fold import each
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction
-from .records import Step
+from .impulse import Step
 
 _EPSILON = 2.220446049250313e-16
 # Sweeps over the walls; a corner of 90 degrees takes three.
@@ -61,11 +60,11 @@ def total(reactions):
 def _sweep(chain, form, law, multipliers, step, reactions):
     """Solve every wall once; whether all were solved."""
     solved = True
-    for k, link in enumerate(each(chain)):
+    for k, wall in enumerate(chain.walls):
         reactions[k] = 0.0
         remaining = Step(step.r, step.p - total(reactions), step.c)
         multiplier = None if multipliers is None else multipliers[k]
-        found = reaction(form, law, multiplier, link.first, remaining)
+        found = reaction(form, law, multiplier, wall, remaining)
         held = found.vector
         reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = held.x, held.y, held.z, found.constraint
         solved = solved & found.solved
@@ -88,8 +87,8 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
     found = 0.0
     if moving is None:
         return found
-    for k, link in reversed(tuple(enumerate(each(chain)))):
-        work = factor * dot(_reaction_of(reactions, k), link.first.way())
+    for k, wall in reversed(tuple(enumerate(chain.walls))):
+        work = factor * dot(_reaction_of(reactions, k), wall.way())
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
     return found
@@ -98,6 +97,6 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
 @outlined
 def constraints(chain, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
-    for k, link in enumerate(each(chain)):
-        start = contact_impulse.start_gap(0.0, link.first, r, link.first.inner(r))
+    for k, wall in enumerate(chain.walls):
+        start = contact_impulse.start_of(0.0, wall, r)
         into[k] = law.constraint(start.gap)

@@ -3,14 +3,15 @@
 import math
 from typing import Any
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, square
-from ..surfaces import fold as walls
 from ..surfaces.fields.grid import block_of, in_block, size_of
 from ..surfaces.fields.members import member
-from ..surfaces.moving import Carried, at
+from ..surfaces.moving import Carried
 from ..surfaces.posed import Posed
+from ..surfaces.walls import Field
 
 _EPSILON = 2.220446049250313e-16
 # Of a length, the part that is none.
@@ -29,32 +30,24 @@ class Path(Record):
     h: Any
 
 
-def _numbered(chain, before=0.0):
-    """The links of a chain, each with the number of its first wall."""
-    if chain is None:
-        return ()
-    count = walls.count(chain.first) if isinstance(chain, walls.Field) else 1.0
-    return ((before, chain), *_numbered(chain.rest, before + count))
-
-
 def meets(chain, ends, held, path, near):
     """Whether a step may go deeper than `near` into a wall that does not hold the particle.
 
     `ends` are the walls at its end, which are others where they move.
     """
     found = False
-    for (number, link), end in zip(_numbered(chain), walls.each(ends), strict=True):
-        if isinstance(link, walls.Field):
-            here = _meets_one(link.first, end.first, number, held, path, near)
+    for (number, wall), end in zip(chain.numbered(), ends.walls, strict=True):
+        if isinstance(wall, Field):
+            here = _meets_one(wall.members, end.members, number, held, path, near)
         else:
-            here = _may_meet(link.first, end.first, path, near) & (not held.has(number))
+            here = _may_meet(wall, end, path, near) & (not held.has(number))
         found = found | here
     return found
 
 
 @outlined
 def _meets_one(field, ends, number, held, path, near):
-    """The same of the bodies of a field that has so many walls before it."""
+    """`meets` of the bodies of a field that has so many walls before it."""
     grid = members_of(field).grid
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
@@ -64,7 +57,7 @@ def _meets_one(field, ends, number, held, path, near):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
             m = float(grid.entries[entry])
-            body, end = walls.member(field, m), walls.member(ends, m)
+            body, end = field.wall(m), ends.wall(m)
             if (not held.has(number + m)) and _may_meet(body, end, path, near):
                 return True
     return False
@@ -130,13 +123,13 @@ class Arrival(Record):
 def arrival(chain, held, path, near, left):
     """The first wall that a step goes into, with so much of the frame left at its start [s]."""
     if isinstance(chain, Carried):
-        return _arrival_later(chain.walls, chain, 0.0, held, path, near, left)
+        return _arrival_later(chain, held, path, near, left)
     found = Arrival(math.inf, -1.0)
-    for number, link in reversed(_numbered(chain)):
-        if isinstance(link, walls.Field):
-            found = _first_of(link.first, number, held, path, near, found)
+    for number, wall in reversed(chain.numbered()):
+        if isinstance(wall, Field):
+            found = _first_of(wall.members, number, held, path, near, found)
         elif not held.has(number):
-            time = _deep_after(_Still(link.first), path, near)
+            time = _deep_after(_Still(wall), path, near)
             if time <= found.time:
                 found = Arrival(time, number)
     return found
@@ -144,7 +137,7 @@ def arrival(chain, held, path, near, left):
 
 @outlined
 def _first_of(members, number, held, path, near, later):
-    """The first of that and of all that a step meets of a field that has so many walls before it."""
+    """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
     grid, found = members.grid, later
     block = block_of_path(grid, path, near)
     for k in range(size_of(block)):
@@ -158,24 +151,24 @@ def _first_of(members, number, held, path, near, later):
     return found
 
 
-def _arrival_later(rest, chain, number, held, path, near, left):
-    """`arrival` at the walls of the rest, which has so many walls before it, of a chain where some move."""
-    found = Arrival(math.inf, -1.0)
-    if isinstance(rest, walls.Field):
-        later = _arrival_later(rest.rest, chain, number + walls.count(rest.first), held, path, near, left)
-        found = _arrival_among(rest, chain, number, held, path, near, left)
-        return found if found.time < later.time else later
-    if rest is not None:
-        for i in range(walls.length(rest)):
-            found = _sooner_at(chain, number + i, held, path, near, left, found)
-    return found
+def _arrival_later(chain, held, path, near, left):
+    """`arrival` where some walls move."""
+    later, before = Arrival(math.inf, -1.0), chain.count_in_fields()
+    for i in range(chain.others().length()):
+        later = _sooner_at(chain, before + i, held, path, near, left, later)
+    if not chain.fields():
+        return later
+    starts, ends = chain.at(left).fields(), chain.at(left - path.h).fields()
+    for (number, field), (_number, end) in reversed(tuple(zip(starts, ends, strict=True))):
+        found = _arrival_among(field.members, end.members, chain, number, held, path, near, left)
+        later = found if found.time < later.time else later
+    return later
 
 
 @outlined
-def _arrival_among(rest, chain, number, held, path, near, left):
-    """The same at the bodies of the first field of the rest."""
+def _arrival_among(field, ends, chain, number, held, path, near, left):
+    """`arrival` at the bodies of a field, which is `ends` at the end of the step."""
     found = Arrival(math.inf, -1.0)
-    field, ends = at(Carried(rest), left).first, at(Carried(rest), left - path.h).first
     grid = members_of(field).grid
     block = block_of_path(grid, own_path(field, ends, path), near)
     for k in range(size_of(block)):
@@ -220,12 +213,12 @@ class _Moving(Record):
     left: float
 
     def depth(self, r, time):
-        return walls.distance(at(self.chain, self.left - time), self.wall, r)
+        return self.chain.at(self.left - time).distance(self.wall, r)
 
     def pace_into(self, path):
-        start = at(self.chain, self.left)
-        towards = path.v0 - walls.velocity(start, self.wall, path.r0)
-        return dot(walls.unit_normal(start, self.wall, path.r0), towards)
+        start = self.chain.at(self.left)
+        towards = path.v0 - start.velocity(self.wall, path.r0)
+        return dot(start.unit_normal(self.wall, path.r0), towards)
 
     def straight(self, path):
         return math.inf
@@ -262,7 +255,7 @@ def bisected(has_happened, given, low, high):
 
 
 def at_part(path, s):
-    """Where the cubic through both ends of a step is."""
+    """The place on the cubic through both ends of a step."""
     r0, a, b, c = cubic(path)
     return r0 + s * (a + s * (b + s * c))
 

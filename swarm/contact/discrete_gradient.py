@@ -17,7 +17,7 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from . import impulse
-from .records import Step
+from .impulse import Step
 
 _EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
@@ -100,11 +100,10 @@ class Composite(NamedTuple):
 
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""
-        kappa, solved = impulse.careful(law, multiplier, surface, step)
+        equation = impulse.equation(law, multiplier, surface, step)
+        kappa, solved = equation.careful()
         r1 = surface.push(step.r, step.p, kappa)
-        start = impulse.start_gap(multiplier, surface, step.r, surface.inner(step.r))
-        g1 = impulse.end_gap(surface, step, start, kappa)
-        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(g1), solved)
+        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(equation.end(kappa).gap), solved)
 
 
 class MeanValue(NamedTuple):
@@ -113,32 +112,7 @@ class MeanValue(NamedTuple):
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""
         body, r0, p = surface.framed(step.r, step.p)
-        own = Step(r0, p, step.c)
-        # Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
-        low, high = 0.0, 0.0
-        kappa, f_low = _pushed(law, multiplier, body, own, low)
-        f_high = f_low
-        for i in range(_PARTS):
-            if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
-                break
-            low, f_low, high = high, f_high, (i + 1.0) / _PARTS
-            kappa, f_high = _pushed(law, multiplier, body, own, high)
-        beta, found = high, f_high == 0.0
-        if f_low == 0.0:
-            beta, found = low, True
-            kappa, _f = _pushed(law, multiplier, body, own, low)
-        elif f_low * f_high < 0.0:
-            for _i in range(_BETA_ITERATIONS):
-                beta = illinois(low, f_low, high, f_high)
-                kappa, f = _pushed(law, multiplier, body, own, beta)
-                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
-                    found = True
-                    break
-                low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
-        # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
-        # identity requires along grad q(r_beta) meets it whatever beta is.
-        r, change = _balanced(law, multiplier, body, own, beta, kappa)
-        return Reaction(r, _constraint(law, body, r0 + p - r), found and change <= _NEARLY)
+        return _MeanValueStep(law, multiplier, body, Step(r0, p, step.c)).reaction()
 
 
 def form_of(gradient: str) -> Composite | MeanValue:
@@ -146,74 +120,116 @@ def form_of(gradient: str) -> Composite | MeanValue:
     return MeanValue() if gradient == "mean-value" else Composite()
 
 
-@outlined
-def _gradient_at(surface, step, beta, kappa):
-    """r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
-    r = surface.resolve(step.r + beta * step.p, beta * kappa)
-    return r, surface.inner_gradient(r, r)
+class _MeanValueStep(Record):
+    """A step with the mean-value form.
 
+    Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
+    """
 
-@outlined
-def _balanced(law, multiplier, surface, step, beta, kappa):
-    """The reaction for this beta with exact energy, and by what part of itself kappa had to change."""
-    k, before, f_before = kappa, kappa * (1.0 + _NUDGE), 0.0
-    first = 0.5 * _constraint(law, surface, step.r)
-    r, change, previous = ZERO, math.inf, math.inf
-    for i in range(_FORCE_ITERATIONS):
-        at = before if i == 0 else k
-        _r_beta, d = _gradient_at(surface, step, beta, at)
-        r = at * d
-        moved = step.p - r
-        exact = composite(law, surface, step.r, step.r + moved)
-        mean = first + 0.5 * _constraint(law, surface, step.r + moved)
-        force = law.alpha * mean + (0.0 if multiplier is None else multiplier)
-        f = at - step.c * force * dot(exact, moved) / dot(d, moved)
-        if i == 0:
-            f_before = f
-            continue
-        change_of_k = f * (k - before) / (f - f_before)
-        # NaN at the turning point, where both parts of the quotient vanish and (6) holds by itself. Steps that do not
-        # shrink are round-off.
-        if not abs(change_of_k) > 4.0 * _EPSILON * abs(k) or previous <= abs(change_of_k) <= _NUDGE * abs(k):
-            change = abs(k - kappa) / abs(kappa) if kappa != 0.0 else 0.0
-            break
-        before, f_before, k, previous = k, f, k - change_of_k, abs(change_of_k)
-    return r, change
+    law: Any
+    multiplier: Any
+    surface: Any
+    step: Step
 
-
-@outlined
-def _pushed(law, multiplier, surface, step, beta):
-    """The kappa that solves the step with D along grad q(r_beta), and by how much (6) then misses its identity."""
-    # F(kappa) = kappa - c (alpha Phi_mean + lambda) Phi'(g_beta) g'(q_beta); a solid pushes with kappa < 0.
-    r, f = _pushed_with(law, multiplier, surface, step, beta, 0.0)
-    sign = -1.0 if f > 0.0 else 1.0
-    kappa, low, f_low, high = 0.0, 0.0, sign * f, abs(f)
-    if f != 0.0:
-        kappa, f_high = high, -1.0
-        for _i in range(_FORCE_ITERATIONS):
-            r, f = _pushed_with(law, multiplier, surface, step, beta, sign * high)
-            f_high = sign * f
-            if f_high > 0.0:
+    def reaction(self):
+        """`Reaction` of the surface."""
+        low, high = 0.0, 0.0
+        kappa, f_low = self.pushed(low)
+        f_high = f_low
+        for i in range(_PARTS):
+            if f_low * f_high <= 0.0 and (i > 0 or f_low == 0.0):
                 break
-            # Not past the push yet: the force grows along this line.
-            low, f_low, high = high, f_high, 2.0 * high
-        for _i in range(_FORCE_ITERATIONS):
-            kappa = illinois(low, f_low, high, f_high)
-            r, f = _pushed_with(law, multiplier, surface, step, beta, sign * kappa)
-            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, sign * f)
-            if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+            low, f_low, high = high, f_high, (i + 1.0) / _PARTS
+            kappa, f_high = self.pushed(high)
+        beta, found = high, f_high == 0.0
+        if f_low == 0.0:
+            beta, found = low, True
+            kappa, _f = self.pushed(low)
+        elif f_low * f_high < 0.0:
+            for _i in range(_BETA_ITERATIONS):
+                beta = illinois(low, f_low, high, f_high)
+                kappa, f = self.pushed(beta)
+                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                    found = True
+                    break
+                low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
+        # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
+        # identity requires along grad q(r_beta) meets it whatever beta is.
+        r, change = self.balanced(beta, kappa)
+        end = self.step.r + self.step.p - r
+        return Reaction(r, _constraint(self.law, self.surface, end), found and change <= _NEARLY)
+
+    @outlined
+    def gradient_at(self, beta, kappa):
+        """r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
+        r = self.surface.resolve(self.step.r + beta * self.step.p, beta * kappa)
+        return r, self.surface.inner_gradient(r, r)
+
+    def force(self, first, last):
+        """alpha Phi_mean + lambda, from half of Phi at each end."""
+        return self.law.alpha * (first + last) + (0.0 if self.multiplier is None else self.multiplier)
+
+    @outlined
+    def balanced(self, beta, kappa):
+        """The reaction for this beta with exact energy, and by what part of itself kappa had to change."""
+        law, surface, step = self.law, self.surface, self.step
+        k, before, f_before = kappa, kappa * (1.0 + _NUDGE), 0.0
+        first = 0.5 * _constraint(law, surface, step.r)
+        r, change, previous = ZERO, math.inf, math.inf
+        for i in range(_FORCE_ITERATIONS):
+            at = before if i == 0 else k
+            _r_beta, d = self.gradient_at(beta, at)
+            r = at * d
+            moved = step.p - r
+            exact = composite(law, surface, step.r, step.r + moved)
+            force = self.force(first, 0.5 * _constraint(law, surface, step.r + moved))
+            f = at - step.c * force * dot(exact, moved) / dot(d, moved)
+            if i == 0:
+                f_before = f
+                continue
+            change_of_k = f * (k - before) / (f - f_before)
+            # NaN at the turning point, where both parts of the quotient vanish and (6) holds by itself. Steps that do
+            # not shrink are round-off.
+            if not abs(change_of_k) > 4.0 * _EPSILON * abs(k) or previous <= abs(change_of_k) <= _NUDGE * abs(k):
+                change = abs(k - kappa) / abs(kappa) if kappa != 0.0 else 0.0
                 break
-    return sign * kappa, identity_miss(law, surface, step.r, step.r + step.p - r, beta)
+            before, f_before, k, previous = k, f, k - change_of_k, abs(change_of_k)
+        return r, change
 
+    @outlined
+    def pushed(self, beta):
+        """The kappa that solves the step with D along grad q(r_beta), and by how much (6) then misses its identity."""
+        # F(kappa) = kappa - c (alpha Phi_mean + lambda) Phi'(g_beta) g'(q_beta); a solid pushes with kappa < 0.
+        r, f = self.pushed_with(beta, 0.0)
+        sign = -1.0 if f > 0.0 else 1.0
+        kappa, low, f_low, high = 0.0, 0.0, sign * f, abs(f)
+        if f != 0.0:
+            kappa, f_high = high, -1.0
+            for _i in range(_FORCE_ITERATIONS):
+                r, f = self.pushed_with(beta, sign * high)
+                f_high = sign * f
+                if f_high > 0.0:
+                    break
+                # Not past the push yet: the force grows along this line.
+                low, f_low, high = high, f_high, 2.0 * high
+            for _i in range(_FORCE_ITERATIONS):
+                kappa = illinois(low, f_low, high, f_high)
+                r, f = self.pushed_with(beta, sign * kappa)
+                low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, sign * f)
+                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                    break
+        return sign * kappa, identity_miss(self.law, self.surface, self.step.r, self.step.r + self.step.p - r, beta)
 
-@outlined
-def _pushed_with(law, multiplier, surface, step, beta, kappa):
-    """The reaction kappa grad q(r_beta) and F(kappa)."""
-    r_beta, d = _gradient_at(surface, step, beta, kappa)
-    r = kappa * d
-    mean = 0.5 * _constraint(law, surface, step.r) + 0.5 * _constraint(law, surface, step.r + step.p - r)
-    force = law.alpha * mean + (0.0 if multiplier is None else multiplier)
-    return r, kappa - step.c * force * _constraint_slope(law, surface, surface.inner(r_beta))
+    @outlined
+    def pushed_with(self, beta, kappa):
+        """The reaction kappa grad q(r_beta) and F(kappa)."""
+        law, surface, step = self.law, self.surface, self.step
+        r_beta, d = self.gradient_at(beta, kappa)
+        r = kappa * d
+        force = self.force(
+            0.5 * _constraint(law, surface, step.r), 0.5 * _constraint(law, surface, step.r + step.p - r)
+        )
+        return r, kappa - step.c * force * _constraint_slope(law, surface, surface.inner(r_beta))
 
 
 # --- A root in a bracket without derivatives -------------------------------------------------------------

@@ -4,7 +4,6 @@ from ..kernel.gravity import potential, weight
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, dot, square, total
-from ..surfaces.fold import each
 
 # Units of round-off by which a contact that is solved may miss its energy.
 _ROUND_OFF = 64.0 * 2.220446049250313e-16
@@ -32,19 +31,18 @@ def contact_energy(law, chain, over_mass, r):
     if law is None:
         return 0.0
     stored = 0.0
-    for link in reversed(each(chain)):
-        stored = law.stored_energy(link.first.gap_of(link.first.inner(r))) + stored
+    for wall in reversed(chain.walls):
+        stored = law.stored_energy(wall.gap_of(wall.inner(r))) + stored
     return stored * over_mass
 
 
 def energy_uncertainty(chain, law, over_mass, r, s):
-    """How far the stored energy per mass moves when each coordinate of r moves by that of s, to first order.
+    """The change of the stored energy per mass when each coordinate of r moves by that of s, to first order.
 
     With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
     """
     found = 0.0
-    for link in reversed(each(chain)):
-        surface = link.first
+    for surface in reversed(chain.walls):
         g = surface.gap_of(surface.inner(r))
         # 2 V/g, which is the force up to the factor (a + 1)/2
         force = law.stiffness(g) * select(g > 0.0, g, 0.0) * over_mass

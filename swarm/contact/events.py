@@ -1,4 +1,4 @@
-"""How a lasting contact begins and ends, one particle at a time: what it becomes at a wall."""
+"""The beginnings and ends of lasting contacts, one particle at a time: its state after it meets a wall."""
 
 import math
 
@@ -7,10 +7,9 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from . import hold, sliding, touching
-from . import laws as wall_laws
 from .hold import One, Two
+from .laws import NONE
 from .projection import ALLOWED
 from .reflection import Energy, exact, relative, wall_velocity
 
@@ -44,7 +43,7 @@ class Particle(Record):
 
 
 class Next(Record):
-    """Its phase then, its velocity along the walls, the speed that it keeps across them, its energy, its walls.
+    """The state of a particle after an event: phase, velocity along the walls, speed across them, energy, walls.
 
     `impulse` is that of the wall, `wait` how long the hops last that are left out.
     """
@@ -60,7 +59,7 @@ class Next(Record):
 
 
 def own_speed2(p):
-    """The square of the speed that a particle's own scale and its motion say."""
+    """The square of a particle's own speed: the larger one of its scale and of its motion."""
     return max(p.scale2, square(p.v))
 
 
@@ -77,7 +76,7 @@ def _energy(twice):
 
 
 def _loses(rules, wall):
-    return 1.0 - wall_laws.restitution_of(rules.laws, wall) > 0.0
+    return 1.0 - rules.laws.restitution_of(wall) > 0.0
 
 
 # Each once in a kernel, and not wherever it is asked for: half of the time to compile.
@@ -85,12 +84,12 @@ def _loses(rules, wall):
 
 @outlined
 def _normal(chain, wall, r):
-    return walls.unit_normal(chain, wall, r)
+    return chain.unit_normal(wall, r)
 
 
 @outlined
 def _press(chain, wall, r, v, pull):
-    return walls.outward_acceleration(chain, wall, r, v, pull)
+    return chain.outward_acceleration(wall, r, v, pull)
 
 
 @outlined
@@ -104,7 +103,7 @@ def _bounce(rules, chain, gravity, wall, p):
 @outlined
 def enter(rules, chain, gravity, wall, p):
     """`Next` of a particle that leaves this wall so slowly that it is back at once."""
-    n, u = _normal(chain, wall, p.r), wall_velocity(wall_laws.moving(rules.laws), chain, wall, p.r)
+    n, u = _normal(chain, wall, p.r), wall_velocity(rules.laws.moving, chain, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
     if dot(relative(u, v), n) > 0.0:
         bounce = _bounce(rules, chain, gravity, wall, p)
@@ -114,7 +113,7 @@ def enter(rules, chain, gravity, wall, p):
     flies = Next(FLYING, v, 0.0, twice, wall, impulse=impulse)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
     press = _press(chain, wall, p.r, along, pull)
-    if not press > weightless(rules, gravity, p) or wall_laws.thermal_of(rules.laws, wall).is_hot():
+    if not press > weightless(rules, gravity, p) or rules.laws.thermal_of(wall).is_hot():
         return flies
     hop = 2.0 * max(away, 0.0) / press
     short = hop < rules.shortest_flight if rules.shortest_flight > 0.0 else away <= GRAZING * math.sqrt(speed2)
@@ -123,7 +122,7 @@ def enter(rules, chain, gravity, wall, p):
     following = flights.first_hit(chain, gravity, p.r, v)
     if 0.0 <= following.wall != wall and following.time < hop:
         at = accelerated(gravity, v, following.time)
-        other = wall_velocity(wall_laws.moving(rules.laws), chain, following.wall, p.r)
+        other = wall_velocity(rules.laws.moving, chain, following.wall, p.r)
         towards = dot(_normal(chain, following.wall, p.r), relative(other, at))
         if towards <= GRAZING * math.sqrt(speed2):
             edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
@@ -137,8 +136,8 @@ def enter(rules, chain, gravity, wall, p):
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
     # the particle than to one that slides, which the caller books, and friction as much less.
     slip = relative(u, along)
-    e, speed = wall_laws.restitution_of(rules.laws, wall), norm(slip)
-    spared = wall_laws.of_wall(wall_laws.friction(rules.laws), wall) * away
+    e, speed = rules.laws.restitution_of(wall), norm(slip)
+    spared = rules.laws.friction_of(wall) * away
     # `away` may be below 0 by round-off, and what friction has stopped has no direction.
     faster = along + (spared / speed) * slip if speed > abs(spared) else along
     twice += square(faster) - square(along) - away * away if u is None else square(faster) - square(v)
@@ -153,7 +152,7 @@ def _kept(across, p):
 @outlined
 def _on_edge(rules, chain, gravity, two, p):
     """`Next` of a particle in an edge: it slides there if both walls press on it."""
-    drift = hold.drift(wall_laws.moving(rules.laws), two, chain, p.r)
+    drift = hold.drift(rules.laws.moving, two, chain, p.r)
     taken = two.split_at(chain, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first)
@@ -184,7 +183,7 @@ def meet(rules, held, chain, gravity, wall, p):
     """`Next` of a sliding particle at another wall."""
     bounce = _bounce(rules, chain, gravity, wall, p)
     p, impulse = Particle(p.r, bounce.v, p.left, bounce.twice_energy, p.scale2), bounce.impulse
-    moving = wall_laws.moving(rules.laws)
+    moving = rules.laws.moving
     away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
     drift = hold.drift(moving, held, chain, p.r)
@@ -211,12 +210,12 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
     if edge.phase == EDGE:
         return edge
     pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
-    moving = wall_laws.moving(rules.laws)
+    moving = rules.laws.moving
     away = -dot(n, relative(wall_velocity(moving, chain, wall, p.r), p.v))
     along = p.v + away * n
     if not _press(chain, wall, p.r, along, pull) > weightless(rules, gravity, p):
         return edge
-    drawn = sliding.force(None, One(wall), chain, gravity, p.r, along).acceleration
+    drawn = sliding.force(NONE, One(wall), chain, gravity, p.r, along).acceleration
     if dot(_normal(chain, held.first, p.r), drawn) > 0.0:
         return edge
     keep, twice = _kept(away, p), p.twice

@@ -2,7 +2,6 @@
 
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, dot, norm
-from ..surfaces.fold import each, length
 
 # The force needs these of every wall.
 NEEDS = ("inner", "gap_of", "gap_slope", "inner_gradient")
@@ -20,8 +19,8 @@ def strength(law, surface, q):
 def force(chain, law, r):
     """The force of all walls [N]."""
     found = ZERO
-    for link in reversed(each(chain)):
-        found = _added(found, link.first, law, r)
+    for wall in reversed(chain.walls):
+        found = _added(found, wall, law, r)
     return found
 
 
@@ -36,10 +35,10 @@ def _added(others, surface, law, r):
 @outlined
 def add_impulses(chain, law, factor, r, impulse, lane):
     """Add `factor` times the magnitude of the force of each wall to impulse[wall, lane]."""
-    for k, link in enumerate(each(chain)):
-        f = strength(law, link.first, link.first.inner(r))
+    for k, wall in enumerate(chain.walls):
+        f = strength(law, wall, wall.inner(r))
         if f != 0.0:
-            impulse[k, lane] += factor * abs(f) * norm(link.first.inner_gradient(r, r))
+            impulse[k, lane] += factor * abs(f) * norm(wall.inner_gradient(r, r))
 
 
 def work(moving, chain, now, law, r):
@@ -47,8 +46,8 @@ def work(moving, chain, now, law, r):
     found = 0.0
     if moving is None:
         return found
-    for over, link in reversed(tuple(zip(each(chain), each(now), strict=True))):
-        found = dot(_added(ZERO, link.first, law, r), over.first.way()) + found
+    for over, wall in reversed(tuple(zip(chain.walls, now.walls, strict=True))):
+        found = dot(_added(ZERO, wall, law, r), over.way()) + found
     return found
 
 
@@ -58,9 +57,9 @@ def add_works(moving, chain, now, law, factor, r, impulse, lane):
     found = 0.0
     if moving is None:
         return found
-    count = length(chain)
-    for k, (over, link) in reversed(tuple(enumerate(zip(each(chain), each(now), strict=True)))):
-        here = factor * dot(_added(ZERO, link.first, law, r), over.first.way())
+    count = chain.length()
+    for k, (over, wall) in reversed(tuple(enumerate(zip(chain.walls, now.walls, strict=True)))):
+        here = factor * dot(_added(ZERO, wall, law, r), over.way())
         impulse[count + k, lane] += here
         found = here + found
     return found

@@ -6,8 +6,6 @@ from ..kernel.jit import outlined
 from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot
-from ..surfaces import fold as walls
-from . import laws as wall_laws
 from .reflection import from_relative, given, relative, wall_velocity
 
 
@@ -20,7 +18,7 @@ class Draw(Record):
 
 
 class Left(Record):
-    """Whether a wall has accommodated a particle, its velocity then, and the normal impulse per mass.
+    """The leave of a particle: whether the wall accommodated it, its velocity then, its normal impulse per mass.
 
     `work` is twice what the wall gives by its motion, per mass; the rest of the change of energy is heat.
     """
@@ -34,11 +32,11 @@ class Left(Record):
 @outlined
 def exchange(laws, chain, wall, arriving, mass, draw):
     """`Left` of a particle that is `arriving` at a thermal wall with (r, v)."""
-    law = wall_laws.thermal_of(laws, wall)
+    law = laws.thermal_of(wall)
     r, v = arriving
-    n = walls.unit_normal(chain, wall, r)
+    n = chain.unit_normal(wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)
-    moving = wall_velocity(wall_laws.moving(laws), chain, wall, r)
+    moving = wall_velocity(laws.moving, chain, wall, r)
     before, after = relative(moving, v), flux_maxwellian(n, law.energy / mass, u)
     b, happens = dot(before, n), u.choice < law.accommodation
     work = given(moving, after - before)

@@ -1,11 +1,11 @@
-"""The walls that hold a particle, one or the edge of two: what they take of its velocity, and how they press on it."""
+"""The walls that hold a particle, one or the edge of two: their parts of its velocity, and their pressures."""
 
 import math
+from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, square
-from ..surfaces import fold as walls
 from .reflection import relative
 
 _TINY = 2.2250738585072014e-308
@@ -28,7 +28,36 @@ class Drift(Record):
     second: Vec
 
 
-class One(Record):
+class Holding(Record):
+    """The numbers of the walls that hold a particle."""
+
+    def has(self: Any, wall):
+        """Whether a wall is among them."""
+        found = False
+        for one in self:
+            found = found | (wall == one)
+        return found
+
+    def settle(self: Any, chain, r):
+        """A point within round-off of the walls, moved onto them."""
+        for one in reversed(self):
+            r = chain.settle(one, r)
+        return r
+
+    def split(self: Any, chain, drift, r0, r1, w):
+        """`Held` of a velocity, with the normals of a step from r0 to r1."""
+        return self.parts(drift, w, *(chain.step_normal(one, r0, r1) for one in self))
+
+    def split_at(self: Any, chain, drift, r, w):
+        """`Held` of a velocity at a point."""
+        return self.parts(drift, w, *(chain.unit_normal(one, r) for one in self))
+
+    def along(self, chain, drift, r0, r1, w):
+        """The part P of `split` alone."""
+        return self.split(chain, drift, r0, r1, w).along
+
+
+class One(Holding):
     """A particle that slides along one wall."""
 
     first: float
@@ -40,41 +69,30 @@ class One(Record):
         """The walls that hold a lane, of this kind."""
         return One(first)
 
-    def has(self, wall):
-        """Whether a wall is among them."""
-        return wall == self.first
-
-    def split(self, chain, drift, r0, r1, w):
-        """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        return _off_wall(drift, walls.step_normal(chain, self.first, r0, r1), w)
-
-    def split_at(self, chain, drift, r, w):
-        """`Held` of a velocity at a point."""
-        return _off_wall(drift, walls.unit_normal(chain, self.first, r), w)
+    def parts(self, drift, w, n):
+        """`Held` of a velocity, by the normal of the wall."""
+        b = _towards(drift, w, n)
+        return Held(w - b * n, n, b, ZERO, 0.0)
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
-        g = walls.inner_gradient(chain, self.first, r0, r1)
+        g = chain.inner_gradient(self.first, r0, r1)
         return w - (_towards(drift, w, g) / square(g)) * g
 
     def inward(self, n, m):
         """The unit vector away from the walls."""
         return -1.0 * n
 
-    def settle(self, chain, r):
-        """A point within round-off of the walls, moved onto them."""
-        return walls.settle(chain, self.first, r)
-
     def presses(self, chain, r, v, pull):
-        """How the walls press on a particle that slides with this velocity, per mass: (first, second)."""
-        return walls.outward_acceleration(chain, self.first, r, v, pull), 0.0
+        """The pressures of the walls on a particle that slides with this velocity, per mass: (first, second)."""
+        return chain.outward_acceleration(self.first, r, v, pull), 0.0
 
     def lets_go(self, n, m):
         """Whether a wall no longer presses."""
         return n < 0.0
 
 
-class Two(Record):
+class Two(Holding):
     """A particle that slides along the edge of two walls."""
 
     first: float
@@ -84,38 +102,26 @@ class Two(Record):
         """The walls that hold a lane, of this kind."""
         return Two(first, second)
 
-    def has(self, wall):
-        """Whether a wall is among them."""
-        return (wall == self.first) | (wall == self.second)
-
-    def split(self, chain, drift, r0, r1, w):
-        """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        n = walls.step_normal(chain, self.first, r0, r1)
-        return _off_edge(drift, n, walls.step_normal(chain, self.second, r0, r1), w)
-
-    def split_at(self, chain, drift, r, w):
-        """`Held` of a velocity at a point."""
-        n = walls.unit_normal(chain, self.first, r)
-        return _off_edge(drift, n, walls.unit_normal(chain, self.second, r), w)
-
-    def along(self, chain, drift, r0, r1, w):
-        """The part P of `split` alone."""
-        return self.split(chain, drift, r0, r1, w).along
+    def parts(self, drift, w, n, m):
+        """`Held` of a velocity, by the normals of both walls."""
+        # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
+        e, cosine, wn = edge(n, m), dot(n, m), _towards(drift, w, n)
+        wm = dot(relative(None if drift is None else drift.second, w), m)
+        inverse = _inverse(square(e))
+        b, c = (wn - cosine * wm) * inverse, (wm - cosine * wn) * inverse
+        # Along the edge, where the walls are at rest
+        along = (dot(w, e) * inverse) * e if drift is None else w - b * n - c * m
+        return Held(along, n, b, m, c)
 
     def inward(self, n, m):
         """The unit vector between those away from the walls."""
         k = n + m
         return k * (-1.0 / math.sqrt(square(k)))
 
-    def settle(self, chain, r):
-        """A point within round-off of the walls, moved onto them."""
-        return walls.settle(chain, self.first, walls.settle(chain, self.second, r))
-
     def presses(self, chain, r, v, pull):
-        """How the walls press on it, per mass: (first, second)."""
-        one = walls.outward_acceleration(chain, self.first, r, v, pull)
-        other = walls.outward_acceleration(chain, self.second, r, v, pull)
-        n, m = walls.unit_normal(chain, self.first, r), walls.unit_normal(chain, self.second, r)
+        """The pressures of the walls on it, per mass: (first, second)."""
+        one, other = (chain.outward_acceleration(wall, r, v, pull) for wall in self)
+        n, m = (chain.unit_normal(wall, r) for wall in self)
         cosine, inverse = dot(n, m), _inverse(square(edge(n, m)))
         return (one - cosine * other) * inverse, (other - cosine * one) * inverse
 
@@ -124,16 +130,12 @@ class Two(Record):
         return (n < 0.0) | (m < 0.0)
 
 
-class Three(Record):
+class Three(Holding):
     """A particle in the corner of three walls."""
 
     first: float
     second: float
     third: float
-
-    def has(self, wall):
-        """Whether a wall is among them."""
-        return (wall == self.first) | (wall == self.second) | (wall == self.third)
 
 
 # --- Their motion: None where no wall of the scene moves -------------------------------------------------
@@ -143,7 +145,7 @@ def drift(moving, held, chain, r):
     """`Drift` at a point."""
     if moving is None:
         return None
-    return Drift(walls.velocity(chain, held.first, r), walls.velocity(chain, max(held.second, 0.0), r))
+    return Drift(chain.velocity(held.first, r), chain.velocity(max(held.second, 0.0), r))
 
 
 def mean_drift(moving, held, chain, r0, r1, h):
@@ -151,7 +153,7 @@ def mean_drift(moving, held, chain, r0, r1, h):
     if moving is None:
         return None
     other = max(held.second, 0.0)
-    return Drift(walls.mean_velocity(chain, held.first, r0, r1, h), walls.mean_velocity(chain, other, r0, r1, h))
+    return Drift(chain.mean_velocity(held.first, r0, r1, h), chain.mean_velocity(other, r0, r1, h))
 
 
 def given_by_second(drift, taken):
@@ -168,11 +170,6 @@ def _towards(drift, w, n):
     return dot(relative(None if drift is None else drift.first, w), n)
 
 
-def _off_wall(drift, n, w):
-    b = _towards(drift, w, n)
-    return Held(w - b * n, n, b, ZERO, 0.0)
-
-
 def edge(n, m):
     """n x m, to round-off of its length also where the walls are nearly parallel: n x (m -+ n)."""
     return cross(n, m - select(dot(n, m) < 0.0, -1.0, 1.0) * n)
@@ -180,14 +177,3 @@ def edge(n, m):
 
 def _inverse(sine2):
     return 1.0 / select(sine2 > _TINY, sine2, _TINY)
-
-
-def _off_edge(drift, n, m, w):
-    # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
-    e, cosine, wn = edge(n, m), dot(n, m), _towards(drift, w, n)
-    wm = dot(relative(None if drift is None else drift.second, w), m)
-    inverse = _inverse(square(e))
-    b, c = (wn - cosine * wm) * inverse, (wm - cosine * wn) * inverse
-    # Along the edge, where the walls are at rest
-    along = (dot(w, e) * inverse) * e if drift is None else w - b * n - c * m
-    return Held(along, n, b, m, c)

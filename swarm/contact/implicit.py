@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, square
-from ..surfaces.fold import of_wall
 from .discrete_gradient import Reaction, illinois, narrowed
 from .force import NEEDS as FORCE_NEEDS
 from .force import strength
@@ -55,17 +54,22 @@ def _improve(surface, law, r, c, kappa):
     return step, pushes & (not (abs(step) <= _TOLERANCE * abs(kappa)))
 
 
-# Of all walls: (chain, wall, law, r, c) and (chain, wall, law, r, c, kappa).
-guess = of_wall(_guess, 0.0)
-improve = of_wall(_improve, (0.0, False))
+def guess(chain, wall, *given):
+    """`_guess` of a wall."""
+    return chain.of(wall, 0.0, _guess, *given)
+
+
+def improve(chain, wall, *given):
+    """`_improve` of a wall."""
+    return chain.of(wall, (0.0, False), _improve, *given)
 
 
 def reached(chain, wall, r, kappa):
     """s; r where there is no such wall."""
-    if chain is None:
-        return r
-    other = reached(chain.rest, wall - 1.0, r, kappa)
-    return select(wall == 0.0, chain.first.resolve(r, kappa), other)
+    end = r
+    for k, one in reversed(tuple(enumerate(chain.walls))):
+        end = select(wall == k, one.resolve(r, kappa), end)
+    return end
 
 
 class AtEnd(NamedTuple):

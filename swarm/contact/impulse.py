@@ -9,16 +9,17 @@ A multiplier is a float, or None where the method has none.
 """
 
 import math
+from typing import Any
 
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from ..surfaces.fold import of_wall
+from ..kernel.vector import Vec
 
 # A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
 # a multiplier its square need only be small, as the loop repairs the rest.
 _NEWTON_TOLERANCE = 1e-8
 _LOOP_TOLERANCE = 1e-2
-# Steps of the vectorised solve; what needs more is solved by `careful`.
+# Steps of the vectorised solve; what needs more is solved by `Equation.careful`.
 NEWTON_STEPS = 8
 _CAREFUL_ITERATIONS = 200
 # A push this near to its farthest has no root before it.
@@ -35,6 +36,14 @@ NEEDS = (
 )  # fmt: skip
 
 
+class Step(Record):
+    """A step from r with the free displacement p = h v0 + h^2 G/2; c = h^2/(2m), in implicit rules h^2/(4m)."""
+
+    r: Vec
+    p: Vec
+    c: float
+
+
 class Start(Record):
     """The start of a step at one surface."""
 
@@ -42,6 +51,27 @@ class Start(Record):
     gap: float
     round_off: float  # the gap that counts as 0
     tolerance: float  # of Newton's steps
+
+
+def start_of(multiplier, surface, r):
+    """The `Start` of a step from r; only multipliers need a gap of round-off to count as 0."""
+    q0 = surface.inner(r)
+    g0 = surface.gap_of(q0)
+    if multiplier is None:
+        return Start(q0, g0, 0.0, _NEWTON_TOLERANCE)
+    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
+    round_off = _ON_SURFACE * surface.gap_scale(r)
+    return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
+
+
+class End(Record):
+    """The end of a step at one surface."""
+
+    gap: float  # g1, from g1 - g0: more digits of a small g1 than r1 has
+    rise: float  # q1 - q0
+    drise: float  # by kappa
+    slope: float  # g[q0, q1]
+    dslope: float  # by q1
 
 
 class Residual(Record):
@@ -70,38 +100,127 @@ class Newton(Record):
     record: LoopRecord
 
 
-def _residual(law, multiplier, surface, step, start, kappa):
-    rise, drise = surface.rise(step.r, step.p, kappa)
-    slope, dslope = surface.gap_slope(start.q, start.q + rise)
-    # g1 - g0 = g[q0, q1] (q1 - q0)
-    g1 = start.gap + slope * rise
-    g1 = select(abs(g1) <= start.round_off, 0.0, g1)
-    force, dforce = law.force(multiplier, start.gap, g1)
-    dg1 = drise * (slope + dslope * rise)
-    f, df = kappa - step.c * force * slope, 1.0 - step.c * (dforce * dg1 * slope + force * dslope * drise)
-    return Residual(f, df, g1, dg1, slope)
+class Equation(Record):
+    """Equation (K) of one surface in one step."""
+
+    law: Any
+    multiplier: Any
+    surface: Any
+    step: Step
+    start: Start
+
+    def end(self, kappa):
+        """The `End` of the step that is pushed with kappa."""
+        start, surface, step = self.start, self.surface, self.step
+        rise, drise = surface.rise(step.r, step.p, kappa)
+        slope, dslope = surface.gap_slope(start.q, start.q + rise)
+        # g1 - g0 = g[q0, q1] (q1 - q0)
+        g1 = start.gap + slope * rise
+        return End(select(abs(g1) <= start.round_off, 0.0, g1), rise, drise, slope, dslope)
+
+    def residual(self, kappa):
+        """The `Residual` of kappa."""
+        c, end = self.step.c, self.end(kappa)
+        force, dforce = self.law.force(self.multiplier, self.start.gap, end.gap)
+        dg1 = end.drise * (end.slope + end.dslope * end.rise)
+        f = kappa - c * force * end.slope
+        df = 1.0 - c * (dforce * dg1 * end.slope + force * end.dslope * end.drise)
+        return Residual(f, df, end.gap, dg1, end.slope)
+
+    def newton(self, kappa):
+        """The `Newton` step of kappa.
+
+        What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1
+        is a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
+        """
+        start, f = self.start, self.residual(kappa)
+        change = f.value / f.slope
+        g0, g1 = start.gap, f.gap
+        depth = select(g0 > abs(g1), g0, abs(g1))
+        # True for NaN.
+        more = not (abs(change * f.gap_slope) <= start.tolerance * depth + 2.0 * start.round_off)
+        record = self.record(g1, g1 - change * f.gap_slope, self.step.c * f.rise_slope / f.slope)
+        return Newton(change, more, record)
+
+    def record(self, g1, g, factor):
+        """The `LoopRecord` of the step that ends at gap g, from one that ended at g1; without a multiplier zeros.
+
+        dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
+        """
+        if self.multiplier is None:
+            return LoopRecord(0.0, 0.0, 0.0)
+        law, g0 = self.law, self.start.gap
+        slope, _curvature = law.constraint_slope(g0, g1)
+        mean = 0.5 * (law.constraint(g0) + law.constraint(g))
+        return LoopRecord(mean, law.stored_energy(g), factor * slope)
+
+    @outlined
+    def careful(self):
+        """kappa by Newton's method inside a bracket, and whether it was found."""
+        first = self.residual(0.0)
+        if first.value == 0.0:
+            return 0.0, True
+        # A cavity pushes with kappa > 0, a solid with kappa < 0: `sign` mirrors it.
+        sign = -1.0 if first.value > 0.0 else 1.0
+        low, high, found = self.bracket(sign, self.first_push(abs(first.value), first.slope))
+        if not found:
+            return sign * low, False
+        k, previous = low, math.inf
+        for _i in range(_CAREFUL_ITERATIONS):
+            residual = self.residual(sign * k)
+            f = sign * residual.value
+            if f == 0.0 or not abs(f) < math.inf:
+                return sign * k, f == 0.0
+            if f < 0.0:
+                low = k
+            else:
+                high = k
+            trial = k - f / residual.slope
+            # Newton's steps that do not shrink have reached the noise of g1: halving the bracket ends.
+            if not (low < trial < high and abs(trial - k) <= 0.5 * previous):
+                trial = 0.5 * (low + high)
+            previous = abs(trial - k)
+            if previous <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
+                return sign * trial, True
+            k = trial
+        return sign * k, False
+
+    def first_push(self, size, df):
+        """The first trial of the root, from |F(0)| and F'(0)."""
+        # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to
+        # that. Without one it does not pass the root where the right side of (K) is convex. The value at 0 can be past
+        # the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from
+        # there held the largest of three roots.
+        return size / df if self.multiplier is None and 1.0 < df < math.inf else size
+
+    @outlined
+    def bracket(self, sign, first):
+        """Two sizes of kappa with F < 0 and F >= 0, the latter `first` doubled some times; whether they were found."""
+        # Doubling from below meets the smallest root first, and it ends: (K) has F > 0 both far out and before the
+        # pole.
+        farthest = abs(self.surface.farthest_push())
+        low, high = 0.0, min(first, 0.5 * farthest)
+        for _i in range(_DOUBLINGS):
+            f = sign * self.residual(sign * high).value
+            if not abs(f) < math.inf:
+                # A push that is not defined so far.
+                farthest = high
+                high = 0.5 * (low + high)
+            elif f >= 0.0:
+                return low, high, True
+            elif high >= _NEAR * farthest:
+                break
+            else:
+                low, high = high, min(2.0 * high, 0.5 * (high + farthest))
+        return low, high, False
 
 
-def start_gap(multiplier, surface, r, q0):
-    """The start of a step from r, where q = q0; only multipliers need a gap of round-off to count as 0."""
-    g0 = surface.gap_of(q0)
-    if multiplier is None:
-        return Start(q0, g0, 0.0, _NEWTON_TOLERANCE)
-    # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
-    round_off = _ON_SURFACE * surface.gap_scale(r)
-    return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
+def equation(law, multiplier, surface, step):
+    """The `Equation` of one surface in one step."""
+    return Equation(law, multiplier, surface, step, start_of(multiplier, surface, step.r))
 
 
-def _loop_record(multiplier, law, g0, g1, g, factor):
-    """The `LoopRecord` of the step that ends at gap g; without a multiplier zeros.
-
-    dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
-    """
-    if multiplier is None:
-        return LoopRecord(0.0, 0.0, 0.0)
-    slope, _curvature = law.constraint_slope(g0, g1)
-    mean = 0.5 * (law.constraint(g0) + law.constraint(g))
-    return LoopRecord(mean, law.stored_energy(g), factor * slope)
+# --- In lanes --------------------------------------------------------------------------------------------
 
 
 def _guess(surface, law, step):
@@ -130,94 +249,14 @@ def _guess(surface, law, step):
 
 
 def _improve(surface, law, multiplier, step, kappa):
-    """The `Newton` step of kappa.
-
-    What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1 is
-    a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
-    """
-    start = start_gap(multiplier, surface, step.r, surface.inner(step.r))
-    f = _residual(law, multiplier, surface, step, start, kappa)
-    change = f.value / f.slope
-    g0, g1 = start.gap, f.gap
-    depth = select(g0 > abs(g1), g0, abs(g1))
-    # True for NaN.
-    more = not (abs(change * f.gap_slope) <= start.tolerance * depth + 2.0 * start.round_off)
-    record = _loop_record(multiplier, law, g0, g1, g1 - change * f.gap_slope, step.c * f.rise_slope / f.slope)
-    return Newton(change, more, record)
+    return equation(law, multiplier, surface, step).newton(kappa)
 
 
-# Of all walls: (chain, wall, law, step) and (chain, wall, law, multiplier, step, kappa).
-guess = of_wall(_guess, 0.0)
-improve = of_wall(_improve, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)))
+def guess(chain, wall, *given):
+    """`_guess` of a wall."""
+    return chain.of(wall, 0.0, _guess, *given)
 
 
-def end_gap(surface, step, start, kappa):
-    """g1 of the step that is pushed with kappa, from g1 - g0: more digits of a small g1 than r1 has."""
-    rise, _drise = surface.rise(step.r, step.p, kappa)
-    slope, _dslope = surface.gap_slope(start.q, start.q + rise)
-    g1 = start.gap + slope * rise
-    return select(abs(g1) <= start.round_off, 0.0, g1)
-
-
-@outlined
-def careful(law, multiplier, surface, step):
-    """kappa of one surface by Newton's method inside a bracket, and whether it was found."""
-    start = start_gap(multiplier, surface, step.r, surface.inner(step.r))
-    first = _residual(law, multiplier, surface, step, start, 0.0)
-    if first.value == 0.0:
-        return 0.0, True
-    # A cavity pushes with kappa > 0, a solid with kappa < 0: `sign` mirrors it.
-    sign = -1.0 if first.value > 0.0 else 1.0
-    trial = _first_push(multiplier, abs(first.value), first.slope)
-    low, high, found = _bracket(law, multiplier, surface, step, start, sign, trial)
-    if not found:
-        return sign * low, False
-    k, previous = low, math.inf
-    for _i in range(_CAREFUL_ITERATIONS):
-        residual = _residual(law, multiplier, surface, step, start, sign * k)
-        f = sign * residual.value
-        if f == 0.0 or not abs(f) < math.inf:
-            return sign * k, f == 0.0
-        if f < 0.0:
-            low = k
-        else:
-            high = k
-        trial = k - f / residual.slope
-        # Newton's steps that do not shrink have reached the noise of g1: halving the bracket ends.
-        if not (low < trial < high and abs(trial - k) <= 0.5 * previous):
-            trial = 0.5 * (low + high)
-        previous = abs(trial - k)
-        if previous <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
-            return sign * trial, True
-        k = trial
-    return sign * k, False
-
-
-def _first_push(multiplier, size, df):
-    """Where to look for the root first, from |F(0)| and F'(0)."""
-    # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to that.
-    # Without one it does not pass the root where the right side of (K) is convex. The value at 0 can be past the root
-    # of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from there held the
-    # largest of three roots.
-    return size / df if multiplier is None and 1.0 < df < math.inf else size
-
-
-@outlined
-def _bracket(law, multiplier, surface, step, start, sign, first):
-    """Two sizes of kappa with F < 0 and F >= 0, the latter `first` doubled some times, and whether they were found."""
-    # Doubling from below meets the smallest root first, and it ends: (K) has F > 0 both far out and before the pole.
-    farthest = abs(surface.farthest_push())
-    low, high = 0.0, min(first, 0.5 * farthest)
-    for _i in range(_DOUBLINGS):
-        f = sign * _residual(law, multiplier, surface, step, start, sign * high).value
-        if not abs(f) < math.inf:
-            # A push that is not defined so far.
-            farthest = high
-            high = 0.5 * (low + high)
-        elif f >= 0.0:
-            return low, high, True
-        elif high >= _NEAR * farthest:
-            break
-        else:
-            low, high = high, min(2.0 * high, 0.5 * (high + farthest))
-    return low, high, False
+def improve(chain, wall, *given):
+    """`_improve` of a wall."""
+    return chain.of(wall, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)), _improve, *given)

@@ -1,31 +1,51 @@
 """The laws of walls: restitution, Coulomb's friction, thermal walls. What no wall of a scene has is None."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..surfaces.fold import Chain
 
 
-class Laws(NamedTuple):
+class Laws(Record):
     """The effects of impacts on a particle besides turning it round."""
 
-    restitution: Any  # None, or a Chain of one e a wall
-    friction: Any  # None, or a Chain of one mu a wall
-    thermal: Any  # None, or a Chain of one `Thermal` a wall
+    restitution: Any  # None, or e of each wall
+    friction: Any  # None, or mu of each wall
+    thermal: Any  # None, or `Thermal` of each wall
     moving: Any  # None, or `Moves` where a wall moves
+
+    @property
+    def loses(self):
+        """Whether an impact may turn energy into heat: a constant for the compiler."""
+        return self.restitution is not None or self.friction is not None
+
+    @property
+    def change_energy(self):
+        """Whether an impact may change the energy of a particle: a constant for the compiler."""
+        return self.loses or self.thermal is not None or self.moving is not None
+
+    def restitution_of(self, wall):
+        """e of a wall."""
+        return of_wall(self.restitution, wall, 1.0)
+
+    def friction_of(self, wall):
+        """mu of a wall."""
+        return of_wall(self.friction, wall)
+
+    def thermal_of(self, wall):
+        """`Thermal` of a wall."""
+        return of_wall(self.thermal, wall, Thermal(0.0, 0.0))
+
+
+# The laws of rigid elastic walls at rest.
+NONE = Laws(None, None, None, None)
 
 
 class Span(Record):
-    """In a chain of numbers, one that holds for so many walls."""
+    """What holds for so many walls in a row."""
 
-    first: Any
+    value: Any
     walls: float
-    rest: Any
-
-
-# The chain of a law that some wall has.
-Given = Chain | Span
 
 
 class Moves(Record):
@@ -45,43 +65,16 @@ class Thermal(Record):
         return (self.accommodation > 0.0) & (self.energy > 0.0)
 
 
-def of_wall(chain, wall, neutral=0.0):
-    """The entry of this wall, `neutral` where no wall has the law."""
-    if chain is None:
-        return neutral
-    if isinstance(chain, Span):
-        return select(wall < chain.walls, chain.first, of_wall(chain.rest, wall - chain.walls, neutral))
-    return select(wall == 0.0, chain.first, of_wall(chain.rest, wall - 1.0, neutral))
-
-
-# --- Of the laws of a scene, or None ---------------------------------------------------------------------
-
-
-def friction(laws):
-    """The friction of all walls, or None."""
-    return None if laws is None else laws.friction
-
-
-def thermal(laws):
-    """The temperatures of all walls, or None."""
-    return None if laws is None else laws.thermal
-
-
-def moving(laws):
-    """`Moves`, or None."""
-    return None if laws is None else laws.moving
-
-
-def loses(laws):
-    """Whether an impact may turn energy into heat: a constant for the compiler."""
-    return laws is not None and (laws.restitution is not None or laws.friction is not None)
-
-
-def restitution_of(laws, wall):
-    """e of a wall."""
-    return 1.0 if laws is None or laws.restitution is None else of_wall(laws.restitution, wall)
-
-
-def thermal_of(laws, wall):
-    """`Thermal` of a wall."""
-    return of_wall(thermal(laws), wall, Thermal(0.0, 0.0))
+def of_wall(given, wall, neutral=0.0):
+    """The part of a law that is of this wall, `neutral` where no wall has the law."""
+    each: Any = ()
+    first = 0.0
+    for one in given or ():
+        is_span = isinstance(one, Span)
+        after = first + (one.walls if is_span else 1.0)
+        each = (*each, (wall < after, one.value) if is_span else (wall == first, one))
+        first = after
+    found = neutral
+    for here, value in reversed(each):
+        found = select(here, value, found)
+    return found

@@ -1,15 +1,14 @@
-"""Where a particle comes into an opening of its wall, and closed walls at the same place, which close it."""
+"""Particles that come into openings of their walls, and closed walls at the same place, which close these."""
 
 import math
 
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
-from ..surfaces import fold as walls
 from ..surfaces.fields.grid import in_block, size_of
 from ..surfaces.fields.members import member
-from ..surfaces.fold import each
 from ..surfaces.openings import is_open, outside
-from . import laws as wall_laws
+from ..surfaces.walls import Field
 from .crossing import at_part, bisected, block_of_path
 from .events import TOUCH
 from .reflection import relative, wall_velocity
@@ -33,11 +32,11 @@ def _lets_out(openings, rules, chain, wall, r, near):
 def _is_covered(openings, rules, chain, wall, r, near):
     """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
     number = numbers_near(chain, r)
-    touch, n = TOUCH * rules.size + near, walls.unit_normal(chain, wall, r)
+    touch, n = TOUCH * rules.size + near, chain.unit_normal(wall, r)
     for i in range(number.size):
-        m = walls.unit_normal(chain, number[i], r)
+        m = chain.unit_normal(number[i], r)
         alike = dot(n, m) > 0.0 and square(cross(n, m)) <= _PARALLEL * _PARALLEL
-        here = alike and abs(walls.distance(chain, number[i], r)) <= touch
+        here = alike and abs(chain.distance(number[i], r)) <= touch
         if here and number[i] != wall and not is_open(openings, number[i], r, near):
             return True
     return False
@@ -52,12 +51,12 @@ def hit_wall(openings, rules, chain, motion, wall, near):
     r, v = motion
     if not is_open(openings, wall, r, near):
         return wall
-    moving, touch = wall_laws.moving(rules.laws), TOUCH * rules.size + near
+    moving, touch = rules.laws.moving, TOUCH * rules.size + near
     number = numbers_near(chain, r)
     found, soonest = wall, math.inf
     for i in range(number.size):
         w = relative(wall_velocity(moving, chain, number[i], r), v)
-        towards, distance = dot(walls.unit_normal(chain, number[i], r), w), walls.distance(chain, number[i], r)
+        towards, distance = dot(chain.unit_normal(number[i], r), w), chain.distance(number[i], r)
         # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
         here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
         if here and -distance < soonest * towards and not is_open(openings, number[i], r, near):
@@ -80,7 +79,7 @@ def open_wall_at(openings, rules, chain, r, near):
         return -1.0
     number, touch = numbers_near(chain, r), TOUCH * rules.size
     for i in range(number.size):
-        if walls.distance(chain, number[i], r) >= -touch and _lets_out(openings, rules, chain, number[i], r, near):
+        if chain.distance(number[i], r) >= -touch and _lets_out(openings, rules, chain, number[i], r, near):
             return number[i]
     return -1.0
 
@@ -96,22 +95,17 @@ def _reach(path):
 def may_pass(openings, held, path):
     """Whether a step may come into an opening of a wall that holds the particle."""
     found, reach = False, _reach(path)
-    for run in each(openings):
+    for opening in openings or ():
         enters = False
-        for link in each(run.volumes):
-            enters = enters | _may_enter(link.first, path, reach)
-        found = found | ((_is_of(run, held.first) | _is_of(run, held.second)) & enters)
+        for volume in opening.volumes:
+            enters = enters | _may_enter(volume, path, reach)
+        found = found | ((opening.is_of(held.first) | opening.is_of(held.second)) & enters)
     return found
 
 
-def _is_of(run, wall):
-    """Whether a wall is open in these volumes."""
-    return (wall >= run.first) & (wall < run.last)
-
-
 def _may_enter(volume, path, reach):
-    if isinstance(volume, walls.Field):
-        return _may_enter_one(volume.first, path, reach)
+    if isinstance(volume, Field):
+        return _may_enter_one(volume.members, path, reach)
     return outside(volume, path.r1) <= reach
 
 
@@ -137,7 +131,7 @@ def part_until_open(openings, rules, chain, held, path, near):
 
 @outlined
 def _part_uncovered(openings, rules, chain, wall, path, near):
-    """The same of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
+    """`part_until_open` of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
     low = _part(openings, wall, path, near)
     if not low < math.inf or not _is_covered(openings, rules, chain, wall, at_part(path, low), near):
         return low
@@ -154,19 +148,19 @@ def _lets_out_at(openings, rules, chain, wall, path, near, part):
 
 
 def _part(openings, wall, path, near):
-    for run in each(openings):
-        if run.first <= wall < run.last:
+    for opening in openings:
+        if opening.first <= wall < opening.last:
             first = math.inf
-            for link in reversed(each(run.volumes)):
-                first = min(_way_into(link.first, path, near), first)
+            for volume in reversed(opening.volumes):
+                first = min(_way_into(volume, path, near), first)
             return first
     return math.inf
 
 
 def _way_into(volume, path, near):
     """The part of a step after which it is in a volume."""
-    if isinstance(volume, walls.Field):
-        return _way_into_any(volume.first, path, near)
+    if isinstance(volume, Field):
+        return _way_into_any(volume.members, path, near)
     return _way_in(volume, path, near)
 
 
@@ -183,7 +177,7 @@ def _way_into_any(members, path, near):
 
 @outlined
 def _way_in(volume, path, near):
-    """The same of one volume, whose distance is looked at at some places of the step and where it is least."""
+    """`_way_into` of one volume, whose distance is looked at at some places of the step and where it is least."""
     reach = _reach(path)
     if not outside(volume, path.r1) <= reach:
         return math.inf

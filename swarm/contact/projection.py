@@ -1,4 +1,4 @@
-"""P, the projection of a vector on what no touched wall forbids: a half-space, the edge of two walls, a corner."""
+"""P, the projection of a vector on the directions that touched walls allow: a half-space, an edge, a corner."""
 
 import math
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, cross, dot, largest, norm, put, total
-from ..surfaces import fold as walls
 
 _EPSILON = 2.220446049250313e-16
 # Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
@@ -27,7 +26,7 @@ class Touch(Record):
 
 
 class Edge(Record):
-    """Of two walls i and j: e along their edge, m = e x n_i, and n_j = cosine n_i + sine m."""
+    """The edge of two walls i and j: e along their edge, m = e x n_i, and n_j = cosine n_i + sine m."""
 
     e: Vec
     m: Vec
@@ -154,8 +153,8 @@ def put_normals(chain, touch, which, r0, r1):
 @outlined
 def _normal(chain, wall, r0, r1):
     """The unit vector along the discrete gradient of a wall, out of the admissible side."""
-    n = walls.unit_normal(chain, wall, r0)
-    d = walls.inner_gradient(chain, wall, r0, r1)
+    n = chain.unit_normal(wall, r0)
+    d = chain.inner_gradient(wall, r0, r1)
     length = norm(d)
     if dot(d, n) < 0.0:
         length = -length

@@ -14,9 +14,8 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
-from ..surfaces import fold as walls
-from . import laws as wall_laws
 from .hold import Two, mean_drift
+from .laws import of_wall
 from .reflection import relative, wall_velocity
 
 _EPSILON = 2.220446049250313e-16
@@ -55,8 +54,8 @@ NEEDS = (
 def _grip(friction, held, presses):
     """sum mu b, where a wall presses with b"""
     b, c = presses
-    first = wall_laws.of_wall(friction, held.first) * b
-    return first + (wall_laws.of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
+    first = of_wall(friction, held.first) * b
+    return first + (of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
 
 
 class Slowed(Record):
@@ -131,14 +130,14 @@ class Force(Record):
 
 def force(laws, held, chain, gravity, r, v):
     """The `Force` on a particle that slides with this velocity along the walls."""
-    pull, moving, friction = accelerated(gravity, ZERO, 1.0), wall_laws.moving(laws), wall_laws.friction(laws)
+    pull, moving, friction = accelerated(gravity, ZERO, 1.0), laws.moving, laws.friction
     n, m = held.presses(chain, r, v, pull)
     taken = held.split_at(chain, None, r, v)
     a = pull - n * taken.n - m * taken.m
     if friction is None:
         return Force(a, n, m)
     slip = relative(wall_velocity(moving, chain, held.first, r), v)
-    drive = relative(None if moving is None else walls.acceleration(chain, held.first, r), a)
+    drive = relative(None if moving is None else chain.acceleration(held.first, r), a)
     return Force(a - _drag(_grip(friction, held, (n, m)), slip, drive), n, m)
 
 
@@ -165,7 +164,7 @@ def longest(friction, v, a):
 
 
 def still(r, v, taken, allowed):
-    """How far the last sweep but one may move r1, if the walls take so much of v in a composed step."""
+    """The most that the last sweep but one may move r1, if the walls take so much of v in a composed step."""
     least = _STILL * total(absolute(r))
     least = select(least > _SLACK * allowed, least, _SLACK * allowed)
     turn, whole = _GAIN * total(absolute(taken)), total(absolute(v))
@@ -192,7 +191,7 @@ def part(k):
 
 
 def before(k):
-    """How much of the composition comes before its step k."""
+    """The part of the composition that comes before its step k."""
     return select(k < 3, OUTER * select(k < 3, 1.0 * k, 0.0), 1.0 - OUTER * (5.0 - k))
 
 
@@ -202,7 +201,7 @@ def inverse_part(k):
 
 
 def lead(k):
-    """How far the acceleration of step k is beyond the mean one of the step before, over its change in that.
+    """The part of its change that the acceleration of step k is beyond the mean one of the step before.
 
     Constant jerk: the mean of a step is that of its middle, and r1 - r0 - h v0 is h^2/2 times that of its first third.
     """

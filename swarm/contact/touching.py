@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch
+from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import flights
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near, until_others
-from . import laws as wall_laws
 from . import reflection
+from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
@@ -36,10 +35,10 @@ NEEDS = ("first_hit", "unit_normal", "inner_gradient", "distance", "settle")
 
 
 class Contacts(Record):
-    """How impacts are taken."""
+    """The settings of an impact."""
 
     contact_step: Any  # None or h
-    laws: Any  # None or `Laws`
+    laws: Laws
     shortest: float  # flight: the particle slides instead of shorter ones [s]
     touch: float  # distance within which walls hold a sliding particle too [m]
 
@@ -53,7 +52,7 @@ class Moving(Record):
 
 
 class Landing(Record):
-    """The particle after the impact, the time it took, and twice its energy per mass."""
+    """A particle after its impact, the time it took, and twice its energy per mass."""
 
     r: Vec
     v: Vec
@@ -69,17 +68,17 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
     flight would be shorter than the shortest too, the particle slides for that time instead.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
-    carried, chain = chain, at(chain, flight.left)
-    given, work = scratch(walls.length(chain), np.float64), scratch(walls.length(chain), np.float64)
+    carried, chain = chain, chain.at(flight.left)
+    given, work = scratch(chain.length(), np.float64), scratch(chain.length(), np.float64)
     w, now, met = v, energy, wall
     for _blow in range(_BLOWS):
         bounce = reflection.exact(method.laws, chain, gravity, met, r, w, now)
         w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
-        given[walls.row(chain, met)] += bounce.impulse
-        work[walls.row(chain, met)] += 0.5 * bounce.work
+        given[chain.row(met)] += bounce.impulse
+        work[chain.row(met)] += 0.5 * bounce.work
         following = flights.first_hit(chain, gravity, r, w)
         if following.time >= method.shortest or following.wall < 0.0:
-            row = walls.row(chain, wall)
+            row = chain.row(wall)
             end = reflection.Stepped(r, w, 0.0, given[row])
             if method.contact_step is not None and met == wall:
                 end = reflection.contact(method.contact_step, chain, gravity, wall, r, v, flight.left, now)
@@ -98,8 +97,8 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
 @outlined
 def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
-    laws, r, moving = method.laws, flight.r, wall_laws.moving(method.laws)
-    carried, chain = chain, at(chain, flight.left)
+    laws, r, moving = method.laws, flight.r, method.laws.moving
+    carried, chain = chain, chain.at(flight.left)
     number = numbers_near(chain, r)
     count = number.size
     touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
@@ -116,7 +115,7 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
     u = from_relative(frame, u)
     if moves(u):
-        r = _settled(at(carried, flight.left - h), wall, touch, r + h * u)
+        r = _settled(carried.at(flight.left - h), wall, touch, r + h * u)
     w = from_relative(frame, w)
     if moving is not None:
         # Walls do work.
@@ -126,11 +125,11 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
         taken = given[i] + 2.0 * touch.held[i]
-        row, behind = walls.row(chain, number[i]), walls.length(chain)
+        row, behind = chain.row(number[i]), chain.length()
         impulse[row, lane] += taken
         if moving is not None and impulse.shape[0] > behind:
             gained = -taken * column(normal, 0, i)
-            impulse[behind + row, lane] += dot(gained, walls.velocity(chain, number[i], flight.r))
+            impulse[behind + row, lane] += dot(gained, chain.velocity(number[i], flight.r))
     return Landing(r, w, h, twice_energy)
 
 
@@ -142,8 +141,8 @@ def _frame_of(chain, number, touched, r):
     for _sweep in range(_SWEEPS):
         for i in range(touched.size):
             if touched[i]:
-                n = walls.unit_normal(chain, number[i], r)
-                u = u + dot(walls.velocity(chain, number[i], r) - u, n) * n
+                n = chain.unit_normal(number[i], r)
+                u = u + dot(chain.velocity(number[i], r) - u, n) * n
     return u
 
 
@@ -188,14 +187,14 @@ def _settled(chain, wall, touch, r):
     for i in range(touch.touched.size):
         holds = touch.number[i] == wall and touch.held[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
-            r = walls.settle(chain, touch.number[i], r)
+            r = chain.settle(touch.number[i], r)
     return r
 
 
 def numbers_near(chain, r):
     """The numbers of the walls near a point, in an array of the function that asks."""
     number = scratch(count_near(chain, r), np.float64)
-    list_near(chain, 0, 0.0, r, number)
+    list_near(chain, r, number)
     return number
 
 
@@ -209,7 +208,7 @@ def inside(chain, r):
         i = np.argmax(outside)
         if outside[i] <= _EPSILON * total(absolute(r)):
             break
-        r = walls.settle(chain, number[i], r)
+        r = chain.settle(number[i], r)
     return r
 
 
@@ -217,7 +216,7 @@ def inside(chain, r):
 def _depths(chain, number, r, into):
     """Signed distance outside of walls into `into`."""
     for i in range(number.size):
-        into[i] = walls.distance(chain, number[i], r)
+        into[i] = chain.distance(number[i], r)
 
 
 @outlined
@@ -227,11 +226,11 @@ def _landed(laws, chain, touch, given, r, v, twice_energy):
     Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
     would reflect the rest.
     """
-    if laws is None:
+    if not laws.change_energy:
         return v, twice_energy
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
-        lossy[i] = touch.touched[i] and 1.0 + wall_laws.restitution_of(laws, touch.number[i]) < 2.0
+        lossy[i] = touch.touched[i] and 1.0 + laws.restitution_of(touch.number[i]) < 2.0
     put_normals(chain, touch, lossy, r, r)
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u
@@ -252,7 +251,7 @@ def _goes_straight(chain, gravity, touch, r, v):
             return False
     bent = 0
     for i in range(touch.touched.size):
-        bent += touch.touched[i] and not walls.flat(chain, touch.number[i])
+        bent += touch.touched[i] and not chain.flat(touch.number[i])
     return speed == 0.0 or bent == 0
 
 
@@ -265,23 +264,23 @@ def are_carried(chain, gravity, r, v, near, held):
     count = count_near(chain, r)
     number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
     normal, taken = scratch((3, count), np.float64), scratch(count, np.float64)
-    list_near(chain, 0, 0.0, r, number)
+    list_near(chain, r, number)
     _depths(chain, number, r, depth)
     several = 0
     for i in range(count):
         touched[i] = depth[i] >= -near
         several += touched[i]
         if touched[i]:
-            put(normal, 0, i, walls.unit_normal(chain, number[i], r))
+            put(normal, 0, i, chain.unit_normal(number[i], r))
     g = accelerated(gravity, ZERO, 1.0)
     # v as a sum over the normals: what goes into the walls, then what goes away from them, and again.
     sign, rest = 1.0, v
     for _sweep in range(_SWEEPS):
         rest = sign * project(touched, normal, taken, sign * rest)
         for i in range(count):
-            held[1, walls.row(chain, number[i])] += sign * taken[i]
+            held[1, chain.row(number[i])] += sign * taken[i]
         sign = -sign
     falling = project(touched, normal, taken, g)
     for i in range(count):
-        held[0, walls.row(chain, number[i])] += taken[i]
+        held[0, chain.row(number[i])] += taken[i]
     return several > 1 and moves(g) and largest(falling) <= ALLOWED * largest(g)

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.arrays import scratch
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec
-from ..surfaces import fold as walls
 from . import corner, impulse
 
 # How the multiplier is updated and started: (8) itself, the secant, or the secant from the reflection's multiplier.
@@ -40,36 +40,27 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
     return multiplier + miss * select(use, stretch * (1.0 - _SHORT), 1.0)
 
 
-def _start_of(surface, r):
-    return impulse.start_gap(0.0, surface, r, surface.inner(r))
-
-
-def _has_limit(surface, law, r):
+def has_limit(surface, law, r):
     """Whether the loop has a limit: State I with Phi'(0) > 0.
 
     Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
     """
-    return (_start_of(surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
+    return (impulse.start_of(0.0, surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
 
-def _multiplier_of(surface, law, r, c, kappa):
+def multiplier_of(surface, law, r, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
-    start = _start_of(surface, r)
+    start = impulse.start_of(0.0, surface, r)
     slope, _curvature = surface.gap_slope(start.q, start.q)
     return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 
 
-# Of all walls: (chain, wall, law, r) and (chain, wall, law, r, c, kappa).
-has_limit = walls.of_wall(_has_limit, False)
-multiplier_of = walls.of_wall(_multiplier_of, 0.0)
-
-
 def reflection(chain, wall, law, step):
     """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
-    kappa = walls.chord_guess(chain, wall, step.r, step.p)
+    kappa = chain.chord_guess(wall, step.r, step.p)
     for _i in range(_CHORD_STEPS):
-        kappa = kappa - walls.chord_improve(chain, wall, step.r, step.p, kappa)
-    multiplier = multiplier_of(chain, wall, law, step.r, step.c, kappa)
+        kappa = kappa - chain.chord_improve(wall, step.r, step.p, kappa)
+    multiplier = chain.of(wall, 0.0, multiplier_of, law, step.r, step.c, kappa)
     good = (multiplier > 0.0) & (multiplier < math.inf)
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
 
@@ -77,9 +68,9 @@ def reflection(chain, wall, law, step):
 def meets_later(chain, wall, law, r, p):
     """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
     found = False
-    for k, link in enumerate(walls.each(chain)):
-        leaves = link.first.level_of(link.first.inner(r + p)) > 0.0
-        found = found | (leaves & (wall != float(k)) & (not _has_limit(link.first, law, r)))
+    for k, other in enumerate(chain.walls):
+        leaves = other.level_of(other.inner(r + p)) > 0.0
+        found = found | (leaves & (wall != float(k)) & (not has_limit(other, law, r)))
     return found
 
 
@@ -120,7 +111,7 @@ def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
         stored += 0.5 * law.alpha * last[k] * last[k]
         miss = 0.5 * law.alpha * (first[k] + last[k])
         old = multipliers[k]
-        acceleration = method.acceleration if has_limit(chain, float(k), law, step.r) else PLAIN
+        acceleration = method.acceleration if chain.of(float(k), False, has_limit, law, step.r) else PLAIN
         if sweep == 0:
             multipliers[k] = old + miss
         else:
@@ -133,7 +124,7 @@ def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
 def start(method, law, chain, step, multipliers):
     """The multipliers that the loop starts from."""
     multipliers[:] = 0.0
-    touched = walls.touched(chain, step.r, step.p)
+    touched = chain.touched(step.r, step.p)
     if method.acceleration == REFLECTION and touched.number == 1.0:
         _kappa, multiplier = reflection(chain, touched.wall, law, step)
         multipliers[int(touched.wall)] = multiplier
@@ -142,7 +133,7 @@ def start(method, law, chain, step, multipliers):
 @outlined
 def loop(method, law, chain, step, reactions):
     """Sweeps until V <= tolerance."""
-    count = walls.length(chain)
+    count = chain.length()
     multipliers = scratch(count, np.float64)
     before = Before(scratch(count, np.float64), scratch(count, np.float64))
     start(method, law, chain, step, multipliers)

@@ -161,7 +161,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) -> Any:
-    """What Numba's `compile` does, of all processes in one at a time for the same kernel and arguments.
+    """Numba's `compile`, of all processes in one at a time for the same kernel and arguments.
 
     The others wait, and find it on disk: 50 runs that start together took the compile time of 50.
     """

@@ -1,4 +1,4 @@
-"""What a compiled kernel is found by on disk, and how it is written there.
+"""The keys of compiled kernels on disk, and their files.
 
 Numba finds it by the types of its arguments, pickled in an index with the classes of tuples: a class of a module by its
 name, so that no process can read the index which cannot import that module, and a class of a script or of a cell of a

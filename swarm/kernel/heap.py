@@ -6,7 +6,8 @@ the first item is the same.
 
 from typing import NamedTuple
 
-from .jit import Array, index, select
+from .arrays import index
+from .jit import Array, select
 
 # Children of a node: half as many levels as two, and the children are beside one another in memory.
 _CHILDREN = 4

@@ -1,4 +1,4 @@
-"""What kernels take from Numba that is not documented: where another version of it may break them.
+"""The undocumented parts of Numba that kernels take: where another version of it may break them.
 
 Each name is here with the parameters by which this package calls it, or None for what it is not called by itself; what
 is taken from them is held by tests/trace/test_internals.py.
@@ -50,7 +50,7 @@ TEMPLATES = {
     "core.typing.templates.infer_global": None,
     "core.typing.templates.make_overload_template": "func overload_func jit_options strict inline",
 }
-# The passes of the compiler and of LLVM: parts.py
+# The passes of the compiler and of LLVM: compilers.py
 COMPILING = {
     "core.codegen.CPUCodegen._pass_builder": "self **kwargs",
     "core.codegen.JITCodeLibrary": None,

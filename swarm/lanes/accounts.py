@@ -1,6 +1,5 @@
 """The accounts of a particle's energy: the shares of walls that move or are hot, and the loss."""
 
-from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
 
 
@@ -27,7 +26,7 @@ def book(chain, state, i, wall, change, given, loses):
 def book_work(chain, state, i, wall, given):
     """Book twice the work per mass of a wall, if it moves."""
     if isinstance(chain, Carried):
-        state.impulse[walls.length(chain) + walls.row(chain, wall), i] += 0.5 * given * state.mass[i]
+        state.impulse[chain.length() + chain.row(wall), i] += 0.5 * given * state.mass[i]
 
 
 def book_step(chain, state, i, wall, change, given, loses):

@@ -5,14 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..contact.events import ARRIVED, EVENT
-from ..contact.laws import loses
 from ..contact.uzawa import RECORDS
-from ..kernel.jit import Array, index, next_of, outlined, select
+from ..kernel.arrays import index, next_of
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from ..surfaces.moving import Carried
 from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 
@@ -122,9 +121,9 @@ class Lanes(NamedTuple):
         if method.dissipates:
             # Each particle knows its energy: what it has lost is accounted for with it.
             now = 0.5 * lane.twice
-            if loses(method.laws):
+            if method.laws.loses:
                 work = 0.0
-                for s in range(walls.length(chain), booked(chain)):
+                for s in range(chain.length(), booked(chain)):
                     work += self.impulse[s, k]
                 state.dissipated[i] += state.mass[i] * (state.energy[i] - now + work)
             state.energy[i] = now
@@ -278,7 +277,7 @@ def take(draws: Draws, some: int) -> Array:
 
 def booked(chain):
     """How many rows book what the walls give: their impulses, then the work of those that move."""
-    return 2 * walls.length(chain) if isinstance(chain, Carried) else walls.length(chain)
+    return 2 * chain.length() if isinstance(chain, Carried) else chain.length()
 
 
 def speed2_scale(state, i):

@@ -9,14 +9,15 @@ import numpy as np
 
 from ..contact.events import FLYING
 from ..contact.heat import Draw, exchange
+from ..kernel.arrays import index
 from ..kernel.gravity import potential
-from ..kernel.jit import index, kernel, outlined, select
+from ..kernel.jit import kernel, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import put, square
 from ..methods import contract as methods
 from ..status import Status
-from ..surfaces import fold as walls
-from ..surfaces.moving import Carried, at
+from ..surfaces.moving import Carried
+from ..surfaces.walls import Field, Listed
 from . import log as impact_log
 from .accounts import book_heat
 from .escape import let_out_lanes
@@ -158,7 +159,7 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
         solve(method, chain, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if method.thermal is not None:
+    if method.laws.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
     some_arrived, some_hard = _make_contacts(method, chain, gravity, watches, lanes, picked, live)
@@ -192,15 +193,15 @@ def _exchange_heat(method, chain, gravity, share, lanes, live):
         if wall >= 0.0:
             r, v = lane.r, lane.v
             draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
-            now, laws = at(chain, lane.left), method.laws
+            now, laws = chain.at(lane.left), method.laws
             left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
             if left.happens:
                 before, after = lane.twice, square(left.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, walls.row(chain, wall), before, after - left.work)
+                book_heat(state, p, chain.row(wall), before, after - left.work)
                 _add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
                 lane.v, lane.twice = left.v, after
                 lane.hits += 1.0
-                lanes.impulse[walls.row(chain, wall), i] += left.impulse
+                lanes.impulse[chain.row(wall), i] += left.impulse
                 for watch in share.watches():
                     watch.note(lanes, i, left.impulse)
                 # The contact is done, unless a wall at 0 K holds the particle.
@@ -220,8 +221,7 @@ def _put_contact(method, lanes, i, contact):
 
 def _add_impulse(chain, impulse, i, wall, given):
     """impulse[wall, i] += given, without a branch; a loop over rows here would not vectorise."""
-    chain = chain.walls if isinstance(chain, Carried) else chain
-    if isinstance(chain, walls.Chain) and chain.rest is None:
+    if len(chain.walls) == 1 and not chain.fields():
         # One wall: what is given is 0, or it is given by that.
         impulse[0, i] += given
     else:
@@ -231,16 +231,16 @@ def _add_impulse(chain, impulse, i, wall, given):
 def _add_work(chain, impulse, i, wall, given):
     """The work of walls that move is in the rows after those of the impulses."""
     if isinstance(chain, Carried):
-        _add_to(chain.walls, impulse, walls.length(chain), i, wall, given)
+        _add_to(chain, impulse, chain.length(), i, wall, given)
 
 
 def _add_to(chain, impulse, row, i, wall, given):
-    """The same for the walls of a chain, from `row` on."""
-    for link in walls.each(chain):
-        if isinstance(link, walls.Field):
-            count = walls.count(link.first)
+    """The same for all walls, from `row` on."""
+    for one in chain.walls:
+        if isinstance(one, Field):
+            count = one.count()
             here = (wall >= 0.0) & (wall < count)
-            if isinstance(link, walls.Listed):
+            if isinstance(one, Listed):
                 impulse[index(row + int(select(here, wall, 0.0))), i] += select(here, given, 0.0)
                 row += int(count)
             else:

@@ -12,12 +12,11 @@ from ..contact import crossing, events
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
-from ..kernel.jit import outlined, scratch, select
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from ..surfaces.near import count_near, list_near
 
 # The phase of a particle that these walls do not carry.
@@ -64,7 +63,7 @@ def _parts(a, b, c, w):
 
 @outlined
 def _normals(chain, held, r):
-    return tuple(walls.unit_normal(chain, wall, r) for wall in held)
+    return tuple(chain.unit_normal(wall, r) for wall in held)
 
 
 def _force(friction, wall, n, slip):
@@ -81,11 +80,11 @@ def _corner(laws, chain, gravity, held, r, least):
     a, b, c = _normals(chain, held, r)
     if not abs(dot(a, cross(b, c))) > _FLATTEST:
         return _NONE
-    v, w, x = tuple(walls.velocity(chain, wall, r) for wall in held)
+    v, w, x = tuple(chain.velocity(wall, r) for wall in held)
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
     # What is left of the pull in the frame of the particle
-    rest = _solved(a, b, c, *(walls.outward_acceleration(chain, wall, r, u, pull) for wall in held))
-    friction = wall_laws.friction(laws)
+    rest = _solved(a, b, c, *(chain.outward_acceleration(wall, r, u, pull) for wall in held))
+    friction = laws.friction
     p, q, s = tuple(_force(friction, *one) for one in zip(held, (a, b, c), (u - v, u - w, u - x), strict=True))
     load = _parts(p, q, s, rest)
     holds = (load.x > least) & (load.y > least) & (load.z > least)
@@ -98,10 +97,10 @@ def _corner(laws, chain, gravity, held, r, least):
 def _find(laws, chain, gravity, r, near, least):
     """Three walls at a point that hold a particle there, and none of whose neighbours comes: `Three`."""
     number = scratch(count_near(chain, r), np.float64)
-    list_near(chain, 0, 0.0, r, number)
+    list_near(chain, r, number)
     count = 0
     for i in range(number.size):
-        if walls.distance(chain, number[i], r) >= -near:
+        if chain.distance(number[i], r) >= -near:
             number[count] = number[i]
             count += 1
     for i in range(count):
@@ -119,7 +118,7 @@ def _settled(chain, held, r):
     """A point near three walls, moved onto them; whether it is there."""
     least = 4.0 * _EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
-        d, e, f = tuple(walls.distance(chain, wall, r) for wall in held)
+        d, e, f = tuple(chain.distance(wall, r) for wall in held)
         if max(abs(d), abs(e), abs(f)) <= least:
             return r, True
         a, b, c = _normals(chain, held, r)
@@ -133,12 +132,12 @@ def _settled(chain, held, r):
 @outlined
 def is_carried(method, chain, gravity, p):
     """Whether three walls, some of which move, carry a particle that is slow in their corner."""
-    now = at(chain, p.left)
+    now = chain.at(p.left)
     held = _find(method.laws, now, gravity, p.r, events.TOUCH * method.size, events.weightless(method, gravity, p))
     if held.first < 0.0:
         return False
     u = _corner(method.laws, now, gravity, held, p.r, 0.0).u
-    part = events.GRAZING if wall_laws.loses(method.laws) else _NO_SPEED
+    part = events.GRAZING if method.laws.loses else _NO_SPEED
     return square(p.v - u) <= part * part * events.own_speed2(p)
 
 
@@ -149,15 +148,15 @@ def carry(method, chain, gravity, state, i, p):
         return NOT_CARRIED
     laws, near, least = method.laws, events.TOUCH * method.size, events.weightless(method, gravity, p)
     shortest = 2.0 * events.GRAZING * method.size / math.sqrt(events.own_speed2(p))
-    r, left, now = p.r, p.left, at(chain, p.left)
+    r, left, now = p.r, p.left, chain.at(p.left)
     held = _find(laws, now, gravity, r, near, least)
     start, h, phase, used, tries = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0, 0
     while left > 0.0 and tries <= _MOST_TRIES:
-        h = min(h, left, walls.shortest_pace(now))
-        middle, _there = _settled(at(chain, left - 0.5 * h), held, r + (0.5 * h) * start.u)
-        r1, there = _settled(at(chain, left - h), held, r + h * start.u)
-        half = _corner(laws, at(chain, left - 0.5 * h), gravity, held, middle, 0.0)
-        end = _corner(laws, at(chain, left - h), gravity, held, r1, 0.0)
+        h = min(h, left, now.shortest_pace())
+        middle, _there = _settled(chain.at(left - 0.5 * h), held, r + (0.5 * h) * start.u)
+        r1, there = _settled(chain.at(left - h), held, r + h * start.u)
+        half = _corner(laws, chain.at(left - 0.5 * h), gravity, held, middle, 0.0)
+        end = _corner(laws, chain.at(left - h), gravity, held, r1, 0.0)
         if not (there and half.holds and end.holds):
             h *= _RETRY
             if h < shortest:
@@ -165,7 +164,7 @@ def carry(method, chain, gravity, state, i, p):
             continue
         path = crossing.Path(r, start.u, r1, end.u, h)
         none = crossing.near(method, r)
-        if crossing.meets(now, at(chain, left - h), held, path, none):
+        if crossing.meets(now, chain.at(left - h), held, path, none):
             found = crossing.arrival(chain, held, path, none, left)
             if found.time == 0.0:
                 phase = EVENT if used > 0.0 else phase
@@ -181,7 +180,7 @@ def carry(method, chain, gravity, state, i, p):
         _book(chain, gravity, state, i, held, (start, half, end), (r1, h, left == h))
         used += h
         left = 0.0 if left == h else left - h
-        r, now, start, h, tries = r1, at(chain, left), end, h / _RETRY, 0
+        r, now, start, h, tries = r1, chain.at(left), end, h / _RETRY, 0
     if used == 0.0:
         return NOT_CARRIED
     put(state.position, 0, i, r)
@@ -227,9 +226,9 @@ def _book(chain, gravity, state, i, held, corners, end):
 @outlined
 def _push(chain, state, i, held, load, work):
     """Book impulses and works per mass of three walls; the sum of the works."""
-    behind, mass = walls.length(chain), state.mass[i]
+    behind, mass = chain.length(), state.mass[i]
     for wall, given, done in zip(held, load, work, strict=True):
-        row = walls.row(chain, wall)
+        row = chain.row(wall)
         state.impulse[row, i] += given * mass
         state.impulse[behind + row, i] += done * mass
     return work.x + work.y + work.z

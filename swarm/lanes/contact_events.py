@@ -3,18 +3,17 @@
 import numpy as np
 
 from ..contact import crossing, events, touching
-from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
 from ..contact.passing import hit_wall, open_wall_at
 from ..contact.reflection import given, wall_velocity
+from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
-from ..kernel.jit import long_kernel, outlined, scratch
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
-from ..surfaces import fold as walls
-from ..surfaces.moving import Carried, at
+from ..surfaces.moving import Carried
 from ..surfaces.near import count_near, list_near
 from ..surfaces.openings import is_open
 from . import log as impact_log
@@ -67,7 +66,7 @@ def _decide(method, chain, gravity, share, i):
     """Decide whether particle i goes on along its walls, or flies; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
-    carried, chain = chain, at(chain, left)
+    carried, chain = chain, chain.at(left)
     if state.openings is not None and _let_out(method, chain, share, i, r, v, left):
         return True
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
@@ -75,9 +74,9 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    if method.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
+    if method.laws.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
-    moving, settles = wall_laws.moving(method.laws), _settles(method, carried, gravity, p)
+    moving, settles = method.laws.moving, _settles(method, carried, gravity, p)
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -86,14 +85,14 @@ def _decide(method, chain, gravity, share, i):
         found = events.meet(method, One(first), chain, gravity, wall, p)
     else:
         found = events.meet(method, Two(first, second), chain, gravity, wall, p)
-    state.impulse[walls.row(chain, wall), i] += found.impulse * state.mass[i]
+    state.impulse[chain.row(wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
         share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, left, found.impulse))
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(moving, chain, state, i, found, wall)
     u = wall_velocity(moving, chain, wall, r)
-    book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), wall_laws.loses(method.laws))
+    book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), method.laws.loses)
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
     if phase == FLYING:
@@ -113,9 +112,9 @@ def _decide(method, chain, gravity, share, i):
 
 def _settles(method, chain, gravity, p):
     """Whether the walls around a particle hold it."""
-    if wall_laws.moving(method.laws) is not None:
+    if method.laws.moving is not None:
         return is_carried(method, chain, gravity, p)
-    return events.settles(method, chain, gravity, p, scratch((2, walls.length(chain)), np.float64))
+    return events.settles(method, chain, gravity, p, scratch((2, chain.length()), np.float64))
 
 
 @outlined
@@ -146,19 +145,19 @@ def _exchange_heat(method, chain, gravity, share, i):
     """Whether a thermal wall accommodates a sliding particle: then it flies."""
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
-    now = at(chain, contacts.left[i])
+    now = chain.at(contacts.left[i])
     left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i]))
     if not left.happens:
         return False
     before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, walls.row(chain, wall), before, after - left.work)
+    book_heat(state, i, chain.row(wall), before, after - left.work)
     book_work(chain, state, i, wall, left.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
     share.note_impact(method, chain, i, struck)
-    state.impulse[walls.row(chain, wall), i] += left.impulse * state.mass[i]
+    state.impulse[chain.row(wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True
@@ -168,15 +167,15 @@ def _exchange_heat(method, chain, gravity, share, i):
 def _spare(moving, chain, state, i, found, wall):
     """Book how much less its walls give particle i, which chatters, than one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
-    turned = v - found.impulse * walls.unit_normal(chain, wall, r)
+    turned = v - found.impulse * chain.unit_normal(wall, r)
     if found.phase == HELD:
         held = One(found.wall)
         taken = held.split_at(chain, drift(moving, held, chain, r), r, turned)
     else:
         edge = Two(found.wall, found.other)
         taken = edge.split_at(chain, drift(moving, edge, chain, r), r, turned)
-        state.impulse[walls.row(chain, found.other), i] += taken.c * state.mass[i]
-    state.impulse[walls.row(chain, found.wall), i] += taken.b * state.mass[i]
+        state.impulse[chain.row(found.other), i] += taken.c * state.mass[i]
+    state.impulse[chain.row(found.wall), i] += taken.b * state.mass[i]
 
 
 # --- Short steps -----------------------------------------------------------------------------------------
@@ -197,7 +196,7 @@ def _take_care(method, chain, gravity, share, i):
 def _rest(method, chain, gravity, share, i, p, held):
     """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
-    loses = method.laws is not None
+    loses = method.laws.change_energy
     for s in range(held.shape[1]):
         taken = held[1, s] if loses else 0.0
         contacts.load[s, i] = held[0, s]
@@ -221,19 +220,19 @@ def _step(method, chain, gravity, share, i):
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
-    now = at(chain, left)
+    now = chain.at(left)
     if state.openings is not None:
         wall = open_wall_at(state.openings, method, now, r, crossing.near(method, r))
         if wall >= 0.0:
             _leave(share, i, wall, r, v, left)
             return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
-    held = scratch((2, walls.length(chain)), np.float64)
-    if wall_laws.moving(method.laws) is None and events.settles(method, now, gravity, p, held):
+    held = scratch((2, chain.length()), np.float64)
+    if method.laws.moving is None and events.settles(method, now, gravity, p, held):
         _rest(method, now, gravity, share, i, p, held)
         return
     # Step by step, where places on its way are looked at.
-    if wall_laws.moving(method.laws) is not None and state.openings is None and state.period is None:
+    if method.laws.moving is not None and state.openings is None and state.period is None:
         phase = carry(method, chain, gravity, state, i, p)
         if phase != NOT_CARRIED:
             contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
@@ -251,10 +250,10 @@ def _step(method, chain, gravity, share, i):
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
     given_work = 0.0
-    for s in range(walls.length(chain), impulses.shape[0]):
+    for s in range(chain.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
-    book_step(chain, state, i, contacts.met[i], change, given_work, wall_laws.loses(method.laws))
+    book_step(chain, state, i, contacts.met[i], change, given_work, method.laws.loses)
     contacts.sliding[i] += end.used
     contacts.left[i] = max(left - end.used, 0.0)
     phase = FLYING if contacts.left[i] > 0.0 else ARRIVED
@@ -265,9 +264,9 @@ def _step(method, chain, gravity, share, i):
 @outlined
 def _have_closed(chain, method, r, left):
     """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
-    now, deepest = at(chain, left), 0.0
+    now, deepest = chain.at(left), 0.0
     number = scratch(count_near(now, r), np.float64)
-    list_near(now, 0, 0.0, r, number)
+    list_near(now, r, number)
     for i in range(number.size):
-        deepest = max(deepest, walls.distance(now, number[i], r))
+        deepest = max(deepest, now.distance(number[i], r))
     return deepest > events.TOUCH * method.size

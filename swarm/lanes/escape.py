@@ -2,8 +2,8 @@
 
 from ..contact import crossing
 from ..contact.passing import hit_wall, open_wall_of
-from ..kernel.jit import index, outlined
-from ..surfaces.moving import at
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..surfaces.openings import is_open
 from . import log as impact_log
 from .table import marked_lanes
@@ -24,7 +24,7 @@ def let_out_lanes(openings, method, chain, share, lanes, live):
         i = index(lanes.order[k])
         flier = lanes.lane(i)
         r, v = flier.r, flier.v
-        wall = hit_wall(openings, method, at(chain, flier.left), (r, v), lanes.wall[i], 0.0)
+        wall = hit_wall(openings, method, chain.at(flier.left), (r, v), lanes.wall[i], 0.0)
         if not is_open(openings, wall, r, 0.0):
             lanes.wall[i] = wall
             continue

@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import Array, copy_row, index, outlined, select, unwritten
+from ..kernel.arrays import copy_row, index, unwritten
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces import flights, fold
+from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, gathered, member, width
 from ..surfaces.period import on_time
+from ..surfaces.walls import Walls
 from .arrays import Flying
 from .table import STRIDE, marked_lanes
 
@@ -58,8 +60,8 @@ class Look(Record):
         return column(self.lanes.rows, index(self.row), i), column(self.lanes.rows, index(self.row + 3), i)
 
     def one(self, i):
-        """The body of a lane, as a chain."""
-        return fold.Chain(gathered(self.like, self.seen.body, i, 0), None)
+        """The body of a lane, as a scene of one wall."""
+        return Walls((gathered(self.like, self.seen.body, i, 0),))
 
     def take(self, i, time, wall):
         """A hit of a lane with its body, if there is one and it is the first so far."""
@@ -96,13 +98,15 @@ def hit_of_lane(lanes, i):
     return flights.Hit(lanes.course[_TIME, i], lanes.course[_WALL, i])
 
 
+def seek(chain, gravity, lanes, live):
+    """The first hits of every live lane with the fields, or one found."""
+    for before, field in reversed(chain.fields()):
+        _seek(gravity, field.members, before, lanes, live)
+
+
 @outlined
-def seek(chain, before, gravity, lanes, live):
-    """The first hit of every live lane with the fields of a chain that has so many walls before it, or one found."""
-    if not isinstance(chain, fold.Field):
-        return
-    members = chain.first
-    seek(chain.rest, before + fold.count(members), gravity, lanes, live)
+def _seek(gravity, members, before, lanes, live):
+    """The same with one field that has so many walls before it."""
     if isinstance(members, Few):
         _look_at_all(members, before, lanes, live)
     else:

@@ -1,10 +1,9 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
-from ..kernel.jit import index
+from ..kernel.arrays import index
 from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.fold import Field, count_in_fields, others
-from ..surfaces.moving import Carried, Marched, Strided, at
+from ..surfaces.moving import Carried, Marched, Strided
 from ..surfaces.period import cut
 from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
@@ -30,36 +29,43 @@ def go(method, chain, gravity, lanes, live):
 
 def _search(met, chain, gravity, lanes, live):
     """What of the first hits is found in loops of their own."""
-    if isinstance(met, Field):
-        free, before = others(chain), count_in_fields(chain)
+    if met is None:
+        return
+    if _has_fields(met):
+        free, before = chain.others(), chain.count_in_fields()
         _search(free, free, gravity, lanes, live)
         for i in range(index(live)):
             keep_hit(lanes, i, _first_hit(free, free, gravity, lanes.lane(i), lanes, i), before)
-        seek(chain, 0.0, gravity, lanes, live)
+        seek(chain, gravity, lanes, live)
     elif isinstance(met, Strided):
         _stride(chain, gravity, lanes, live)
-    elif met is not None and not isinstance(met, Marched) and not _is_closed(gravity, chain):
+    elif met.walls and not isinstance(met, Marched) and not _is_closed(gravity, chain):
         _go_by_steps(chain, gravity, lanes, live)
 
 
 def _first_hit(met, chain, gravity, lane, lanes, i):
     """The first hit of a lane with the walls that the method lands on."""
-    if met is None:
+    if met is None or not met.walls:
         return flights.NEVER
-    if isinstance(met, Field):
+    if _has_fields(met):
         return hit_of_lane(lanes, i)
     if isinstance(met, Strided):
         return strides.end(lanes.course, i)
     if isinstance(met, Marched):
         return safe.first_hit(chain, gravity, lane.r, lane.v, lane.left)
     if _is_closed(gravity, chain):
-        return flights.first_hit(at(chain, lane.left), gravity, lane.r, lane.v)
-    return flights.end(at(chain, lane.left), lanes.course, 0, i)
+        return flights.first_hit(chain.at(lane.left), gravity, lane.r, lane.v)
+    return flights.end(chain.at(lane.left), lanes.course, 0, i)
+
+
+def _has_fields(met):
+    """Whether walls at rest are bodies of a field."""
+    return len(met.fields()) > 0 and not isinstance(met, Carried)
 
 
 def _is_closed(gravity, chain):
-    """Whether the first hit has a closed form: flights are straight, and walls that move, or none is met by steps."""
-    return gravity is None and (isinstance(chain, Carried) or flights.in_steps(chain) is None)
+    """Whether the first hit has a closed form: flights are straight, and no wall is met by steps."""
+    return gravity is None and chain.in_steps() is None
 
 
 def _stride(chain, gravity, lanes, live):
@@ -82,7 +88,7 @@ def _go_by_steps(chain, gravity, lanes, live):
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        flights.begin(at(chain, lane.left), gravity, course, 0, i, lane.r, lane.v)
+        flights.begin(chain.at(lane.left), gravity, course, 0, i, lane.r, lane.v)
     for _step in range(SAFE_STEPS):
         for i in range(index(live)):
             _step_on(chain, gravity, lanes, i)
@@ -100,13 +106,13 @@ def _go_by_steps(chain, gravity, lanes, live):
 def _step_on(chain, gravity, lanes, i):
     """One safe step of a lane."""
     lane = lanes.lane(i)
-    flights.step(at(chain, lane.left), gravity, lanes.course, 0, i, lane.r, lane.v)
+    flights.step(chain.at(lane.left), gravity, lanes.course, 0, i, lane.r, lane.v)
 
 
 def _needs_more(chain, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
     left = lanes.lane(i).left
-    hit = flights.end(at(chain, left), lanes.course, 0, i)
+    hit = flights.end(chain.at(left), lanes.course, 0, i)
     return (hit.wall < 0.0) & (hit.time < left)
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.jit import copy_row, index, scratch, select
+from ..kernel.arrays import copy_row, index, scratch
+from ..kernel.jit import select
 from ..kernel.record import Record
 from ..surfaces.fields.members import gathered, width
-from ..surfaces.fold import Field, count, each
 from ..surfaces.moving import Carried
+from ..surfaces.walls import Field, Walls
 from .table import STRIDE
 
 
@@ -32,31 +33,31 @@ class Picked(Record):
 
 
 def _fields(chain):
-    """The fields of a chain. Of walls that move each contact looks at all."""
-    return () if isinstance(chain, Carried) else tuple(link for link in each(chain) if isinstance(link, Field))
+    """The fields of a scene, with their numbers. Of walls that move each contact looks at all."""
+    return () if isinstance(chain, Carried) else chain.fields()
 
 
 def picks(chain):
-    """Room for the numbers of a body in each lane, of every field of a chain."""
-    return tuple(scratch((STRIDE, width(link.first.like)), np.float64) for link in _fields(chain))
+    """Room for the numbers of a body in each lane, of every field."""
+    return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(chain))
 
 
 def pick(chain, lanes, picked, live):
     """The numbers of the body that each lane has met; of any where it has met none of this field."""
-    before = 0.0
-    for link, rows in zip(_fields(chain), picked, strict=True):
-        members = link.first
-        last = count(members) - 1.0
+    for (before, field), rows in zip(_fields(chain), picked, strict=True):
+        members, last = field.members, field.count() - 1.0
         for i in range(index(live)):
             wall = lanes.wall[i] - before
             m = index(int(select(wall < 0.0, 0.0, select(wall > last, last, wall))))
             copy_row(rows, i, members.table, m, width(members.like))
-        before = before + count(members)
 
 
 def of_lane(chain, picked, i):
     """The walls of a scene for the contact of one lane."""
     if not picked:
         return chain
-    body = gathered(chain.first.like, picked[0], i, 0)
-    return Field(Picked(body, count(chain.first)), of_lane(chain.rest, picked[1:], i))
+    fields = (
+        Field(Picked(gathered(field.members.like, rows, i, 0), field.count()))
+        for (_number, field), rows in zip(_fields(chain), picked, strict=True)
+    )
+    return Walls((*fields, *chain.others().walls))

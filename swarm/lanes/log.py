@@ -7,13 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contact import laws as wall_laws
 from ..contact.reflection import relative, wall_velocity
-from ..kernel.jit import Array, index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from .arrays import Place
 from .table import LANES, Lane, Rows
 
@@ -110,9 +108,9 @@ class Log(NamedTuple):
         """How fast a particle slips along the wall that it strikes, where the log has that."""
         if self.slip is None:
             return ZERO
-        now = at(chain, struck.left)
-        u = wall_velocity(wall_laws.moving(method.laws), now, struck.wall, struck.r)
-        n, before = walls.unit_normal(now, struck.wall, struck.r), relative(u, struck.before)
+        now = chain.at(struck.left)
+        u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
+        n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
         return before - dot(before, n) * n
 
     def _add(self, state, particle, struck, slip):

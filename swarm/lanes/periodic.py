@@ -3,11 +3,10 @@
 import numpy as np
 
 from ..contact.events import ARRIVED, EDGE, FLYING, HELD
-from ..kernel.jit import index, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..kernel.vector import column, dot, put
-from ..surfaces import fold as walls
 from ..surfaces.axes import length_of
-from ..surfaces.moving import at
 from ..surfaces.period import has_left, into, keeps_walls
 from .sliding import AGAIN
 from .table import marked_lanes
@@ -61,7 +60,7 @@ def return_sliding(period, chain, state, lanes, i, phase):
     if phase == ARRIVED or not has_left(period, r):
         return phase
     back, slides = into(period, r), phase in (HELD, EDGE, AGAIN)
-    if not slides or not _are_there(period, at(chain, lane.left), lane.first, lane.second, r, back.r):
+    if not slides or not _are_there(period, chain.at(lane.left), lane.first, lane.second, r, back.r):
         return FLYING
     lane.r = back.r
     lane.twice = _come_through(period, state, p, back.images, lane.twice)
@@ -79,7 +78,7 @@ def return_particle(period, chain, state, p):
     _come_through(period, state, p, back.images, 0.0)
     first, second = contacts.walls[0, p], contacts.walls[1, p]
     holds = contacts.phase[p] == HELD or contacts.phase[p] == EDGE
-    if holds and not _are_there(period, at(chain, contacts.left[p]), first, second, r, back.r):
+    if holds and not _are_there(period, chain.at(contacts.left[p]), first, second, r, back.r):
         contacts.phase[p], contacts.step[p] = FLYING, 0.0
         contacts.walls[0, p], contacts.walls[1, p] = -1.0, -1.0
 
@@ -93,5 +92,5 @@ def _are_there(period, chain, first, second, r, back):
 
 @outlined
 def _is_there(chain, wall, r, back, near):
-    same = dot(walls.unit_normal(chain, wall, r), walls.unit_normal(chain, wall, back)) > 0.5
-    return same and abs(walls.distance(chain, wall, back) - walls.distance(chain, wall, r)) <= near
+    same = dot(chain.unit_normal(wall, r), chain.unit_normal(wall, back)) > 0.5
+    return same and abs(chain.distance(wall, back) - chain.distance(wall, r)) <= near

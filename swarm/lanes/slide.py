@@ -10,10 +10,10 @@ import numpy as np
 from ..contact import events, hold
 from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
-from ..kernel.jit import index, long_kernel, outlined
+from ..kernel.arrays import index
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
-from ..surfaces.moving import at
 from .arrays import Place, speed2_scale
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
@@ -114,7 +114,7 @@ def _load(slide, share, i, p):
     lane.first, lane.second = contacts.walls[0, p], contacts.walls[1, p]
     lane.keep, lane.twice, lane.scale2 = contacts.keep[p], 2.0 * state.energy[p], speed2_scale(state, p)
     if begins:
-        held, now = slide.held(lane), at(slide.chain, left)
+        held, now = slide.held(lane), slide.chain.at(left)
         # Frames show the speed that is kept across the walls too.
         v = held.split_at(now, hold.drift(slide.moving(), held, now, r), r, v).along
     lane.r, lane.v = r, v
@@ -130,7 +130,7 @@ def _retire(slide, share, i, phase):
     """A lane back into its particle, for its next phase."""
     lanes, state, contacts = slide.lanes, slide.state, slide.state.contacts
     lane, p = lanes.lane(i), index(lanes.particle[i])
-    now = at(slide.chain, lane.left)
+    now = slide.chain.at(lane.left)
     if phase == AGAIN:
         phase = slide.phase()
     v, keep = lane.v, lane.keep

@@ -5,12 +5,10 @@ from typing import Any
 import numpy as np
 
 from ..contact import hold
-from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from ..surfaces import fold as walls
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
@@ -103,7 +101,7 @@ class Slide(Record):
 
     def moving(self):
         """The walls' numbers where some move, else None."""
-        return wall_laws.moving(self.method.laws)
+        return self.method.laws.moving
 
     def moves(self):
         """Whether a wall moves: a constant for the compiler."""
@@ -137,7 +135,7 @@ class Slide(Record):
         self.state.contacts.sliding[lanes.particle[i]] += lane.h
         self.push(i, lane.impulse, lane.impulse_second)
         lane.trials = 0.0
-        if self.method.friction is not None:
+        if self.method.laws.friction is not None:
             self.lose(i, lane.work)
         if self.moves():
             self.work(i, lanes.gained[i], lane.given_by_second)
@@ -145,18 +143,18 @@ class Slide(Record):
     def push(self, i, first, second):
         """Impulses per mass to the walls that hold a lane."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
-        state.impulse[walls.row(self.chain, lane.first), p] += first * state.mass[p]
+        state.impulse[self.chain.row(lane.first), p] += first * state.mass[p]
         if lane.second >= 0.0:
-            state.impulse[walls.row(self.chain, lane.second), p] += second * state.mass[p]
+            state.impulse[self.chain.row(lane.second), p] += second * state.mass[p]
 
     def work(self, i, twice, second):
         """Book twice the work per mass of walls that move, and of it that of the second wall."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
         behind = state.impulse.shape[0] // 2
         state.energy[p] = 0.5 * lane.twice
-        state.impulse[behind + walls.row(self.chain, lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+        state.impulse[behind + self.chain.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
         if lane.second >= 0.0:
-            state.impulse[behind + walls.row(self.chain, lane.second), p] += 0.5 * second * state.mass[p]
+            state.impulse[behind + self.chain.row(lane.second), p] += 0.5 * second * state.mass[p]
 
     def lose(self, i, twice):
         """Book twice the energy per mass that a lane has lost; its row knows what is left."""

@@ -10,8 +10,6 @@ from ..contact.passing import part_until_open
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from ..surfaces.period import part_until
 from .escape import is_at_opening
 from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
@@ -31,7 +29,7 @@ def set_going(slide, i):
     """The forces on a lane at the start of its next step; its phase then, which may be to rest."""
     chain, lanes, lane = slide.chain, slide.lanes, slide.lanes.lane(i)
     r, v, left = lane.r, lane.v, lane.left
-    now = at(chain, left)
+    now = chain.at(left)
     if lanes.openings is not None and is_at_opening(slide, now, i):
         return EVENT
     force = slide.force(lane, now, r, v)
@@ -43,9 +41,9 @@ def set_going(slide, i):
     if square(v) == 0.0 and events.rests(slide.gravity, force):
         p, contacts = lanes.particle[i], slide.state.contacts
         contacts.sliding[p] += left
-        contacts.phase[p], contacts.load[walls.row(chain, lane.first), p] = ARRIVED, force.n
+        contacts.phase[p], contacts.load[chain.row(lane.first), p] = ARRIVED, force.n
         if lane.second >= 0.0:
-            contacts.load[walls.row(chain, lane.second), p] = force.m
+            contacts.load[chain.row(lane.second), p] = force.m
         slide.push(i, force.n * left, force.m * left)
         lane.left = 0.0
         return ARRIVED
@@ -80,12 +78,12 @@ def decide(slide, i):
         # At once, or so soon that the time left does not change.
         if lane.left - met.time * h == lane.left:
             slide.state.contacts.met[lanes.particle[i]] = met.wall
-            lane.r = walls.settle(at(chain, lane.left), met.wall, r)
+            lane.r = chain.at(lane.left).settle(met.wall, r)
             return EVENT
         cut = min(cut, met.time)
     if event & (LEAVES | PASSES):
         cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
-        cut = min(cut, part_until_open(lanes.openings, method, at(chain, lane.left), held, path, near))
+        cut = min(cut, part_until_open(lanes.openings, method, chain.at(lane.left), held, path, near))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(slide, i)
@@ -98,7 +96,7 @@ def _stop(slide, i):
     """Friction has stopped a lane."""
     lane, r, u, given = slide.lanes.lane(i), slide.lanes.lane(i).r, ZERO, 0.0
     if slide.moves():
-        u = walls.velocity(at(slide.chain, lane.left), lane.first, r)
+        u = slide.chain.at(lane.left).velocity(lane.first, r)
         lost, twice = square(lane.v - u) + lane.keep * lane.keep, square(u) + 2.0 * potential(slide.gravity, r)
         given = twice - lane.twice + lost
         lane.twice = twice
@@ -136,7 +134,7 @@ def _shorten(slide, i):
     if h > SHORTEST * slide.method.size / math.sqrt(lane.scale2):
         return slide.phase()
     end = lane.r + h * lane.v
-    if walls.outside(at(slide.chain, lane.left - h), -1.0, end) or not h > 0.0:
+    if slide.chain.at(lane.left - h).outside(-1.0, end) or not h > 0.0:
         return _give_up(slide, i)
     lane.r = end
     lane.left -= h

@@ -5,15 +5,12 @@ import math
 import numpy as np
 
 from ..contact import crossing, hold
-from ..contact import laws as wall_laws
 from ..contact import sliding as slides
 from ..contact.passing import may_pass
 from ..contact.reflection import relative, wall_velocity
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at, during
 from ..surfaces.period import is_beyond
 from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
 
@@ -26,7 +23,7 @@ SLOWEST = 1e-24
 def compose(slide, live):
     """One composed step of every live lane, from its r, v and a to its r1 and v1."""
     chain, gravity, lanes = slide.chain, slide.gravity, slide.lanes
-    friction, moving = slide.method.friction, slide.moving()
+    friction, moving = slide.method.laws.friction, slide.moving()
     rubs = friction is not None
     for i in range(live):
         _start(slide, i)
@@ -34,7 +31,7 @@ def compose(slide, live):
         for i in range(live):
             lane = lanes.lane(i)
             r, v, h = lane.r1, lane.v1, slides.part(k) * lane.h
-            now = at(chain, lane.left - slides.before(k) * lane.h)
+            now = chain.at(lane.left - slides.before(k) * lane.h)
             last = lane.change
             change = last + slides.lead(k) * (last - lane.before)
             lane.before = last
@@ -42,7 +39,7 @@ def compose(slide, live):
             if rubs:
                 u = wall_velocity(moving, now, lane.first, r)
                 # The drive of a particle that is at rest on its first wall
-                drive = last - lane.h * walls.acceleration(now, lane.first, r) if slide.moves() else last
+                drive = last - lane.h * now.acceleration(lane.first, r) if slide.moves() else last
                 toward = slides.direction(friction, relative(u, v), drive)
                 slowed = slides.slow(friction, slide.held(lane), now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
@@ -60,13 +57,13 @@ def compose(slide, live):
             lane = lanes.lane(i)
             h, w, v0, r0, held = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, slide.held(lane)
             left, after = _when(lane, k)
-            step, end = during(chain, left, after), lane.end
+            step, end = chain.during(left, after), lane.end
             # The last sweep
             drift = hold.mean_drift(moving, held, step, r0, end, h)
             taken = held.split(step, drift, r0, end, w)
             r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
             if rubs:
-                now = at(chain, after)
+                now = chain.at(after)
                 u = wall_velocity(moving, now, lane.first, r)
                 slowed = slides.slow(friction, held, now, gravity, r, (v1, lane.toward, u), 0.5 * h)
                 v1 = slowed.v
@@ -99,10 +96,10 @@ def _start(slide, i):
 
 def _longest(slide, lane):
     """A time within which a lane that slides with friction surely does not stop on its first wall."""
-    now, r, v, a = at(slide.chain, lane.left), lane.r, lane.v, lane.a
+    now, r, v, a = slide.chain.at(lane.left), lane.r, lane.v, lane.a
     if slide.moves():
-        v, a = v - walls.velocity(now, lane.first, r), a - walls.acceleration(now, lane.first, r)
-    return slides.longest(slide.method.friction, v, a)
+        v, a = v - now.velocity(lane.first, r), a - now.acceleration(lane.first, r)
+    return slides.longest(slide.method.laws.friction, v, a)
 
 
 def _when(lane, k):
@@ -114,7 +111,7 @@ def _when(lane, k):
 def _sweep_lane(slide, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
     lane, unsolved = slide.lanes.lane(i), slide.lanes.unsolved
-    end, step, h = lane.end, during(slide.chain, *_when(lane, k)), slides.part(k) * lane.h
+    end, step, h = lane.end, slide.chain.during(*_when(lane, k)), slides.part(k) * lane.h
     swept = slides.sweep(slide.moving(), slide.held(lane), step, h, (lane.r1, end, lane.w), lane.still)
     on = unsolved[i]
     lane.end = either(on, swept.r, end)
@@ -135,7 +132,7 @@ def end_steps(slide, live):
 def _end_step(slide, i):
     method, chain, gravity, lanes, lane = slide.method, slide.chain, slide.gravity, slide.lanes, slide.lanes.lane(i)
     moving, held = slide.moving(), slide.held(lane)
-    start, now = at(chain, lane.left), at(chain, lane.left - lane.h)
+    start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
     r1 = held.settle(now, lane.r1)
@@ -170,7 +167,7 @@ def _end_step(slide, i):
     lane.r, lane.v, lane.a = either(fine, r1, r0), either(fine, v1, v0), either(fine, force.acceleration, a0)
     lane.press = select(fine, force.n, lane.press)
     lane.press_second = select(fine, force.m, lane.press_second)
-    if wall_laws.friction(method.laws) is not None:
+    if method.laws.friction is not None:
         slip = relative(wall_velocity(moving, now, lane.first, r1), v1)
         lanes.event[i] |= select(fine & (square(slip) <= SLOWEST * scale2), STOPPED, 0)
     # Near an apex steps become shorter without end, in time or, of a slow particle, in length.

@@ -8,7 +8,8 @@ import numpy as np
 from ..contact.impulse import LoopRecord
 from ..contact.reflection import Turned
 from ..contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
-from ..kernel.jit import kept, outlined, select
+from ..kernel.arrays import kept
+from ..kernel.jit import outlined, select
 from ..kernel.vector import column, put
 from ..methods import contract as methods
 

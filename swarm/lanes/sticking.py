@@ -4,15 +4,12 @@ Until then another wall may come, and strike it.
 """
 
 from ..contact import crossing, hold
-from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, EVENT
 from ..contact.projection import ALLOWED
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, norm, square
-from ..surfaces import fold as walls
-from ..surfaces.moving import at, during
 from .sliding import AGAIN
 from .sliding_step import SLOWEST
 
@@ -37,12 +34,12 @@ def stay(slide, i):
     """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
     chain, lanes, contacts, lane = slide.chain, slide.lanes, slide.state.contacts, slide.lanes.lane(i)
     left, first = lane.left, lane.first
-    now = at(chain, left)
-    u, slowest = walls.velocity(now, first, lane.r), SLOWEST * lane.scale2
+    now = chain.at(left)
+    u, slowest = now.velocity(first, lane.r), SLOWEST * lane.scale2
     moves_on = square(lane.v - u) > slowest or _rubs(slide, now, lane, slowest)
     if moves_on or not _rests(slide, now, lane, lane.r):
         return slide.phase()
-    pace, low, high, met, paces = walls.shortest_pace(now), 0.0, 0.0, -1.0, 0.0
+    pace, low, high, met, paces = now.shortest_pace(), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
@@ -73,8 +70,8 @@ def stay(slide, i):
         pressed += 0.5 * (one.n + two.n) * (end - start)
         pressed_second += 0.5 * (one.m + two.m) * (end - start)
     after = left - end
-    r1, then = _carried(chain, lane, end), at(chain, after)
-    v1 = walls.velocity(then, first, r1)
+    r1, then = _carried(chain, lane, end), chain.at(after)
+    v1 = then.velocity(first, r1)
     twice = square(v1) + 2.0 * potential(slide.gravity, r1)
     given = twice - lane.twice
     lane.r, lane.v, lane.left, lane.twice, lane.keep = r1, v1, after, twice, 0.0
@@ -85,7 +82,7 @@ def stay(slide, i):
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
         contacts.met[lanes.particle[i]] = met
-        lane.r = walls.settle(then, met, r1)
+        lane.r = then.settle(met, r1)
         return EVENT
     force = slide.force(lane, then, r1, v1)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
@@ -96,8 +93,8 @@ def _rubs(slide, now, lane, slowest):
     """Whether the second wall has friction and slips on a lane that moves with the first one."""
     if not isinstance(slide.kind, hold.Two):
         return False
-    slip = lane.v - walls.velocity(now, lane.second, lane.r)
-    friction = wall_laws.of_wall(wall_laws.friction(slide.method.laws), lane.second)
+    slip = lane.v - now.velocity(lane.second, lane.r)
+    friction = slide.method.laws.friction_of(lane.second)
     return friction > 0.0 and square(slip) > slowest
 
 
@@ -108,7 +105,7 @@ def _clear(slide, lane, low, high):
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
-        start, then, path = at(chain, left - time), at(chain, left - end), _way(chain, lane, time, end)
+        start, then, path = chain.at(left - time), chain.at(left - end), _way(chain, lane, time, end)
         if not crossing.meets(start, then, held, path, near):
             if end == high:
                 return Clear(high, -1.0)
@@ -126,22 +123,22 @@ def _clear(slide, lane, low, high):
 @outlined
 def _carried(chain, lane, t):
     """Where a lane that moves with its first wall is after a time."""
-    return walls.carry(during(chain, lane.left, lane.left - t), lane.first, lane.r)
+    return chain.during(lane.left, lane.left - t).carry(lane.first, lane.r)
 
 
 @outlined
 def _way(chain, lane, start, end):
     """The way of a lane that moves with its first wall, from one time to another."""
     r0, r1 = _carried(chain, lane, start), _carried(chain, lane, end)
-    v0 = walls.velocity(at(chain, lane.left - start), lane.first, r0)
-    v1 = walls.velocity(at(chain, lane.left - end), lane.first, r1)
+    v0 = chain.at(lane.left - start).velocity(lane.first, r0)
+    v1 = chain.at(lane.left - end).velocity(lane.first, r1)
     return crossing.Path(r0, v0, r1, v1, end - start)
 
 
 @outlined
 def _rests(slide, now, lane, r):
     """Whether a lane that moves with its first wall goes on to do so from here."""
-    force, acceleration = _force_at_rest(slide, now, lane, r), walls.acceleration(now, lane.first, r)
+    force, acceleration = _force_at_rest(slide, now, lane, r), now.acceleration(lane.first, r)
     pull = norm(accelerated(slide.gravity, ZERO, 1.0)) + norm(acceleration)
     pressed = not slide.kind.lets_go(force.n, force.m)
     return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
@@ -150,12 +147,12 @@ def _rests(slide, now, lane, r):
 @outlined
 def _force_at_rest(slide, now, lane, r):
     """The force on a lane at r that moves with its first wall."""
-    return slide.force(lane, now, r, walls.velocity(now, lane.first, r))
+    return slide.force(lane, now, r, now.velocity(lane.first, r))
 
 
 def _rests_later(slide, lane, t):
-    return _rests(slide, at(slide.chain, lane.left - t), lane, _carried(slide.chain, lane, t))
+    return _rests(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))
 
 
 def _press_later(slide, lane, t):
-    return _force_at_rest(slide, at(slide.chain, lane.left - t), lane, _carried(slide.chain, lane, t))
+    return _force_at_rest(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel.jit import Array, index, spaced
+from ..kernel.arrays import index, spaced
+from ..kernel.jit import Array
 from ..kernel.record import Record
 from ..kernel.vector import column, put
 

@@ -1,9 +1,9 @@
 """The methods by their kind in a scene file.
 
-To add one, write a file here with a dataclass derived from `Method`, for users, and a record of its numbers, for
-kernels. For the type of the numbers register, with contract.py, which describes all functions: what a lane keeps
-(`constants`, `own`), the way to the next contact (`land` or `flight`), `contact` in lanes, and `hard_pass`, which may
-branch and loop. Then name the class in ALL_METHODS below. examples/own_method.py is a complete method.
+To add one, write a file here with a dataclass derived from `Method`, for users, and a record derived from
+`MethodNumbers` of contract.py, for kernels: what a lane keeps (`constants`, `own`), the way to the next contact (`land`
+or `flight`), and `contact` in lanes; what needs branches and loops is `hard_pass`. Then name the class in ALL_METHODS
+below. examples/own_method.py is a complete method.
 """
 
 from .augmented_lagrangian import AugmentedLagrangian

@@ -7,7 +7,6 @@ from .. import checks
 from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.reflection import CHORD_NEEDS
-from ..contact.regularisation import regularisation
 from ..contact.touching import NEEDS as SLIDING_NEEDS
 from ..errors import SceneError
 from ..particles import Particles
@@ -19,7 +18,7 @@ _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uza
 
 
 @dataclass(frozen=True)
-class AugmentedLagrangian(base.Method):
+class AugmentedLagrangian(fixed_step.SoftWalls):
     """Rigid walls by the paper's nested loops: the step (7) with multipliers, and Uzawa's update (8) of them.
 
     (v0 + v1)/2 = (r1 - r0)/h,   m (v1 - v0) = h m G - h D (alpha (Phi0 + Phi1)/2 + lambda),
@@ -72,9 +71,6 @@ class AugmentedLagrangian(base.Method):
     swarm.errors.SceneError: gradient must be "composite" for exponent = 1, got "mean-value"
     """
 
-    dt: float
-    penalty: float
-    exponent: float = 1.0
     tolerance: float = 1e-10
     max_sweeps: int = 50
     gradient: str = "composite"
@@ -83,7 +79,8 @@ class AugmentedLagrangian(base.Method):
     on_unconverged: str = "raise"
 
     def __post_init__(self) -> None:
-        fixed_step.check_arguments(self)
+        super().__post_init__()
+        fixed_step.check_gradient(self)
         object.__setattr__(self, "tolerance", checks.positive("tolerance", self.tolerance))
         object.__setattr__(self, "max_sweeps", checks.count("max_sweeps", self.max_sweeps))
         object.__setattr__(self, "adaptive", checks.flag("adaptive", self.adaptive))
@@ -119,7 +116,7 @@ class AugmentedLagrangian(base.Method):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         # The reaction, the chord that starts the loop, and the exact impacts that may replace a contact
         contact = *reaction_needs(self.gradient), "gap_scale", *CHORD_NEEDS, *SLIDING_NEEDS
-        return *fixed_step.of_steps(scene), *contact
+        return *super().needs(scene), *contact
 
     def numbers(self, scene: Scene) -> steps.Numbers:
         kind = steps.CutSteps if self.adaptive else steps.FixedSteps
@@ -136,20 +133,17 @@ class AugmentedLagrangian(base.Method):
             fixed_step.moves(scene),
         )
 
-    def too_fast(self, scene: Scene) -> str:
-        return fixed_step.too_fast_failure(scene, self.dt)
-
     def time_of_impact(self) -> float | None:
         return self.dt if self.adaptive else None
 
     def span(self, name: str, duration: float) -> float:
-        return duration if self.adaptive else fixed_step.whole_steps(name, duration, self.dt)
+        return duration if self.adaptive else super().span(name, duration)
 
     def instant(self, moment: float) -> float:
-        return moment if self.adaptive else fixed_step.whole_time(moment, self.dt)
+        return moment if self.adaptive else super().instant(moment)
 
-    def law(self) -> Any:
-        return regularisation(self.penalty, self.exponent)
+    def seldom_hard(self, scene: Scene) -> bool:
+        return False
 
     def has_multipliers(self) -> bool:
         return True

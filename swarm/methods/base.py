@@ -1,4 +1,4 @@
-"""What a method is for a user: a description, checked. The functions of its numbers are in contract.py."""
+"""The description of a method for users, checked. Methods as kernels take them are in contract.py."""
 
 import math
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ class Method:
         return ()
 
     def numbers(self, scene: Scene) -> Any:
-        """The NamedTuple of numbers that kernels take in place of this description."""
+        """The record of numbers that kernels take in place of this description."""
         raise NotImplementedError
 
     def time_of_impact(self) -> float | None:
-        """How long an impact takes besides the flight to it [s]; None where a frame costs steps, not impacts."""
+        """The duration of an impact besides the flight to it [s]; None where a frame costs steps, not impacts."""
         return None
 
     def span(self, name: str, duration: float) -> float:

@@ -1,6 +1,6 @@
 """The contract of a method: every function that the loops over lanes ask of one, required or derived.
 
-A method's numbers are a NamedTuple, by whose type these functions are chosen. A pass is a free flight followed by at
+A method is a record for kernels, derived from `MethodNumbers`. A pass is a free flight followed by at
 most one contact. Its parts are scalar, branch-free functions of one lane, and the lanes loop over each part separately:
 short loops keep more lanes in the processor's window than one long loop (measured on Zen 3: 7.8 instead of 10.3 ns an
 impact in an ellipsoid). What is rare and needs loops and branches is left to `hard_pass`.
@@ -8,21 +8,21 @@ impact in an ellipsoid). What is rare and needs loops and branches is left to `h
 Required are
     constants and own       what a lane keeps of its particle for the whole frame,
     land or flight          the way to the next contact: from the first hit, which is found before, or by itself,
-    contact                 the contact in lanes,
-    hard_pass               what `flight` or `contact` leave to it.
-A contact with an unknown registers `guess`, `improve` and `most_sweeps` too, one that is too long for a loop `turn`,
-and one with a multiplier the three functions of Uzawa's loop. examples/own_method.py is a complete method.
+    contact                 the contact in lanes.
+A method whose `flight` or `contact` leaves contacts to it has `hard_pass` too, one whose contact has an unknown
+`guess`, `improve` and `most_sweeps`, one that is too long for a loop `turn`, and one with a multiplier the three
+functions of Uzawa's loop. examples/own_method.py is a complete method.
 """
 
 from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
+from ..contact.laws import NONE
 from ..contact.reflection import Turned
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
+from ..kernel.vector import ZERO, Vec
+from ..status import Status
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0
@@ -49,7 +49,7 @@ class Flight(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """What is known of a contact: its unknown, whether it is unsolved, and the velocity where the method has `turn`."""
+    """The solve of a contact: its unknown, whether it is unsolved, and the velocity where the method has `turn`."""
 
     kappa: float
     unsolved: bool
@@ -67,7 +67,7 @@ class Sweep(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """What a contact makes of a lane: the normal impulse per mass that the wall gave, and new impacts.
+    """The result of a contact of a lane, with the normal impulse per mass that the wall gave, and new impacts.
 
     Where contacts change the energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
     particles on walls, `lasts` says that another kernel decides what follows, at this wall. Where walls move, `work` is
@@ -85,9 +85,9 @@ class Contact(NamedTuple):
     work: Any = 0.0
 
 
-def work_along(moving, chain, wall, force):
-    """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-    return 0.0 if moving is None else dot(force, walls.way(chain, wall))
+def refused(lane, status):
+    """A contact that is not taken, for this reason: a result of `hard_pass`."""
+    return Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status
 
 
 class MethodNumbers(Record):
@@ -127,18 +127,8 @@ class MethodNumbers(Record):
 
     @property
     def laws(self):
-        """The laws of its walls, or None."""
-        return None
-
-    @property
-    def friction(self):
-        """Their friction, or None."""
-        return None
-
-    @property
-    def thermal(self):
-        """Their temperatures, or None."""
-        return None
+        """The `Laws` of its walls."""
+        return NONE
 
     @property
     def sliding_tolerance(self):
@@ -150,7 +140,7 @@ class MethodNumbers(Record):
 
         A method of steps takes all there are, to ask them over its step.
         """
-        return at(chain, left)
+        return chain.at(left)
 
     # --- Flight ---
 
@@ -191,7 +181,7 @@ class MethodNumbers(Record):
         return self if self.gives("guess") else None
 
     def turn(self, chain, gravity, lane, wall, kappa):
-        """How the contact has `Turned` the velocity, for `contact`, where one loop of both would be too long."""
+        """The `Turned` velocity, for `contact`, where one loop of both would be too long."""
         return NOT_TURNED
 
     @property
@@ -226,8 +216,8 @@ class MethodNumbers(Record):
 
     @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
-        """What `flight` or `contact` left, as the `Contact` that it is, and its status.
+        """The `Contact` that `flight` or `contact` left to this function, and its status.
 
         Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
         """
-        raise NotImplementedError
+        return refused(lane, Status.STALLED.value)

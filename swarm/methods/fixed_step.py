@@ -1,4 +1,4 @@
-"""What methods with a fixed step share: whole steps, the jump over free ones, solids that a step could miss."""
+"""The common part of methods with a fixed step: whole steps, the jump over free ones, solids that a step could miss."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,16 +10,15 @@ from ..contact.discrete_gradient import MeanValue
 from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
+from ..kernel.arrays import kept
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, outlined, select
-from ..kernel.vector import Vec, square
+from ..kernel.jit import outlined, select
+from ..kernel.vector import Vec, dot, square
 from ..particles import Particles
 from ..scene import Scene
 from ..status import Status
 from ..surfaces import flights, safe
-from ..surfaces import fold as walls
 from ..surfaces.drive import drive_of
-from ..surfaces.moving import at, during
 from ..surfaces.surface import Surface
 from . import base, contract
 
@@ -39,18 +38,22 @@ class SoftWalls(base.Method):
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        check_numbers(self)
+        object.__setattr__(self, "dt", checks.positive("dt", self.dt))
+        object.__setattr__(self, "penalty", checks.positive("penalty", self.penalty))
+        object.__setattr__(self, "exponent", checks.at_least("exponent", self.exponent, 1.0))
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_laws(type(self).__name__, scene)
         base.check_motions(type(self).__name__, scene)
         check_solids(scene, particles, self.dt)
 
-    def seldom_hard(self, scene: Scene) -> bool:
-        return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid()
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        asked: tuple[Any, ...] = flights.of_steps(scene.gravity is not None)
+        return asked
 
-    def too_fast(self, scene: Scene) -> str:
-        return too_fast_failure(scene, self.dt)
+    def record(self, kind: type["Numbers"], scene: Scene, factor: float, form: Any = None) -> "Numbers":
+        """The numbers of this description, of a kind that divides such a factor by the mass."""
+        return kind(self.dt, self.law(), longest_step(scene, self.dt), factor, form, moves(scene))
 
     def span(self, name: str, duration: float) -> float:
         return whole_steps(name, duration, self.dt)
@@ -58,20 +61,19 @@ class SoftWalls(base.Method):
     def instant(self, moment: float) -> float:
         return whole_time(moment, self.dt)
 
+    def seldom_hard(self, scene: Scene) -> bool:
+        return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid()
+
     def law(self) -> Any:
         return regularisation(self.penalty, self.exponent)
 
-
-def check_numbers(method: Any) -> None:
-    """Check and convert dt, penalty and exponent of a description."""
-    object.__setattr__(method, "dt", checks.positive("dt", method.dt))
-    object.__setattr__(method, "penalty", checks.positive("penalty", method.penalty))
-    object.__setattr__(method, "exponent", checks.at_least("exponent", method.exponent, 1.0))
+    def too_fast(self, scene: Scene) -> str:
+        thin = _described(scene, _thinnest(scene, self.dt)[1])
+        return f"with dt = {self.dt:g} s and {thin}; use a smaller dt, or Impact"
 
 
-def check_arguments(method: Any) -> None:
-    """The same, and check its gradient."""
-    check_numbers(method)
+def check_gradient(method: Any) -> None:
+    """Raise a `SceneError` if a method of this exponent has no such gradient."""
     checks.one_of("gradient", method.gradient, GRADIENTS)
     if method.gradient == "mean-value" and method.exponent == 1.0:
         raise SceneError(
@@ -100,7 +102,7 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
 
 
 def longest_step(scene: Scene, dt: float) -> float | None:
-    """How far a particle may fly in a step so that no solid is jumped over [m]; None where there is no solid."""
+    """The longest flight in a step that jumps over no solid [m]; None where there is no solid."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
     thickness, i = _thinnest(scene, dt)
@@ -123,13 +125,8 @@ def _described(scene: Scene, i: int) -> str:
     return f"surfaces[{i}] ({type(scene.surfaces[i]).__name__}), {2.0 * scene.surfaces[i].size():.3g} m thick"
 
 
-def too_fast_failure(scene: Scene, dt: float) -> str:
-    """The end of the sentence about a step that was longer than a solid is thick."""
-    return f"with dt = {dt:g} s and {_described(scene, _thinnest(scene, dt)[1])}; use a smaller dt, or Impact"
-
-
 def whole_steps(name: str, duration: float, dt: float) -> float:
-    """How many steps a duration is; a `SceneError` that calls it `name` where they are not whole."""
+    """The number of steps of a duration; a `SceneError` that calls it `name` where they are not whole."""
     if duration / dt > _MOST_STEPS:
         raise SceneError(
             f"{name} must be at most {_MOST_STEPS:g} steps, got {name} = {duration:g} s with dt = {dt:g} s"
@@ -148,39 +145,21 @@ def whole_time(moment: float, dt: float) -> float:
     return round(moment / dt) * dt
 
 
-def of_steps(scene: Scene) -> tuple[Any, ...]:
-    """What whole steps ask of every wall."""
-    asked: tuple[Any, ...] = flights.of_steps(scene.gravity is not None)
-    return asked
+# --- As kernels know it ----------------------------------------------------------------------------------
 
 
-# --- As kernels know it -----------------------------------------------------------------------------------
+class Own(NamedTuple):
+    """The numbers that a lane keeps."""
+
+    twice_energy: float  # per mass, at the start, and with the work of walls since
+    over_mass: float  # the method's factor over the mass
+    unused: float
 
 
 class Steps(contract.MethodNumbers):
     """A method of steps, with the fields `dt`, `longest`, `factor` and `moving`: the walls of a step, and its ends."""
 
     point = 1.0  # the part of a step after which it takes its force
-
-    def before(self: Any, chain, left):
-        """The walls at the start of a step, with so many of the frame left."""
-        return at(chain, left * self.dt)
-
-    def over(self: Any, chain, left):
-        """The walls over that step."""
-        return during(chain, left * self.dt, (left - 1.0) * self.dt)
-
-    def after(self: Any, chain, left):
-        """The walls at the end of that step."""
-        return at(chain, (left - 1.0) * self.dt)
-
-    def reach(self: Any, before, gravity, lane):
-        """From r0 to the point whose force it takes, as if there were no wall."""
-        return displacement(gravity, lane.v, self.dt)
-
-    def is_too_fast(self: Any, p):
-        """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
-        return False if self.longest is None else square(p) > self.longest * self.longest
 
     def constants(self, mass, energy, scale2):
         return 2.0 * energy, self.factor / mass, 0.0
@@ -196,6 +175,30 @@ class Steps(contract.MethodNumbers):
         # Of all walls: each part of a step asks for those that it needs.
         return chain
 
+    def before(self: Any, chain, left):
+        """The walls at the start of a step, with so many of the frame left."""
+        return chain.at(left * self.dt)
+
+    def over(self: Any, chain, left):
+        """The walls over that step."""
+        return chain.during(left * self.dt, (left - 1.0) * self.dt)
+
+    def after(self: Any, chain, left):
+        """The walls at the end of that step."""
+        return chain.at((left - 1.0) * self.dt)
+
+    def reach(self: Any, before, gravity, lane):
+        """From r0 to the point whose force it takes, as if there were no wall."""
+        return displacement(gravity, lane.v, self.dt)
+
+    def is_too_fast(self: Any, p):
+        """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
+        return False if self.longest is None else square(p) > self.longest * self.longest
+
+    def work_along(self: Any, over, wall, force):
+        """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
+        return 0.0 if self.moving is None else dot(force, over.way(wall))
+
     def flight(self: Any, chain, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
         dt = self.dt
@@ -207,8 +210,8 @@ class Steps(contract.MethodNumbers):
             lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
             lane.own,
         )  # fmt: skip
-        to_point = during(chain, start.left * dt, (start.left - self.point) * dt)
-        touched = walls.touched(to_point, start.r, self.reach(self.before(chain, start.left), gravity, start))
+        to_point = chain.during(start.left * dt, (start.left - self.point) * dt)
+        touched = to_point.touched(start.r, self.reach(self.before(chain, start.left), gravity, start))
         # Several walls at once, or nested solves: the careful way.
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
@@ -233,20 +236,12 @@ class Numbers(Steps):
     @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
-            return refused(lane, Status.TOO_FAST.value)
+            return contract.refused(lane, Status.TOO_FAST.value)
         step = self.careful_step(chain, gravity, lane, lanes.impulse, i)
-        new = select(walls.outside(self.before(chain, lane.left), -1.0, lane.r), 0.0, 1.0)
+        new = select(self.before(chain, lane.left).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
         twice_energy = lane.own.twice_energy + 2.0 * step.work
         return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
-
-
-class Own(NamedTuple):
-    """The numbers that a lane keeps."""
-
-    twice_energy: float  # per mass, at the start, and with the work of walls since
-    over_mass: float  # the method's factor over the mass
-    unused: float
 
 
 # --- The contact -----------------------------------------------------------------------------------------
@@ -288,8 +283,3 @@ class Careful(NamedTuple):
     v: Vec
     solved: bool
     work: float
-
-
-def refused(lane, status):
-    """A hard step that is not taken, for this reason."""
-    return contract.Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status

@@ -4,25 +4,30 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .. import checks
-from ..contact import laws as wall_laws
 from ..contact import sliding, touching
-from ..contact.reflection import CHORD_NEEDS, exact
+from ..contact.laws import NONE, Laws
+from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact
 from ..errors import SceneError
-from ..kernel.jit import kept, select
+from ..kernel.arrays import kept
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
 from ..surfaces.surface import Surface
 from . import base, contract
-from .chord import Chord, Instants
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
 # Of what is slow, the impulse that is round-off of a particle at its wall: to count it would count by chance. Those of
 # particles that a wall lets go are 1e-16 to 1e-14 of the speed, what is slow 1e-4.
 _NO_IMPACT = 1e-8
+# A particle gets nowhere in this part of a crossing.
+_INSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -99,23 +104,22 @@ class Impact(base.Method):
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
         return *flights.of_flights(scene.gravity is not None), *sliding.NEEDS, *touching.NEEDS, *chord
 
+    def numbers(self, scene: Scene) -> "Reflection":
+        size = scene.finite_size()
+        length = base.SHORTEST * size if self.shortest_flight is None else 0.0
+        pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
+        kind = Chord if self.contact_step > 0.0 else Reflection
+        lasting = size, _bend(scene), pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance
+        return kind(*lasting, scene.laws() or NONE, self.contact_step or None)
+
     def time_of_impact(self) -> float:
         return self.contact_step
-
-    def knows_period(self) -> bool:
-        return self.contact_step == 0.0
 
     def is_rigid(self) -> bool:
         return True
 
-    def numbers(self, scene: Scene) -> "Reflection | Chord":
-        size = scene.finite_size()
-        length = base.SHORTEST * size if self.shortest_flight is None else 0.0
-        pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
-        given = Lasting(size, _bend(scene), pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance)
-        if self.contact_step > 0.0:
-            return Chord(*given, None, self.contact_step)
-        return Reflection(*given, scene.laws())
+    def knows_period(self) -> bool:
+        return self.contact_step == 0.0
 
     def may_slide(self) -> bool:
         return True
@@ -158,8 +162,18 @@ def _require_reacting(scene: Scene) -> None:
             )
 
 
-class Lasting(NamedTuple):
-    """What decides whether a contact lasts; one of the shortest flight's two numbers is 0."""
+# --- As kernels know it ----------------------------------------------------------------------------------
+
+
+class Own(NamedTuple):
+    """The energy of a lane, and twice the speed [m/s] away from a wall below which its contact may last."""
+
+    energy: Energy
+    slow: float
+
+
+class Reflection(contract.MethodNumbers):
+    """The method with the exact reflection. One of the shortest flight's two numbers is 0."""
 
     size: float  # of the scene [m]
     bend: float  # the least length on which walls bend [m], infinite where all are flat
@@ -167,30 +181,45 @@ class Lasting(NamedTuple):
     shortest_flight: float  # [s]
     shortest_length: float  # of a flight [m]
     sliding_tolerance: float  # a crossing
+    laws: Laws
+    contact_step: Any  # h of a chord [s], or None
 
+    # --- What a lane keeps ---
 
-class Reflection(Instants):
-    """What kernels know of the method with the exact reflection: `Lasting` and the laws of the walls."""
+    def constants(self, mass, energy, scale2):
+        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow:
+        # not by its velocity at the start of the frame, on whose ends no contact may depend
+        twice_energy = 2.0 * energy
+        moving = twice_energy > 0.0
+        half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
+        slow = (self.shortest_flight * scale2 + self.shortest_length * math.sqrt(scale2)) / self.size
+        return twice_energy, half_inverse, slow
 
-    size: float
-    bend: float
-    fall2: float
-    shortest_flight: float
-    shortest_length: float
-    sliding_tolerance: float
-    laws: Any  # None or `Laws`
+    def own(self, first, second, third):
+        return Own(Energy(first, second), third)
+
+    holds = True
+
+    def instant(self, v):
+        speed2 = square(v) + self.fall2
+        return _INSTANT * self.size / math.sqrt(select(speed2 > 0.0, speed2, np.inf))
 
     @property
     def dissipates(self):
-        return self.laws is not None
+        return self.laws.change_energy
 
-    @property
-    def friction(self):
-        return wall_laws.friction(self.laws)
+    # --- Flight ---
 
-    @property
-    def thermal(self):
-        return wall_laws.thermal(self.laws)
+    def land(self, chain, gravity, lane, hit):
+        t = select(hit.time < lane.left, hit.time, lane.left)
+        return contract.Flight(
+            lane.r + displacement(gravity, lane.v, t),
+            accelerated(gravity, lane.v, t),
+            lane.left - t,
+            select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
+        )
+
+    # --- Contact ---
 
     def contact(self, chain, gravity, lane, wall, solution):
         bounce = exact(self.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
@@ -202,24 +231,63 @@ class Reflection(Instants):
             lane.left,
             wall,
             impulse,
-            select(_is_within(self, lane, impulse, _NO_IMPACT), 0.0, 1.0),
+            select(self.is_within(lane, impulse, _NO_IMPACT), 0.0, 1.0),
             select(hit, bounce.twice_energy, lane.own.energy.twice),
-            hit & _is_within(self, lane, bounce.twice_away, 1.0),
+            hit & self.is_within(lane, bounce.twice_away, 1.0),
             select(hit, 0.5 * bounce.work, 0.0),
         )
 
+    def is_within(self, lane, speed, part):
+        """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last.
 
-# --- One pass --------------------------------------------------------------------------------------------
+        A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
+        """
+        if not self.laws.change_energy:
+            return speed <= part * lane.own.slow
+        # By the velocity with which it comes: such walls change that. One of both is 0.
+        speed2 = (square(lane.v) + self.fall2) / (self.size * self.size)
+        by_time, by_length = self.shortest_flight * self.size * speed2, self.shortest_length
+        return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
 
 
-# A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
+class Chord(Reflection):
+    """The method with a contact step, a chord of the surface; such scenes have no laws."""
 
+    def step(self, lane):
+        """The length of the contact step, which the end of the frame cuts."""
+        return select(self.contact_step < lane.left, self.contact_step, lane.left)
 
-def _is_within(method, lane, speed, part):
-    """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last."""
-    if method.laws is None:
-        return speed <= part * lane.own.slow
-    # By the velocity with which it comes: such walls change that. One of both is 0.
-    speed2 = (square(lane.v) + method.fall2) / (method.size * method.size)
-    by_time, by_length = method.shortest_flight * method.size * speed2, method.shortest_length
-    return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
+    # --- The unknown of a contact ---
+
+    def most_sweeps(self, chain):
+        return chain.chord_sweeps()
+
+    def guess(self, chain, gravity, lane, wall):
+        h = self.step(lane)
+        return chain.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
+
+    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+        p = displacement(gravity, lane.v, self.step(lane))
+        better, more = chord_step(chain, wall, lane.r, p, solution.kappa)
+        return select(solution.unsolved, better, solution.kappa), solution.unsolved & more, contract.NO_RECORD
+
+    def turn(self, chain, gravity, lane, wall, kappa):
+        return chord_turn(chain, gravity, wall, lane.r, lane.v, self.step(lane), kappa)
+
+    # --- Contact ---
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        h, turned = self.step(lane), solution.turned
+        r, v, stays = chord_end(chain, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
+        hit = wall >= 0.0
+        chord = hit & stays & (turned.impulse > lane.own.slow) & (not solution.unsolved)
+        return contract.Contact(
+            select(chord, r, kept(lane.r)),
+            select(chord, v, kept(lane.v)),
+            lane.left - select(chord, h, 0.0),
+            wall,
+            select(chord, turned.impulse, 0.0),
+            select(chord, 1.0, 0.0),
+            lane.own.energy.twice,
+            hit & (not chord),
+        )

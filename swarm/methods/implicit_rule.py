@@ -1,4 +1,4 @@
-"""What the implicit baselines share: the pass of a rule that takes the force at a point it has to find.
+"""The common part of the implicit baselines: the pass of a rule that takes the force at a point it has to find.
 
 A rule says where that point would be without walls (`reach`), and the step that follows from where it is (`end`).
 """
@@ -8,12 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import corner, implicit
-from ..contact.records import Step
-from ..kernel.jit import scratch, select
+from ..contact.impulse import Step
+from ..kernel.arrays import scratch
+from ..kernel.jit import select
 from ..kernel.vector import Vec, norm
-from ..scene import Scene
-from ..surfaces import fold as walls
-from ..surfaces.moving import at
 from . import contract, fixed_step
 
 
@@ -42,17 +40,7 @@ class RuleNumbers(fixed_step.Numbers):
 
     def there(self, chain, lane):
         """The walls when the particle is at the point."""
-        return at(chain, (lane.left - self.point) * self.dt)
-
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        """The step against all walls at once."""
-        before = self.before(chain, lane.left)
-        free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
-        reactions = scratch((walls.length(chain), 4), np.float64)
-        point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(chain, lane), free, reactions)
-        work = self.add_impulses(chain, lane, reactions, impulse, i)
-        step = self.end(before, gravity, lane, point, corner.total(reactions))
-        return fixed_step.Careful(step.r, step.v, solved, work)
+        return chain.at((lane.left - self.point) * self.dt)
 
     def most_sweeps(self, chain):
         return implicit.SWEEPS
@@ -76,22 +64,20 @@ class RuleNumbers(fixed_step.Numbers):
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
         # Another wall at s, or an equation that is not solved yet: the careful way.
-        solved = (not solution.unsolved) & (not walls.outside(there, wall, point))
+        solved = (not solution.unsolved) & (not there.outside(wall, point))
         # The midpoint rule may end outside before it feels a force.
-        inside = not walls.outside(before, -1.0, lane.r)
-        new = inside & (touching | walls.outside(after, -1.0, step.r))
+        inside = not before.outside(-1.0, lane.r)
+        new = inside & (touching | after.outside(-1.0, step.r))
         # One wall alone has a part in the kick.
-        work = contract.work_along(self.moving, over, wall, -1.0 / self.dt * step.kick)
+        work = self.work_along(over, wall, -1.0 / self.dt * step.kick)
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
         return fixed_step.contact(lane, wall, taken)
 
-
-def numbers(method: fixed_step.SoftWalls, scene: Scene, kind: type[RuleNumbers]) -> RuleNumbers:
-    """The numbers of a method whose rule this is."""
-    # h^2/(4m) of equation (I) in contact/implicit.py
-    factor = 0.25 * method.dt * method.dt
-    longest = fixed_step.longest_step(scene, method.dt)
-    return kind(method.dt, method.law(), longest, factor, None, fixed_step.moves(scene))
-
-
-# --- One pass --------------------------------------------------------------------------------------------
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        before = self.before(chain, lane.left)
+        free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
+        reactions = scratch((chain.length(), 4), np.float64)
+        point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(chain, lane), free, reactions)
+        work = self.add_impulses(chain, lane, reactions, impulse, i)
+        step = self.end(before, gravity, lane, point, corner.total(reactions))
+        return fixed_step.Careful(step.r, step.v, solved, work)

@@ -36,14 +36,18 @@ class Midpoint(fixed_step.SoftWalls):
     """
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *fixed_step.of_steps(scene), *implicit.NEEDS
+        return *super().needs(scene), *implicit.NEEDS
 
-    def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.numbers(self, scene, MidpointNumbers)
+    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+        # h^2/(4m) of equation (I) in contact/implicit.py
+        return self.record(MidpointNumbers, scene, 0.25 * self.dt * self.dt)
+
+
+# --- As kernels know it ----------------------------------------------------------------------------------
 
 
 class MidpointNumbers(implicit_rule.RuleNumbers):
-    """The method as kernels know it."""
+    """The rule."""
 
     point = 0.5
 

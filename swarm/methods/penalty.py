@@ -9,12 +9,12 @@ from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import form_of, reaction_needs
-from ..contact.records import Step
+from ..contact.impulse import Step
+from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import scratch, select
+from ..kernel.jit import select
 from ..kernel.vector import norm
 from ..scene import Scene
-from ..surfaces import fold as walls
 from . import contract, fixed_step
 
 
@@ -51,23 +51,25 @@ class Penalty(fixed_step.SoftWalls):
     gradient: str = "composite"
 
     def __post_init__(self) -> None:
-        fixed_step.check_arguments(self)
+        super().__post_init__()
+        fixed_step.check_gradient(self)
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        return *super().needs(scene), *reaction_needs(self.gradient)
+
+    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+        # h^2/(2m) of equation (K) in contact/impulse.py
+        return self.record(PenaltyNumbers, scene, 0.5 * self.dt * self.dt, form_of(self.gradient))
 
     def seldom_hard(self, scene: Scene) -> bool:
         return self.gradient == "composite" and super().seldom_hard(scene)
 
-    def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *fixed_step.of_steps(scene), *reaction_needs(self.gradient)
 
-    def numbers(self, scene: Scene) -> "PenaltyNumbers":
-        # h^2/(2m) of equation (K) in contact/impulse.py
-        factor, form = 0.5 * self.dt * self.dt, form_of(self.gradient)
-        longest = fixed_step.longest_step(scene, self.dt)
-        return PenaltyNumbers(self.dt, self.law(), longest, factor, form, fixed_step.moves(scene))
+# --- As kernels know it ----------------------------------------------------------------------------------
 
 
 class PenaltyNumbers(fixed_step.Numbers):
-    """The method as kernels know it."""
+    """The step with the composite discrete gradient, or with the mean-value one."""
 
     def free(self, gravity, lane):
         """The step without walls: r0, p and c."""
@@ -79,18 +81,6 @@ class PenaltyNumbers(fixed_step.Numbers):
             2.0 / (self.dt * self.dt) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0
         )
         return energies.restored(self.law, over, after, gravity, budget, ends)
-
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        """The step against all walls at once."""
-        h, step = self.dt, self.free(gravity, lane)
-        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
-        reactions = scratch((walls.length(chain), 4), np.float64)
-        r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
-        corner.add_impulses(reactions, h, impulse, i)
-        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
-        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
-        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-        return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)
 
     def most_sweeps(self, chain):
         return contact_impulse.NEWTON_STEPS
@@ -113,20 +103,28 @@ class PenaltyNumbers(fixed_step.Numbers):
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
         step = self.free(gravity, lane)
         touching = wall >= 0.0
-        r1 = select(touching, walls.push(over, wall, step.r, step.p, kappa), step.r + step.p)
+        r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
         # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-        g = walls.inner_gradient(over, wall, step.r, r1)
+        g = over.inner_gradient(wall, step.r, r1)
         f = select(touching, 2.0 / h * kappa, 0.0)
         v1 = accelerated(gravity, lane.v, h) - f * g
-        work = contract.work_along(self.moving, over, wall, -f / h * g)
+        work = self.work_along(over, wall, -f / h * g)
 
         # A push into another wall, or an equation that is not solved yet: the careful way.
         factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-        solved = balanced & (not solution.unsolved) & walls.pushes(over, wall, kappa)
-        solved = solved & (not walls.outside(after, wall, r1))
-        new = touching & (not walls.outside(over, -1.0, lane.r))
+        solved = balanced & (not solution.unsolved) & over.pushes(wall, kappa)
+        solved = solved & (not after.outside(wall, r1))
+        new = touching & (not over.outside(-1.0, lane.r))
         taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
         return fixed_step.contact(lane, wall, taken)
 
-
-# --- One pass --------------------------------------------------------------------------------------------
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        h, step = self.dt, self.free(gravity, lane)
+        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        reactions = scratch((chain.length(), 4), np.float64)
+        r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
+        corner.add_impulses(reactions, h, impulse, i)
+        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
+        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
+        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
+        return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)

@@ -13,15 +13,16 @@ from ..contact import corner, uzawa
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
 from ..contact.discrete_gradient import MeanValue
-from ..contact.records import Step
+from ..contact.impulse import Step
+from ..contact.laws import NONE
 from ..contact.reflection import Energy, chord, exact
 from ..contact.touching import Contacts, Moving, impact
+from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import kept, outlined, scratch, select
+from ..kernel.jit import outlined, select
 from ..kernel.vector import norm, square
 from ..status import Status
 from ..surfaces import flights
-from ..surfaces import fold as walls
 from . import contract, fixed_step
 
 RAISE, COUNT, IMPACT = 0, 1, 2
@@ -77,20 +78,24 @@ class Numbers(fixed_step.Steps):
         """The contact as exact impacts: the result of `hard_pass`."""
         raise NotImplementedError
 
-    # --- One pass ---
+    # --- The unknown of a contact ---
+
+    def free(self, gravity, lane, h):
+        """The step without walls: r0, p and c = h^2/(2m)."""
+        return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
     def most_sweeps(self, chain):
         return contact_impulse.NEWTON_STEPS
 
     def guess(self, chain, gravity, lane, wall):
         cut, over = self.cut(lane.left), self.over(chain, lane.left)
-        kappa = contact_impulse.guess(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        kappa = contact_impulse.guess(over, wall, cut.law, self.free(gravity, lane, cut.h))
         touching = wall >= 0.0
         return select(touching, kappa, 0.0), touching
 
     def improve(self, chain, gravity, lane, wall, solution, multiplier):
         cut, over, kappa = self.cut(lane.left), self.over(chain, lane.left), solution.kappa
-        newton = contact_impulse.improve(over, wall, cut.law, multiplier, _free_step(gravity, lane, cut.h), kappa)
+        newton = contact_impulse.improve(over, wall, cut.law, multiplier, self.free(gravity, lane, cut.h), kappa)
         return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
     # --- Uzawa's loop (8) ---
@@ -101,9 +106,9 @@ class Numbers(fixed_step.Steps):
 
     def first_multiplier(self, chain, gravity, lane, wall, kappa):
         cut, over = self.cut(lane.left), self.over(chain, lane.left)
-        better, multiplier = uzawa.reflection(over, wall, cut.law, _free_step(gravity, lane, cut.h))
+        better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
-        limited = uzawa.has_limit(over, wall, cut.law, lane.r)
+        limited = over.of(wall, False, uzawa.has_limit, cut.law, lane.r)
         return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
 
     def next_multiplier(self, left, acceleration, multiplier, record, before):
@@ -111,20 +116,22 @@ class Numbers(fixed_step.Steps):
         following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
         return following, miss, not (record.stored <= self.tolerance)
 
+    # --- Contact ---
+
     def contact(self, chain, gravity, lane, wall, solution):
         # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
         cut, kappa = self.cut(lane.left), solution.kappa
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
         h, p = cut.h, displacement(gravity, lane.v, cut.h)
-        r1 = walls.push(over, wall, lane.r, p, kappa)
-        g = walls.inner_gradient(over, wall, lane.r, r1)
+        r1 = over.push(wall, lane.r, p, kappa)
+        g = over.inner_gradient(wall, lane.r, r1)
         f = 2.0 / h * kappa
-        work = contract.work_along(self.moving, over, wall, -f / h * g)
+        work = self.work_along(over, wall, -f / h * g)
         v1 = accelerated(gravity, lane.v, h) - f * g
         given = abs(f) * norm(g)
 
         alone = self.is_alone(after, wall, lane.r, r1, kappa)
-        solved = alone & (not solution.unsolved) & walls.pushes(over, wall, kappa)
+        solved = alone & (not solution.unsolved) & over.pushes(wall, kappa)
         touching = wall >= 0.0
         step = (lane.left > 0.0) & touching & solved
         budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
@@ -145,8 +152,6 @@ class Numbers(fixed_step.Steps):
             work,
         )
 
-    # --- Several walls, nested solves, and loops that do not converge ---
-
     @outlined
     def hard_pass(self, chain, gravity, lane, wall, lanes, i):
         cut, record = self.cut(lane.left), lanes.record
@@ -154,17 +159,17 @@ class Numbers(fixed_step.Steps):
         if self.is_blocked(chain, wall, lane.r, h * lane.v):
             record[uzawa.SWEEPS, i] = 0.0
             return self.as_impacts(chain, lane, cut, wall, lanes, i)
-        free = _free_step(gravity, lane, h)
+        free = self.free(gravity, lane, h)
         if self.is_too_fast(free.p):
-            return fixed_step.refused(lane, Status.TOO_FAST.value)
-        reactions = scratch((walls.length(chain), 4), np.float64)
+            return contract.refused(lane, Status.TOO_FAST.value)
+        reactions = scratch((chain.length(), 4), np.float64)
         end = uzawa.loop(self, cut.law, over, free, reactions)
         record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
         record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
         if not end.converged and self.policy == IMPACT:
             return self.as_impacts(chain, lane, cut, wall, lanes, i)
         if not end.converged and (self.policy == RAISE or not end.solved):
-            return fixed_step.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
+            return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
         new = 1.0 if self.is_new(over, lane.r) else 0.0
         reaction = corner.total(reactions)
         v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
@@ -187,11 +192,6 @@ def _first_energy(lane):
     return Energy(speed2, 0.5 / speed2)
 
 
-def _free_step(gravity, lane, h):
-    """The step without walls: r0, p and c = h^2/(2m)."""
-    return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
-
-
 def _after(r, v, left, hits):
     """The contact, whose impulses were added one by one."""
     return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0, False)
@@ -204,16 +204,16 @@ class FixedSteps(Numbers):
         return Cut(self.dt, 1.0, self.law)
 
     def is_new(self, chain, r):
-        return not walls.outside(chain, -1.0, r)
+        return not chain.outside(-1.0, r)
 
     def is_alone(self, chain, wall, r0, r1, kappa):
-        return not walls.outside(chain, wall, r1)
+        return not chain.outside(wall, r1)
 
     @outlined
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
         if self.moving is not None:
             # Refused before the run.
-            return fixed_step.refused(lane, Status.UNCONVERGED.value)
+            return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
         remaining, hits = cut.h, 0.0
         for _i in range(_MOST_BOUNCES):
@@ -224,7 +224,7 @@ class FixedSteps(Numbers):
                 return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
             if hit.wall < 0.0:
                 continue
-            bounce = exact(None, chain, None, hit.wall, r, v, energy)
+            bounce = exact(NONE, chain, None, hit.wall, r, v, energy)
             v = bounce.v
             lanes.impulse[int(hit.wall), i] += bounce.impulse
             hits += 1.0
@@ -251,18 +251,18 @@ class CutSteps(Numbers):
 
     def is_blocked(self, chain, wall, r, p):
         kappa = chord(chain, wall, r, p)
-        r1 = walls.push(chain, wall, r, p, kappa)
+        r1 = chain.push(wall, r, p, kappa)
         other = flights.other_hit(chain, wall, r, r1 - r)
         # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-        later = other.time <= 1.0 and not uzawa.has_limit(chain, other.wall, self.law, r)
+        later = other.time <= 1.0 and not chain.of(other.wall, False, uzawa.has_limit, self.law, r)
         later = later or uzawa.meets_later(chain, wall, self.law, r, p)
-        return not walls.pushes(chain, wall, kappa) or kappa == 0.0 or later
+        return not chain.pushes(wall, kappa) or kappa == 0.0 or later
 
     @outlined
     def as_impacts(self, chain, lane, cut, wall, lanes, i):
         energy = _first_energy(lane)
         shortest = self.shortest_length / math.sqrt(energy.twice)
-        contacts = Contacts(None, None, shortest, _SAME_INSTANT * self.shortest_length)
+        contacts = Contacts(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
         end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
         return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value
 
@@ -274,4 +274,4 @@ class CutSteps(Numbers):
         # A hit in the last instant of a frame is met again in the next one.
         met = met & (hit.wall >= 0.0) & (left > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-        return contract.Flight(select(met, walls.settle(chain, hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+        return contract.Flight(select(met, chain.settle(hit.wall, r), r), lane.v, left, select(met, wall, -1.0))

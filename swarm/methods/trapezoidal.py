@@ -37,14 +37,18 @@ class Trapezoidal(fixed_step.SoftWalls):
     """
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *fixed_step.of_steps(scene), *implicit.NEEDS
+        return *super().needs(scene), *implicit.NEEDS
 
-    def numbers(self, scene: Scene) -> implicit_rule.RuleNumbers:
-        return implicit_rule.numbers(self, scene, TrapezoidalNumbers)
+    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+        # h^2/(4m) of equation (I) in contact/implicit.py
+        return self.record(TrapezoidalNumbers, scene, 0.25 * self.dt * self.dt)
+
+
+# --- As kernels know it ----------------------------------------------------------------------------------
 
 
 class TrapezoidalNumbers(implicit_rule.RuleNumbers):
-    """The method as kernels know it."""
+    """The rule."""
 
     def reach(self, before, gravity, lane):
         # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)

@@ -8,7 +8,6 @@ from ..contact.force import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
-from ..surfaces import fold as walls
 from . import fixed_step
 
 
@@ -40,34 +39,14 @@ class Verlet(fixed_step.SoftWalls):
     """
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *fixed_step.of_steps(scene), *FORCE_NEEDS
+        return *super().needs(scene), *FORCE_NEEDS
 
-    def numbers(self, scene: Scene) -> "VerletNumbers":
-        longest, moving = fixed_step.longest_step(scene, self.dt), fixed_step.moves(scene)
-        return VerletNumbers(self.dt, self.law(), longest, 0.5 * self.dt, None, moving)
-
-
-class VerletNumbers(fixed_step.Numbers):
-    """The method as kernels know it."""
-
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        """The step against all walls at once."""
-        step, over_mass, law = _step(self, chain, gravity, lane), lane.own.over_mass, self.law
-        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
-        add_impulses(before, law, over_mass, lane.r, impulse, i)
-        add_impulses(after, law, over_mass, step.r, impulse, i)
-        work = add_works(self.moving, over, before, law, over_mass / self.dt, lane.r, impulse, i)
-        work += add_works(self.moving, over, after, law, over_mass / self.dt, step.r, impulse, i)
-        return fixed_step.Careful(step.r, step.v, True, work)
-
-    def contact(self, chain, gravity, lane, wall, solution):
-        step = _step(self, chain, gravity, lane)
-        new = (wall >= 0.0) & (not walls.outside(self.before(chain, lane.left), -1.0, lane.r))
-        taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
-        return fixed_step.contact(lane, wall, taken)
+    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+        # h/(2m)
+        return self.record(VerletNumbers, scene, 0.5 * self.dt)
 
 
-# --- One pass --------------------------------------------------------------------------------------------
+# --- As kernels know it ----------------------------------------------------------------------------------
 
 
 class VerletStep(NamedTuple):
@@ -79,13 +58,31 @@ class VerletStep(NamedTuple):
     work: float
 
 
-def _step(method, chain, gravity, lane):
-    """The step of a lane."""
-    h, over_mass = method.dt, lane.own.over_mass
-    before, over, after = method.before(chain, lane.left), method.over(chain, lane.left), method.after(chain, lane.left)
-    f0 = force(before, method.law, lane.r)
-    # h^2/(2m) F0
-    r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
-    kick = over_mass * (f0 + force(after, method.law, r1))
-    given = work(method.moving, over, before, method.law, lane.r) + work(method.moving, over, after, method.law, r1)
-    return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
+class VerletNumbers(fixed_step.Numbers):
+    """The rule."""
+
+    def step(self, chain, gravity, lane):
+        """The `VerletStep` of a lane."""
+        h, over_mass = self.dt, lane.own.over_mass
+        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+        f0 = force(before, self.law, lane.r)
+        # h^2/(2m) F0
+        r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
+        kick = over_mass * (f0 + force(after, self.law, r1))
+        given = work(self.moving, over, before, self.law, lane.r) + work(self.moving, over, after, self.law, r1)
+        return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
+
+    def contact(self, chain, gravity, lane, wall, solution):
+        step = self.step(chain, gravity, lane)
+        new = (wall >= 0.0) & (not self.before(chain, lane.left).outside(-1.0, lane.r))
+        taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
+        return fixed_step.contact(lane, wall, taken)
+
+    def careful_step(self, chain, gravity, lane, impulse, i):
+        step, over_mass, law = self.step(chain, gravity, lane), lane.own.over_mass, self.law
+        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+        add_impulses(before, law, over_mass, lane.r, impulse, i)
+        add_impulses(after, law, over_mass, step.r, impulse, i)
+        work = add_works(self.moving, over, before, law, over_mass / self.dt, lane.r, impulse, i)
+        work += add_works(self.moving, over, after, law, over_mass / self.dt, step.r, impulse, i)
+        return fixed_step.Careful(step.r, step.v, True, work)

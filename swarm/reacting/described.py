@@ -1,18 +1,17 @@
 """A scene with walls that react as kernels take it, from its description."""
 
-import functools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.laws import NONE
 from ..kernel.vector import Vec, vec
 from ..motion import Guide, Rotation, Translation, pose, unit_axis
 from ..scene import Scene
-from ..surfaces.fold import Chain, each
-from ..surfaces.moving import at
 from ..surfaces.surface import Surface
+from ..surfaces.walls import Walls
 from .freedoms import Free, Freedoms, Guided, Sprung
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import Scenery
@@ -28,16 +27,16 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     given = Scene(rest, scene.gravity).apart("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
-        None if given is None else given.chain(moment),
-        None if given is None else given.laws(),
+        Walls(()) if given is None else given.chain(moment),
+        (given.laws() if given else None) or NONE,
         np.flatnonzero(~reacts),
         _reacting(scene),
         scene.pull(),
     )
 
 
-def _reacting(scene: Scene) -> Chain | None:
-    """The walls that react, in the order of the scene's chain; rows of freedoms are in that of its surfaces."""
+def _reacting(scene: Scene) -> tuple[Reacting, ...]:
+    """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
     rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
     made, number = [], 0
     for i in dict.fromkeys(scene.owners()):
@@ -47,7 +46,7 @@ def _reacting(scene: Scene) -> Chain | None:
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
         number += len(walls)
-    return functools.reduce(lambda chain, wall: Chain(wall, chain), reversed(made), None)
+    return tuple(made)
 
 
 def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Any:
@@ -102,9 +101,9 @@ def freedoms_of(scene: Scene, width: float) -> Freedoms:
         widths[k] = width if surface.inertia is None else width / size
     series = np.zeros((3 * TERMS, count))
     made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
-    for link in each(_reacting(scene)):
-        if isinstance(link.first.freedom, Pendulum):
-            link.first.freedom.expand(made)
+    for wall in _reacting(scene):
+        if isinstance(wall.freedom, Pendulum):
+            wall.freedom.expand(made)
     return made
 
 
@@ -150,14 +149,8 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
     return found
 
 
-def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Chain | None:
+def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
-    given, reacting = ([link.first for link in each(chain)] for chain in (at(scenery.given, 0.0), scenery.reacting))
-    made = []
-    for i in scene.owners():
-        if scene.surfaces[i].reacts():
-            wall = reacting.pop(0)
-            made.append(wall.freedom.posed(wall.body, freedoms, 0.0))
-        else:
-            made.append(given.pop(0))
-    return functools.reduce(lambda chain, wall: Chain(wall, chain), reversed(made), None)
+    given = iter(scenery.given.at(0.0).walls)
+    reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
+    return Walls(tuple(next(reacting if scene.surfaces[i].reacts() else given) for i in scene.owners()))

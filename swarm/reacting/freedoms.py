@@ -1,4 +1,4 @@
-"""How a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
+"""The ways in which a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
 
 Between two impacts its motion is known. What impacts may make of it is bounded by a lease: until the wall has left it,
 the velocity stays within a width of a middle one, so that what was said of far particles holds.
@@ -7,15 +7,16 @@ the velocity stays within a width of a middle one, so that what was said of far 
 import math
 from typing import Any, NamedTuple, cast
 
-from ..kernel.jit import Array, index, select
+from ..kernel.arrays import index
+from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
 from ..surfaces import flights, safe
 from ..surfaces.drive import Drive, Pose, Swing
-from ..surfaces.fold import Chain
 from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
 from ..surfaces.relative import flight_of
+from ..surfaces.walls import Walls
 from .reach import Seen, reach_of
 
 
@@ -57,11 +58,11 @@ class Falling(Posed):
         return self.body.falling_hit(way, speed, pull - self.pose.acceleration)
 
 
-_AT_REST = Drive(ZERO, ZERO, None, None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+_AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
 class Freedom(Record):
-    """How a wall may move, with its `row` among the `walls` and its `lightness`, 1/M or 1/I. Times are of the frame."""
+    """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
 
     def pose(self, walls, t):
         """Its `Pose` at a time."""
@@ -107,8 +108,8 @@ class Freedom(Record):
 
 
 def march(wall, flight, longest):
-    """The same of a wall that is met by safe steps, within so long [s]."""
-    found = safe.march(Chain(wall, None), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
+    found = safe.march(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
     return found.time, found.wall >= 0.0
 
 
@@ -221,7 +222,7 @@ class Sprung(Shifted):
         away, speed = found.shift - self.pull / (rate * rate), found.velocity / rate
         most = math.sqrt(square(away) + square(speed))
         bounds = rate * most, rate * rate * most, rate * rate * rate * most
-        swings, jerks = Chain(Swing(away, speed, rate), None), Vec(bounds[2], bounds[2], bounds[2])
+        swings, jerks = (Swing(away, speed, rate),), Vec(bounds[2], bounds[2], bounds[2])
         return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
 
     def hardest(self, walls):

@@ -7,7 +7,7 @@ From one lease to the next the angle of a pendulum is its Taylor polynomial. Its
 import math
 from typing import Any, NamedTuple
 
-from ..kernel.jit import index
+from ..kernel.arrays import index
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from ..surfaces.course import rise_time
 from ..surfaces.drive import Drive, Pose, Rows, Turn
@@ -64,7 +64,7 @@ class Hinged(Turning):
     def drive(self, walls, t):
         rate, turn = walls.rate[index(self.row)], self.pose(walls, t).turn
         turning, spin = Turn(turn.x, turn.y, turn.z, self.axis, rate), rate * self.axis
-        return Drive(ZERO, ZERO, None, None, turning, spin, self.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+        return Drive(ZERO, ZERO, (), None, turning, spin, self.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
     def push(self, walls, t, impulse, arm):
         k = index(self.row)
@@ -158,7 +158,7 @@ class Pendulum(Turning):
 
     def drive(self, walls, t):
         spin = self.angle(walls, t).rate * self.axis
-        return Drive(ZERO, ZERO, None, None, None, spin, self.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+        return Drive(ZERO, ZERO, (), None, None, spin, self.center, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
     def posed(self, body, walls, t):
         here = self.pose(walls, t)
@@ -201,5 +201,5 @@ class Pendulum(Turning):
         # Of A^T x: theta'' x, and theta''' x + 3 theta'' (x' + theta' x)
         hard, jerk = stiffness * arm, stiffness * (4.0 * fastest * arm + 3.0 * speed)
         turn, jerks = Turn(ZERO, ZERO, ZERO, self.axis, fastest), Vec(jerk, jerk, jerk)
-        bounds = Drive(ZERO, ZERO, None, None, turn, ZERO, self.center, 0.0, hard, jerk, math.inf, 0.0, jerks)
+        bounds = Drive(ZERO, ZERO, (), None, turn, ZERO, self.center, 0.0, hard, jerk, math.inf, 0.0, jerks)
         return Swaying(body, bounds, self, walls, flight.time)

@@ -10,15 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.laws import Laws
 from ..contact.reflection import Energy, exact
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement, potential
 from ..kernel.heap import Heap, build, change
-from ..kernel.jit import Array, index, long_kernel, outlined, select
+from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
-from ..surfaces.flights import NEVER
-from ..surfaces.moving import Marched, at
+from ..surfaces.moving import Marched
 from .freedoms import Flight
 from .walls import all_stay, first_hit, reach_of_all, renew_all, settle_all, strike
 
@@ -37,10 +38,10 @@ _NEAR = 1e-6
 
 
 class Scenery(NamedTuple):
-    """What particles meet: walls that do not react, their laws and their numbers in the scene; those that do."""
+    """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
 
     given: Any  # None, or the walls
-    laws: Any
+    laws: Laws
     owners: Array  # (given walls,)
     reacting: Any
     pull: Any  # gravity, or None
@@ -80,11 +81,9 @@ class Rule(NamedTuple):
 
 def _given_hit(chain, gravity, r, v, left):
     """The first hit with the walls that do not react."""
-    if chain is None:
-        return NEVER
     if isinstance(chain, Marched):
         return safe.first_hit(chain, gravity, r, v, left)
-    return flights.first_hit(at(chain, left), gravity, r, v)
+    return flights.first_hit(chain.at(left), gravity, r, v)
 
 
 def _aim(scenery, queue, i, end):
@@ -133,7 +132,7 @@ def _bounce(scenery, queue, i, wall, left):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
     energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    bounce = exact(scenery.laws, at(scenery.given, left), scenery.pull, wall, r, v, energy)
+    bounce = exact(scenery.laws, scenery.given.at(left), scenery.pull, wall, r, v, energy)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
     queue.impulse[owner, i] += m * bounce.impulse
@@ -172,7 +171,7 @@ def _soon(clock):
 
 @long_kernel
 def predict(scenery, freedoms, queue, clock, rule, first, last):
-    """What is next for the particles from `first` to before `last`; no other is touched.
+    """Find the next events of the particles from `first` to before `last`; no other is touched.
 
     At the start of a frame also when they meet walls that do not react.
     """
@@ -214,7 +213,7 @@ def _until(freedoms):
 
 
 def _list(queue, close, i):
-    """How many are listed, with particle i if it is near."""
+    """The number of those that are listed, with particle i if it is near."""
     if queue.near[i] and not queue.listed[i]:
         queue.listed[i] = True
         queue.close[close] = i

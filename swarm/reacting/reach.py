@@ -1,4 +1,4 @@
-"""How soon a particle may meet a wall that reacts, whatever others do to the wall within its lease.
+"""The times until which a particle surely does not meet a wall that reacts, whatever happens within its lease.
 
 In the frame that moves with the middle velocity of the lease the wall stays within the width times the time of where it
 is: for a plane and a ball the first time at which a flight is as near as that is the root of a parabola.
@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 from ..kernel.jit import select
 from ..kernel.vector import Vec, dot, norm, square
 from ..surfaces.course import rise_time
-from ..surfaces.fold import each
 from ..surfaces.rotation import Rotated
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
-from ..surfaces.shapes.slab import SlabNumbers, along
+from ..surfaces.shapes.slab import SlabNumbers
 from ..surfaces.shapes.solid import SolidNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
 
@@ -40,14 +39,14 @@ def clear_of(body, r):
     if isinstance(body, SolidNumbers):
         # How far the point is out of the part that it is farthest from.
         clear = 0.0
-        for part in reversed(each(body.parts)):
-            clear = max(_out_of(part.first, r), clear)
+        for part in reversed(body.parts):
+            clear = max(_out_of(part, r), clear)
         return clear
     return body.clearance(r)
 
 
 def _out_of(part, r):
-    """How far a point is out of a part at least; below 0 inside."""
+    """A lower bound of the distance of a point outside of a part; below 0 inside."""
     if isinstance(part, Rotated):
         return _out_of(part.body, part.vector_in(r))
     if isinstance(part, (PlaneNumbers, SlabNumbers, SphereNumbers)):
@@ -86,9 +85,8 @@ def _reach_of_plane(body, seen):
 
 
 def _reach_of_slab(body, seen):
-    n = body.normal
-    x, u, a = along(n, seen.r) - body.offset, along(n, seen.v), 0.5 * along(n, seen.pull)
-    width = seen.width * (1.0 if seen.axis is None else abs(along(n, seen.axis)))
+    x, u, a = body.off(seen.r), body.along(seen.v), 0.5 * body.along(seen.pull)
+    width = seen.width * (1.0 if seen.axis is None else abs(body.along(seen.axis)))
     # To the wall on the one side and on the other; of a plate the particle is on one side.
     up = rise_time(body.side * (x - body.radius), 0.5 * (body.side * u + width), body.side * a)
     down = rise_time(body.side * (-x - body.radius), 0.5 * (-body.side * u + width), -body.side * a)

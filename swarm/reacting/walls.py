@@ -7,7 +7,6 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces.flights import NEVER, sooner
-from ..surfaces.fold import each
 
 
 class Blow(NamedTuple):
@@ -50,50 +49,50 @@ class Reacting(Record):
         return Blow(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner)
 
 
-def reach_of_all(chain, walls, flight):
+def reach_of_all(reacting, walls, flight):
     """A time during which a flight meets none of the walls, whatever others do to them within their leases."""
     time = math.inf
-    for link in reversed(each(chain)):
-        first = link.first.freedom.reach(link.first.body, walls, flight)
+    for wall in reversed(reacting):
+        first = wall.freedom.reach(wall.body, walls, flight)
         time = select(time < first, time, first)
     return time
 
 
-def first_hit(chain, gravity, walls, flight):
+def first_hit(reacting, gravity, walls, flight):
     """The first `Hit` of a flight, if nothing else strikes the walls before."""
     hit = NEVER
-    for link in reversed(each(chain)):
-        time, found = link.first.freedom.hit(link.first.body, gravity, walls, flight)
-        hit = sooner(time, found, hit)
+    for k, wall in reversed(tuple(enumerate(reacting))):
+        time, found = wall.freedom.hit(wall.body, gravity, walls, flight)
+        hit = sooner(time, found, float(k), hit)
     return hit
 
 
-def strike(chain, wall, walls, flight, mass):
+def strike(reacting, wall, walls, flight, mass):
     """The impact of a particle on the wall with this number: its `Blow`."""
-    for k, link in enumerate(each(chain)):
+    for k, one in enumerate(reacting):
         if wall == k:
-            return link.first.strike(walls, flight, mass)
+            return one.strike(walls, flight, mass)
     return Blow(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
 
 
 # --- Leases ----------------------------------------------------------------------------------------------
 
 
-def renew_all(chain, walls, t):
+def renew_all(reacting, walls, t):
     """New leases of all walls, from this time on."""
-    for link in each(chain):
-        link.first.freedom.renew(walls, t)
+    for wall in reacting:
+        wall.freedom.renew(walls, t)
 
 
-def all_stay(chain, wall, walls):
+def all_stay(reacting, wall, walls):
     """Whether the wall with this number, which was just struck, is within its lease."""
-    for k, link in enumerate(each(chain)):
+    for k, one in enumerate(reacting):
         if wall == k:
-            return link.first.freedom.stays(walls)
+            return one.freedom.stays(walls)
     return True
 
 
-def settle_all(chain, walls, t):
+def settle_all(reacting, walls, t):
     """Bring every wall to a time, which its motion is counted from."""
-    for link in each(chain):
-        link.first.freedom.push(walls, t, ZERO, ZERO)
+    for wall in reacting:
+        wall.freedom.push(walls, t, ZERO, ZERO)

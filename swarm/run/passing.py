@@ -6,8 +6,7 @@ import math
 from ..bodies import covering
 from ..bodies.body import Body
 from ..scene import Scene
-from ..surfaces.fields.boxes import Boxes
-from ..surfaces.fields.cylinders import Cylinders
+from ..surfaces.fields.bodies import Boxes, Cylinders
 from ..surfaces.fields.many import Many
 from ..surfaces.shapes.box import Box
 from ..surfaces.shapes.cone import Cone

@@ -16,7 +16,6 @@ from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
-from ..surfaces import fold as walls
 
 _LOG = logging.getLogger("swarm")
 # At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
@@ -113,7 +112,7 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
             length, ahead, wall = _chord(chain, point, way)
             if not length < math.inf:
                 return Flights(math.inf, -1)
-            normal = np.array(walls.unit_normal(chain, float(wall), vec(point + ahead * way)))
+            normal = np.array(chain.unit_normal(float(wall), vec(point + ahead * way)))
             point = point + (ahead - length * random.random()) * way
             speed = math.sqrt(velocity @ velocity + pull * length)
             if k >= _CHORDS - _COUNTED and length > 0.0 and speed > 0.0:

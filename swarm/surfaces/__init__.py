@@ -1,22 +1,15 @@
 """The surfaces by their kind in a scene file.
 
 To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a record derived from
-`Smooth`, for kernels. Of the methods that contract.py describes it gives `phi`, `gradient` and one of `first_hit`,
-`course`, `near` and `bend`; for `Impact`, which slides along walls, and methods with steps in contact also `hessian`,
-and for these `farthest_push`. All others have a default. Then name the class in ALL_SURFACES. examples/own_surface.py
-is a complete surface; if something is missing, an error says so before the run.
+`contract.Smooth`, which describes all methods, for kernels; then name the dataclass in ALL_SURFACES.
+examples/own_surface.py is a complete surface. If a method of simulation needs what is missing, an error says so before
+the run.
 """
 
-# First: what a surface is made of imports it in turn.
-from . import approach as _approach  # noqa: F401
 from .contract import Smooth as Smooth
 from .data.sampled import Sampled
-from .fields.boxes import Boxes
-from .fields.capsules import Capsules
-from .fields.cylinders import Cylinders
-from .fields.ellipsoids import Ellipsoids
+from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
-from .fields.spheres import Spheres
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
 from .shapes.box import Box

@@ -116,11 +116,6 @@ def first_hit(surface, gravity, r, v):
     return t, not under_way(t, last)
 
 
-def falling_hit(surface, r, v, pull):
-    """The same under gravity, which is a vector like any other here."""
-    return first_hit(surface, Gravity(pull.x, pull.y, pull.z), r, v)
-
-
 def safe_time(surface, r, v, pull):
     """A time during which a fall surely stays admissible."""
     level = surface.near(Gravity(pull.x, pull.y, pull.z), r, v)

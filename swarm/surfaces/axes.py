@@ -137,19 +137,9 @@ def fastest(pull, v, t):
     return abs(v) if pull is None else abs(v) + abs(pull) * t
 
 
-def along_x(gravity):
-    """Gravity along x, None where there is none at all."""
-    return None if gravity is None else gravity.x
-
-
-def along_y(gravity):
-    """The same along y."""
-    return None if gravity is None else gravity.y
-
-
-def along_z(gravity):
-    """The same along z."""
-    return None if gravity is None else gravity.z
+def pulls(gravity):
+    """Gravity along each axis, None where there is none at all."""
+    return (None, None, None) if gravity is None else (gravity.x, gravity.y, gravity.z)
 
 
 def least(x, y, z):

@@ -10,29 +10,31 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 `required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
 """
 
-import math
-
+from ..kernel.gravity import Gravity
 from ..kernel.jit import select
-from ..kernel.record import Record
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
 from . import approach, flights, march, newton
+from .at_rest import AtRest
 from .course import first_rise, safe_rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
 
 
-class Smooth(Record):
+class Smooth(AtRest):
     """A surface as kernels take it.
 
-    Required are the field `side`, the methods `phi` and `gradient`, and one of
-        first_hit (and falling_hit under gravity)  the first hit of a flight in closed form,
-        course   the level along a fall as a quartic: falling_hit and safe_time follow,
-        near     a polynomial above the level from a place on: the hits follow by steps, approach.py,
-        bend     how strongly q bends at most: the hits follow by safe steps, march.py;
-    for methods with steps in contact also `farthest_push` and one of
-        push, rise and resolve  the step in closed form,
-        hessian                 the step follows by Newton's method, newton.py.
+    Required are the field `side`, the methods `phi` and `gradient`, and one that finds the first hit of a flight:
+        first_hit (and falling_hit under gravity)  in closed form,
+        course   the level along a fall as a quartic; falling_hit and safe_time follow by its first root, course.py,
+        near     a polynomial above the level from a place on; the hits follow by steps, approach.py,
+        bend     how strongly q bends at most; the hits follow by steps under a parabola, march.py;
+    for methods with steps in contact also `farthest_push`, and one that makes the step:
+        push, rise and resolve  in closed form,
+        hessian                 by Newton's method, newton.py;
+    for motion other than uniform one from which safe steps in the frame of the wall follow, rising.py:
+        level_along  the level with a bound of its third derivative; the best,
+        bend.
     Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
     whose inner function is not phi overrides `inner`, `slope`, `gap_of`, `level_of` and `gap_slope` together.
     What is no method is a constant for the compiler.
@@ -111,53 +113,9 @@ class Smooth(Record):
         return n * (self.side / norm(n))
 
     def settle(self, r):
-        """A point within round-off of the self, moved onto it: one Newton step along the gradient."""
+        """A point within round-off of the surface, moved onto it: one Newton step along the gradient."""
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
-
-    # Whether the normal is the same everywhere on a wall.
-    flat = False
-
-    # --- Motion: of walls that move; see moving.py ---
-
-    def velocity(self, r):
-        """The velocity of the wall at a point of it."""
-        return ZERO
-
-    def acceleration(self, r):
-        """The acceleration of the wall at a point of it."""
-        return ZERO
-
-    def carry(self, r):
-        """Where what is at a point of the wall at the start of a step is at its end."""
-        return r
-
-    def way(self):
-        """The displacement of the wall in a step."""
-        return ZERO
-
-    def end_inner(self, r):
-        """The inner function at the end of a step, where the wall may be elsewhere."""
-        return self.inner(r)
-
-    def place_scale(self, s):
-        """The scale of the round-off of a place in the frame of a wall, from that of its coordinates."""
-        return s
-
-    def framed(self, r, p):
-        """The surface at rest in its frame, and the start and the free displacement of a step there."""
-        return self, r, p
-
-    def pace(self):
-        """A time in which the motion of the wall changes little [s]; infinite where it does not change."""
-        return math.inf
-
-    def mean_velocity(self, r0, r1, h):
-        """How fast what the wall is made of moves in the mean of a step of length h from r0 to r1, both on it.
-
-        As far as the surface changes with it: a rotation that leaves the surface as it is does not count.
-        """
-        return ZERO
 
     # --- Flight ---
 
@@ -175,7 +133,9 @@ class Smooth(Record):
         """`first_hit` for the parabola r + v t + G t^2/2."""
         if self.is_quartic:
             return first_rise(self.may_be_far, self.course(r, v, pull))
-        return approach.falling_hit(self, r, v, pull) if self.gives("near") else march.march(self, r, v, pull)
+        if self.gives("near"):
+            return approach.first_hit(self, Gravity(pull.x, pull.y, pull.z), r, v)
+        return march.march(self, r, v, pull)
 
     def safe_time(self, r, v, pull):
         """A time during which that parabola surely stays admissible: a lower bound, cheap.
@@ -234,8 +194,9 @@ class Smooth(Record):
         """Lower bound of the distance to the wall; 0 if unknown."""
         return 0.0
 
-    # Whether the third derivative of the level along a flight has a bound that rising.py knows.
-    has_levels = False
+    def may_reach(self, low, high):
+        """Whether a solid may have a point in common with a box with these corners; its bounds do."""
+        return True
 
     def passed(self, r, v):
         """Whether a straight flight surely never meets the surface again."""

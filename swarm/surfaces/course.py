@@ -179,7 +179,7 @@ def leave(level):
 
 
 def close(window):
-    """What reach step^2 is at most in a step that leaves nothing."""
+    """The largest reach step^2 of a step that leaves nothing."""
     window = abs(window)
     return _CLOSE * window * window * window
 

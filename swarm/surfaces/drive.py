@@ -14,7 +14,6 @@ from ..kernel.angle import sine_and_versine
 from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, vec
-from .fold import Chain, each
 from .surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
@@ -150,7 +149,7 @@ class Drive(Record):
 
     shift: Vec  # d at the end of the frame
     velocity: Vec
-    swings: Any  # None or a Chain of `Swing`
+    swings: tuple[Any, ...]  # each a `Swing`
     track: Any  # None or `Track`
     turn: Any  # None or `Turn`; None also where the rotation leaves the surface as it is
     spin: Any  # the angular velocity, or None
@@ -166,8 +165,8 @@ class Drive(Record):
         """The `Pose` when so much of the frame is left [s]."""
         t = -left
         d, v, a = ZERO, ZERO, ZERO
-        for link in reversed(each(self.swings)):
-            d, v, a = link.first.added(t, d, v, a)
+        for swing in self.swings:
+            d, v, a = swing.added(t, d, v, a)
         e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
         turn = None if self.turn is None else self.turn.at(t)
         return Pose(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
@@ -177,8 +176,8 @@ class Drive(Record):
         # Not the difference of two places over the time: of a short step that has no digits left, and a particle that
         # friction stops takes ever shorter ones.
         swings = ZERO
-        for link in reversed(each(self.swings)):
-            swings = swings + link.first.mean_velocity(middle, h)
+        for swing in self.swings:
+            swings = swings + swing.mean_velocity(middle, h)
         return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
 
     def angular_speed(self):
@@ -193,7 +192,8 @@ def drive_of(surface: Surface, moment: float) -> Drive:
     """The motion of a surface in the frame that ends at a moment [s]."""
     # A guide says how impacts move a wall, which is at rest before.
     parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
-    velocity, swings, track, turn, spin, center = np.zeros(3), None, None, None, None, ZERO
+    velocity, track, turn, spin, center = np.zeros(3), None, None, None, ZERO
+    swings: tuple[Swing, ...] = ()
     fastest = hardest = jerk = 0.0
     pace, jerks = math.inf, np.zeros(3)
     for one in parts:
@@ -203,9 +203,8 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             led = one.harmonic((0.0, 0.0, 0.0))
             c, s = math.cos(led.rate * moment), math.sin(led.rate * moment)
             # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
-            swings = Chain(
-                Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate), swings
-            )
+            swing = Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)
+            swings = (*swings, swing)
             amplitude, pace = math.hypot(*one.amplitude), min(pace, _SLOW / led.rate)
             fastest += amplitude * led.rate
             hardest += amplitude * led.rate**2

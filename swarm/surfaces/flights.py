@@ -1,4 +1,4 @@
-"""When a free flight meets the walls of a scene: the hits and free times of one wall, folded over the chain."""
+"""When a free flight meets the walls of a scene."""
 
 import math
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from .course import Quartic, arrived, close, leave, safe_step
-from .fold import Chain, Field, count, each, member, outside
+from .walls import Field
 
 
 class Hit(NamedTuple):
@@ -45,27 +45,26 @@ def hit(gravity, surface, r, v):
 def first_hit(chain, gravity, r, v):
     """The first `Hit` of a free flight."""
     first = NEVER
-    for link in reversed(each(chain)):
-        if isinstance(link, Field):
-            first = soonest(link.first.field_hit(gravity, r, v), first, count(link.first))
+    for number, wall in reversed(chain.numbered()):
+        if isinstance(wall, Field):
+            first = soonest(wall.members.field_hit(gravity, r, v), number, first)
         else:
-            time, found = hit(gravity, link.first, r, v)
-            first = sooner(time, found, first)
+            time, found = hit(gravity, wall, r, v)
+            first = sooner(time, found, number, first)
     return first
 
 
-def soonest(hit, later, before):
-    """The sooner one of two hits, the second with a wall that has so many more walls before it."""
+def soonest(hit, number, later):
+    """The sooner one of a hit with a field that has so many walls before it and that with a later wall."""
     first = hit.time <= later.time
-    behind = select(later.wall < 0.0, -1.0, later.wall + before)
-    return Hit(select(first, hit.time, later.time), select(first, hit.wall, behind))
+    wall = select(hit.wall < 0.0, -1.0, hit.wall + number)
+    return Hit(select(first, hit.time, later.time), select(first, wall, later.wall))
 
 
-def sooner(time, found, later):
-    """The sooner one of the hit of the first wall and that of the rest."""
+def sooner(time, found, number, later):
+    """The sooner one of the hit with the wall of this number and that with a later wall."""
     sooner = later.time < time
-    wall = select(later.wall < 0.0, -1.0, later.wall + 1.0)
-    return Hit(select(sooner, later.time, time), select(sooner, wall, select(found, 0.0, -1.0)))
+    return Hit(select(sooner, later.time, time), select(sooner, later.wall, select(found, number, -1.0)))
 
 
 # --- In lanes, by steps ----------------------------------------------------------------------------------
@@ -75,21 +74,10 @@ COURSE = 9
 _WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
 
 
-def in_steps(chain):
-    """A number where a straight flight to any wall of a chain takes steps in lanes: a type for the compiler.
-
-    None where its hit has a closed form, or is asked for as a whole, as of walls that move.
-    """
-    steps = None
-    for link in each(chain) if isinstance(chain, Chain) else ():
-        steps = link.first.in_steps if steps is None else steps
-    return steps
-
-
 def begin(chain, gravity, course, row, lane, r, v):
     """The start of a flight for every wall into course[row:, lane]."""
-    for k, link in enumerate(each(chain)):
-        link.first.begin_flight(gravity, course, row + k * COURSE, lane, r, v)
+    for k, wall in enumerate(chain.walls):
+        wall.begin_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
 def begin_whole(gravity, surface, course, row, lane, r, v):
@@ -107,8 +95,8 @@ def begin_whole(gravity, surface, course, row, lane, r, v):
 
 def step(chain, gravity, course, row, lane, r, v):
     """One safe step of every wall that needs steps, of the flight that starts at r."""
-    for k, link in enumerate(each(chain)):
-        link.first.step_flight(gravity, course, row + k * COURSE, lane, r, v)
+    for k, wall in enumerate(chain.walls):
+        wall.step_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
 def step_whole(gravity, surface, course, row, lane):
@@ -127,9 +115,9 @@ def step_whole(gravity, surface, course, row, lane):
 def end(chain, course, row, lane):
     """`first_hit` from the course."""
     first = NEVER
-    for k, _link in reversed(tuple(enumerate(each(chain)))):
+    for k, _wall in reversed(tuple(enumerate(chain.walls))):
         at = row + k * COURSE
-        first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), first)
+        first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), float(k), first)
     return first
 
 
@@ -138,26 +126,25 @@ def end(chain, course, row, lane):
 
 def hit_of(chain, gravity, wall, r, v):
     """`hit` of the wall with this number."""
-    if chain is None:
-        return math.inf, True
-    if isinstance(chain, Field):
-        many = count(chain.first)
-        surface, here, rest = member(chain.first, wall), wall < many, wall - many
-    else:
-        surface, here, rest = chain.first, wall == 0.0, wall - 1.0
-    time, found = hit(gravity, surface, r, v)
-    other, found_other = hit_of(chain.rest, gravity, rest, r, v)
-    return select(here, time, other), (here & found) | ((not here) & found_other)
+    first, found = math.inf, True
+    for number, one in reversed(chain.numbered()):
+        if isinstance(one, Field):
+            surface, here = one.members.wall(wall - number), wall < number + one.count()
+        else:
+            surface, here = one, wall == number
+        time, hits = hit(gravity, surface, r, v)
+        first, found = select(here, time, first), (here & hits) | ((not here) & found)
+    return first, found
 
 
 def other_hit(chain, wall, r, v):
     """The first hit of a straight flight with any wall but this one, which is one of the chain's."""
-    first, links = NEVER, each(chain)
+    first = NEVER
     # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
-    for k, link in reversed(tuple(enumerate(links if len(links) > 1 else ()))):
-        time, _found = link.first.first_hit(r, v)
+    for k, other in reversed(tuple(enumerate(chain.walls if len(chain.walls) > 1 else ()))):
+        time, _found = other.first_hit(r, v)
         use = (first.time < time) | (wall == k)
-        first = Hit(select(use, first.time, time), select(use, first.wall + 1.0, 0.0))
+        first = Hit(select(use, first.time, time), select(use, first.wall, float(k)))
     return first
 
 
@@ -167,14 +154,14 @@ def other_hit(chain, wall, r, v):
 def free_time(gravity, chain, r, v):
     """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
     if gravity is None:
-        return select(outside(chain, -1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
+        return select(chain.outside(-1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
     return safe_time(chain, r, v, as_vector(gravity))
 
 
 def safe_time(chain, r, v, pull):
     """The smallest safe time of all walls."""
     shortest = math.inf
-    for link in reversed(each(chain)):
-        time = link.first.safe_time(r, v, pull)
+    for wall in reversed(chain.walls):
+        time = wall.safe_time(r, v, pull)
         shortest = select(shortest < time, shortest, time)
     return shortest

@@ -1,7 +1,8 @@
 """A surface in a frame of its own: what is asked of it is asked of its body there.
 
 Each argument of the contract has a role, by which it goes into the frame, and each answer one by which it comes out: a
-place and a vector are turned, a place is moved too, and a number is the same in any frame.
+place, a velocity and any other vector are turned, a place is moved too, in a wall that moves a velocity loses that of
+the wall, and a number is the same in any frame.
 """
 
 from typing import Any
@@ -22,13 +23,15 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("unit_normal", ("place",), "vector"),
     ("settle", ("place",), "place"),
     ("farthest_push", (), None),
-    ("first_hit", ("place", "vector"), None),
-    ("falling_hit", ("place", "vector", "vector"), None),
-    ("safe_time", ("place", "vector", "vector"), None),
-    ("course", ("place", "vector", "vector"), None),
-    ("outward_acceleration", ("place", "vector", "vector"), None),
-    ("begin_flight", ("gravity", None, None, None, "place", "vector"), None),
-    ("step_flight", ("gravity", None, None, None, "place", "vector"), None),
+    ("first_hit", ("place", "velocity"), None),
+    ("falling_hit", ("place", "velocity", "vector"), None),
+    ("safe_time", ("place", "velocity", "vector"), None),
+    ("course", ("place", "velocity", "vector"), None),
+    ("level_along", ("seen",), None),
+    ("moving_step", ("seen", None), None),
+    ("outward_acceleration", ("place", "velocity", "vector"), None),
+    ("begin_flight", ("gravity", None, None, None, "place", "velocity"), None),
+    ("step_flight", ("gravity", None, None, None, "place", "velocity"), None),
     ("inner_gradient", ("place", "place"), "vector"),
     ("step_normal", ("place", "place"), "vector"),
     ("push", ("place", "vector", None), "place"),
@@ -37,16 +40,29 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("chord_guess", ("place", "vector"), None),
     ("chord_improve", ("place", "vector", None), None),
     ("chord_normal", ("place", "vector", None), "vector"),
+    # Of a field: see `Members`
+    ("count", (), None),
+    ("field_hit", ("gravity", "place", "velocity"), None),
+    ("until_next_cell", ("place", "velocity"), None),
+    ("is_in_another", (None, "place"), None),
+    ("count_in_cell", ("place",), None),
+    ("list_in_cell", (None, None, "place", None), None),
+    ("one_in_cell", (None, "place"), None),
+    ("deepest_in_cell", ("place",), None),
 )
-_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "chord_sweeps")
+_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "needs_bend", "chord_sweeps")
 
 
 class Framed(Smooth):
     """A surface `body`, asked in its own frame.
 
-    A class of frames gives `place_in`, `vector_in`, `gravity_in`, `place_out` and `vector_out`, and overrides what
-    depends on more than its arguments.
+    A class of frames gives `place_in`, `velocity_in`, `vector_in`, `gravity_in`, `place_out` and `vector_out`, as far
+    as its surfaces are asked, and overrides what depends on more than its arguments.
     """
+
+    def seen_in(self, seen):
+        """A particle as the wall sees it, in the frame of the body."""
+        return seen._replace(r=self.place_in(seen.r), v=self.vector_in(seen.v), a=self.vector_in(seen.a))
 
 
 def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> Any:

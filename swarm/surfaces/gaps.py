@@ -9,7 +9,7 @@ from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from .axes import CELLS, Free, along_x, along_y, along_z, least, length_of, most, time_far, time_out
+from .axes import CELLS, Free, least, length_of, most, pulls, time_far, time_out
 from .course import rise_time
 from .flights import Hit
 
@@ -68,10 +68,10 @@ def _time_to_reach(pull, far, v, below):
 
 def _time_in_gaps(gaps, period, gravity, motion):
     """How long a flight stays in a gap."""
-    r, v = motion
-    x = _time_in(gaps.x, period.x, r.x, v.x, along_x(gravity))
-    y = _time_in(gaps.y, period.y, r.y, v.y, along_y(gravity))
-    z = _time_in(gaps.z, period.z, r.z, v.z, along_z(gravity))
+    (r, v), (gx, gy, gz) = motion, pulls(gravity)
+    x = _time_in(gaps.x, period.x, r.x, v.x, gx)
+    y = _time_in(gaps.y, period.y, r.y, v.y, gy)
+    z = _time_in(gaps.z, period.z, r.z, v.z, gz)
     return most(x, y, z)
 
 

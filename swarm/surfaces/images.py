@@ -111,7 +111,7 @@ def _shifts(surface: Surface, ends: tuple[float, float], length: float, name: st
 
 
 def body_of(surface: Surface) -> Surface:
-    """What a solid fills, as the cavity of the same shape."""
+    """The volume of a solid, as the cavity of the same shape."""
     return replace(surface, side="inside", motion=None)  # type: ignore[call-arg]
 
 

@@ -3,6 +3,7 @@
 The types of nested numbers are what the compiler sees. Whoever has sorted by them keeps which is which.
 """
 
+import functools
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
@@ -25,5 +26,8 @@ def _rank(numbers: Any) -> tuple[int, str]:
 
 def _text(numbers: Any) -> str:
     """The types of nested numbers."""
+    if type(numbers) is tuple:
+        # As nested pairs: by their text walls have the order in which results of earlier versions were made.
+        return functools.reduce(lambda rest, part: f"Chain({_text(part)},{rest})", reversed(numbers), "NoneType")
     parts = f"({','.join(map(_text, numbers))})" if isinstance(numbers, (tuple, list)) else ""
     return type(numbers).__name__ + parts

@@ -1,4 +1,4 @@
-"""What follows from `bend`: the first hit of a flight by safe steps, and a time during which it surely hits nothing.
+"""The first hit of a flight by safe steps, and a time during which it surely hits nothing, from `bend`.
 
 A safe step ends where a parabola above the level rises through 0, so no root is skipped.
 """

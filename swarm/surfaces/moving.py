@@ -1,17 +1,17 @@
 """The walls of a scene, some of which move.
 
-`at` and `during` make of them those at one instant, or over one step, which are surfaces like any other; a scene
-without motion has none of this around its walls and pays nothing.
+`at` and `during` make of them those at one instant, or over one step, which are surfaces like any other.
 """
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
 from ..kernel.record import Record
 from .drive import Drive, drive_of
-from .fold import Chain, Field
 from .posed import Drifting, Posed
 from .surface import Surface
+from .walls import Field, Walls
 
 
 class Driven(Record):
@@ -60,10 +60,22 @@ class Following(Record):
     body: Any
 
 
-class Carried(Record):
+class Carried(Walls):
     """The walls of a scene, some of which move, all of them uniformly."""
 
-    walls: Chain | Field
+    def at(self, left):
+        return self.during(left, left)
+
+    def during(self, left, after):
+        made: tuple[Any, ...] = ()
+        last: Any = None
+        for wall in self.walls:
+            last = _during(wall.members if isinstance(wall, Field) else wall, last, left, after)
+            made = (*made, Field(last) if isinstance(wall, Field) else last)
+        return Walls(made)
+
+    def in_steps(self):
+        return None
 
 
 class Marched(Carried):
@@ -74,25 +86,28 @@ class Strided(Marched):
     """The same where all of these steps are taken in lanes: see strides.py."""
 
 
+def _during(wall, last, left, after):
+    """A wall over a step; `last` is the one before it then."""
+    if isinstance(wall, Following):
+        return last._replace(body=wall.body)
+    return wall.during(left, after) if isinstance(wall, Moving) else wall
+
+
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float) -> Chain | Field | Carried | None:
+def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float) -> Walls:
     """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others."""
     of_surfaces = [walls_of(surface, moment) for surface in surfaces]
-    chain: Chain | Field | None = None
-    for wall in reversed([wall for walls in of_surfaces for wall in walls]):
-        chain = Chain(wall, chain)
-    for field in reversed(fields):
-        chain = Field(walls_of(field, moment)[0], chain)
-    if chain is None or all(surface.motion is None for surface in (*fields, *surfaces)):
-        return chain
+    all_walls = (*(Field(walls_of(field, moment)[0]) for field in fields), *itertools.chain(*of_surfaces))
+    if all(surface.motion is None for surface in (*fields, *surfaces)):
+        return Walls(all_walls)
     if fields:
-        return Marched(chain)
+        return Marched(all_walls)
     marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]
     if not marched:
-        return Carried(chain)
-    return (Strided if all(map(_may_stride, marched)) else Marched)(chain)
+        return Carried(all_walls)
+    return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
 
 
 def _may_stride(walls: list[Any]) -> bool:
@@ -106,30 +121,5 @@ def walls_of(surface: Surface, moment: float) -> list[Any]:
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)
-    uniform = drive.swings is None and drive.track is None and drive.turn is None
+    uniform = not drive.swings and drive.track is None and drive.turn is None
     return [(Translated if uniform else Moving)(first, drive), *map(Following, others)]
-
-
-# --- At one instant --------------------------------------------------------------------------------------
-
-
-def at(chain, left):
-    """The walls when so much of the frame is left [s]: themselves, where none moves."""
-    return during(chain, left, left)
-
-
-def during(chain, left, after):
-    """The walls over a step, at whose start and end so much of the frame is left [s]."""
-    return _during(chain.walls, None, left, after) if isinstance(chain, Carried) else chain
-
-
-def _during(chain, last, left, after):
-    """The walls of a chain; `last` is the one before them."""
-    if chain is None:
-        return None
-    wall, kind = chain.first, Field if isinstance(chain, Field) else Chain
-    if isinstance(wall, Following):
-        wall = last._replace(body=wall.body)
-    elif isinstance(wall, Moving):
-        wall = wall.during(left, after)
-    return kind(wall, _during(chain.rest, wall, left, after))

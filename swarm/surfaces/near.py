@@ -3,31 +3,30 @@
 import math
 
 from ..kernel.jit import outlined
-from .fold import Field, count, each, length
 
 
 def count_near(chain, r):
     """How many walls are near a point."""
-    if isinstance(chain, Field):
-        return chain.first.count_in_cell(r) + count_near(chain.rest, r)
-    return length(chain)
+    near = chain.others().length()
+    for _number, field in reversed(chain.fields()):
+        near = field.members.count_in_cell(r) + near
+    return near
 
 
 @outlined
-def list_near(chain, k, before, r, into):
-    """The numbers of the walls near a point into into[k:], of a chain that has so many walls before it."""
-    if isinstance(chain, Field):
-        listed = chain.first.list_in_cell(k, before, r, into)
-        list_near(chain.rest, k + listed, before + count(chain.first), r, into)
-    else:
-        for i in range(length(chain)):
-            into[k + i] = before + i
+def list_near(chain, r, into):
+    """The numbers of the walls near a point into `into`."""
+    k = 0
+    for number, field in chain.fields():
+        k += field.members.list_in_cell(k, number, r, into)
+    before = chain.count_in_fields()
+    for i in range(chain.others().length()):
+        into[k + i] = before + i
 
 
 def until_others(chain, r, v):
     """When a straight flight may meet a wall that is not near its start."""
     soonest = math.inf
-    for link in reversed(each(chain)):
-        if isinstance(link, Field):
-            soonest = min(link.first.until_next_cell(r, v), soonest)
+    for _number, field in reversed(chain.fields()):
+        soonest = min(field.members.until_next_cell(r, v), soonest)
     return soonest

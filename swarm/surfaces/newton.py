@@ -1,4 +1,4 @@
-"""What follows from `hessian`: steps in contact by Newton's method."""
+"""Steps in contact by Newton's method, from `hessian`."""
 
 import math
 
@@ -41,14 +41,9 @@ def _moved(surface, r0, p, kappa):
     return Vec(math.nan, math.nan, math.nan)
 
 
-def resolve(surface, r, strength):
-    """The point s with s + strength grad q(s) = r."""
-    return _resolved(surface, r, strength)
-
-
 @outlined
-def _resolved(surface, r, strength):
-    """The s of `resolve`; NaN where it does not converge."""
+def resolve(surface, r, strength):
+    """The point s with s + strength grad q(s) = r; NaN where it does not converge."""
     s, size, previous = r, largest(r), math.inf
     for _i in range(_ITERATIONS):
         g = surface.slope(s)

@@ -8,20 +8,21 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..kernel.jit import select
+from ..kernel.record import Record
 from . import required
 from .fields.many import Many
-from .fold import Chain, Field, chain_of, each, linked
 from .images import Lengths, images_of
 from .kinds import by_kind
 from .room import has_room
 from .surface import SIDES, Surface
+from .walls import Field, Walls, all_walls
 
 # Most walls that all openings of a scene may be compiled for.
 _MOST = 24
@@ -29,20 +30,23 @@ _MOST = 24
 _REACH = 2.0
 
 
-class Openings(NamedTuple):
-    """The volumes in which some walls are open, a Chain, and their numbers, from one to before another; then others."""
+class Opening(Record):
+    """The volumes in which some walls are open, each `Walls` or a `Field`."""
 
-    volumes: Any
-    first: float
-    last: float
-    rest: Any
+    volumes: tuple[Any, ...]
+    first: float  # the number of the first of these walls
+    last: float  # that of the first after them
+
+    def is_of(self, wall):
+        """Whether a wall is one of these."""
+        return (wall >= self.first) & (wall < self.last)
 
 
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]]) -> Openings | None:
-    """The openings of a chain as kernels take them, None where there are none.
+def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]]) -> tuple[Opening, ...] | None:
+    """The openings of the walls of a scene as kernels take them, None where there are none.
 
     `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece.
     """
@@ -51,16 +55,13 @@ def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Sur
     runs, number = [], 0
     for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
         first, number = number, number + sum(walls for _piece, walls in some)
-        runs += [(_chain_of(given), float(first), float(number))] if given else []
-    found: Openings | None = None
-    for run in by_kind(runs, lambda run: run[0]):
-        found = Openings(*run, found)
-    return found
+        runs += [Opening(_taken(given), float(first), float(number))] if given else []
+    return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
 
 
-def _chain_of(volumes: Sequence[Surface]) -> Any:
+def _taken(volumes: Sequence[Surface]) -> tuple[Any, ...]:
     ordered = reversed(by_kind(volumes, lambda volume: volume.walls()))
-    return linked(Field(one.members, None) if isinstance(one, Many) else chain_of([one]) for one in ordered)
+    return tuple(Field(one.members) if isinstance(one, Many) else all_walls([one]) for one in ordered)
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
@@ -157,26 +158,25 @@ def are_open(volumes: Sequence[Surface], points: NDArray[np.float64]) -> NDArray
 def outside(volume, r):
     """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
 
-    What is neither a `Chain` of walls nor a `Field` is the inside of one body of a field, whose admissible side is
-    outside of it.
+    What is neither `Walls` nor a `Field` is the inside of one body of a field, whose admissible side is outside of it.
     """
     if isinstance(volume, Field):
-        return -volume.first.deepest_in_cell(r)
-    if volume is not None and not isinstance(volume, Chain):
+        return -volume.members.deepest_in_cell(r)
+    if not isinstance(volume, Walls):
         return -volume.distance(r)
     farthest = -math.inf
-    for link in reversed(each(volume)):
-        here = link.first.distance(r)
+    for wall in reversed(volume.walls):
+        here = wall.distance(r)
         farthest = select(here <= farthest, farthest, here)
     return farthest
 
 
 def is_open(openings, wall, r, near):
     """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
-    if openings is None:
-        return False
-    found = False
-    for volume in reversed(each(openings.volumes)):
-        found = (outside(volume.first, r) <= near) | found
-    here = (wall >= openings.first) & (wall < openings.last) & found
-    return here | is_open(openings.rest, wall, r, near)
+    is_in_any = False
+    for opening in reversed(openings or ()):
+        found = False
+        for volume in reversed(opening.volumes):
+            found = (outside(volume, r) <= near) | found
+        is_in_any = (opening.is_of(wall) & found) | is_in_any
+    return is_in_any

@@ -13,9 +13,6 @@ from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
 from .axes import (
-    along_x,
-    along_y,
-    along_z,
     excess,
     fastest,
     image_of,
@@ -25,6 +22,7 @@ from .axes import (
     is_out,
     least,
     most,
+    pulls,
     room_along,
     time_to_leave,
 )  # fmt: skip
@@ -92,9 +90,9 @@ def cut(period, gravity, motion, left, hit):
     """The `Hit` of a flight (r, v), or that it leaves the cell before; `left` is the time until the frame ends."""
     if period is None:
         return hit
-    r, v = motion
-    x, y = time_to_leave(period.x, r.x, v.x, along_x(gravity)), time_to_leave(period.y, r.y, v.y, along_y(gravity))
-    z = time_to_leave(period.z, r.z, v.z, along_z(gravity))
+    (r, v), (gx, gy, gz) = motion, pulls(gravity)
+    x, y = time_to_leave(period.x, r.x, v.x, gx), time_to_leave(period.y, r.y, v.y, gy)
+    z = time_to_leave(period.z, r.z, v.z, gz)
     late = _EPSILON * left
     first, hit = over_faces(period.gaps, period, gravity, motion, (least(x, y, z), hit, 2.0 * late))
     # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
@@ -109,8 +107,8 @@ def cut(period, gravity, motion, left, hit):
 
 def _fastest(gravity, v, t):
     """The greatest speed along an axis, which is not exceeded within a time t."""
-    x, y = fastest(along_x(gravity), v.x, t), fastest(along_y(gravity), v.y, t)
-    return most(x, y, fastest(along_z(gravity), v.z, t))
+    gx, gy, gz = pulls(gravity)
+    return most(fastest(gx, v.x, t), fastest(gy, v.y, t), fastest(gz, v.z, t))
 
 
 def on_time(period, gravity, motion, left, time, room):

@@ -26,28 +26,9 @@ class Posed(Framed):
     left: float  # of the frame [s]
     after: float  # of the frame, at the end of the step [s]
 
-    # --- Of a field: see `Members` ---
-
-    def count(self):
-        return self.body.count()
-
     def wall(self, number):
+        """Of a field one of its walls."""
         return self._replace(body=self.body.wall(number))
-
-    def is_in_another(self, number, r):
-        return self.body.is_in_another(number, self.own_place(r))
-
-    def count_in_cell(self, r):
-        return self.body.count_in_cell(self.own_place(r))
-
-    def list_in_cell(self, k, before, r, into):
-        return self.body.list_in_cell(k, before, self.own_place(r), into)
-
-    def one_in_cell(self, k, r):
-        return self.body.one_in_cell(k, self.own_place(r))
-
-    def deepest_in_cell(self, r):
-        return self.body.deepest_in_cell(self.own_place(r))
 
     # --- The frame of the wall ---
 
@@ -216,27 +197,15 @@ class Posed(Framed):
 class Drifting(Posed):
     """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
 
-    def own_flight(self, r, v):
-        """Place and velocity of a particle in the frame of the wall."""
-        return r - self.pose.shift, v - self.pose.velocity
+    def velocity_in(self, v):
+        """A velocity in the frame of the wall."""
+        return v - self.pose.velocity
 
+    def vector_in(self, a):
+        """An acceleration there."""
+        return a
+
+    gravity_in = vector_in
     is_quartic = property(lambda self: self.body.is_quartic)
     may_be_far = property(lambda self: self.body.may_be_far)
-
-    def first_hit(self, r, v):
-        return self.body.first_hit(*self.own_flight(r, v))
-
-    def falling_hit(self, r, v, pull):
-        return self.body.falling_hit(*self.own_flight(r, v), pull)
-
-    def course(self, r, v, pull):
-        return self.body.course(*self.own_flight(r, v), pull)
-
-    def safe_time(self, r, v, pull):
-        return self.body.safe_time(*self.own_flight(r, v), pull)
-
-    def field_hit(self, gravity, r, v):
-        return self.body.field_hit(gravity, *self.own_flight(r, v))
-
-    def until_next_cell(self, r, v):
-        return self.body.until_next_cell(*self.own_flight(r, v))
+    safe_time = Framed.safe_time

@@ -1,8 +1,9 @@
 """A free flight in the frame of a wall that moves: where the particle is, and what bounds its way from there."""
 
+from typing import Any
+
 from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, norm, total
-from .drive import Drive
 
 
 class Flight(Record):
@@ -44,7 +45,7 @@ class Bounds(Record):
 class Seen(Record):
     """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
 
-    drive: Drive
+    drive: Any  # a `Drive`
     r: Vec
     v: Vec
     a: Vec

@@ -1,4 +1,4 @@
-"""What a surface must give for what is done with it: asked before anything is compiled, and said in one sentence.
+"""The methods that a surface lacks for its use: an error in one sentence, before anything is compiled.
 
 Which methods a definition in contract.py, march.py, approach.py or newton.py is made of is read from its code. One that
 has no definition there, such as `hessian`, must be given where it is asked for, or something that is made of it is.
@@ -14,7 +14,6 @@ from ..errors import SceneError
 from . import approach, march, newton
 from .contract import Smooth
 from .fields.members import Members
-from .fold import each
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface
@@ -69,12 +68,12 @@ def _asked_of(wall: Any, asked: tuple[str, ...]) -> Iterator[tuple[Any, tuple[st
     yield wall, asked
     if isinstance(wall, SolidNumbers):
         falls = tuple(one for one in asked if one in ("falling_hit", "safe_time"))
-        for link in each(wall.parts):
-            yield from _asked_of(link.first, (*_OF_PARTS, *falls))
+        for part in wall.parts:
+            yield from _asked_of(part, (*_OF_PARTS, *falls))
 
 
 def _lacking(wall: Any, name: str) -> Iterator[str]:
-    """What must be given before a method of a wall works."""
+    """The methods without which a method of a wall does not work."""
     if not isinstance(wall, Smooth):
         yield "the base class swarm.surfaces.contract.Smooth"
         return
@@ -108,7 +107,7 @@ def _definition(wall: Any, name: str) -> types.FunctionType:
         return _nothing  # type: ignore[return-value]
     if name in ("first_hit", "falling_hit"):
         return inspect.unwrap(approach.first_hit if wall.gives("near") else march.march)  # type: ignore[no-any-return]
-    return getattr(newton if name in ("push", "rise", "resolve") else Smooth, name)  # type: ignore[no-any-return]
+    return inspect.unwrap(getattr(newton if name in ("push", "rise", "resolve") else Smooth, name))  # type: ignore[no-any-return]
 
 
 def _nothing(*_asked: Any) -> None:

@@ -139,7 +139,12 @@ class Rotated(Framed):
         """A vector of the surface's own frame in the scene."""
         return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
 
-    place_in, place_out = vector_in, vector_out
+    place_in = velocity_in = vector_in
+    place_out = vector_out
+
+    def flat_normal(self):
+        n = self.body.flat_normal()
+        return None if n is None else self.vector_out(n)
 
     def gravity_in(self, gravity):
         """Gravity, or none, in the surface's own frame."""
@@ -150,7 +155,7 @@ class Rotated(Framed):
 
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:
-    """What kernels take of a surface whose own axes are these columns."""
+    """A surface whose own axes are these columns, as kernels take it."""
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)
@@ -160,5 +165,5 @@ def framed(axes: NDArray[np.float64], body: Any) -> Any:
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:
-    """What kernels take of a rotated surface; `body` has its centre in its own frame, `turned_back(turn, center)`."""
+    """A rotated surface as kernels take it; `body` has its centre in its own frame, `turned_back(turn, center)`."""
     return framed(matrix(turn), body)

@@ -3,8 +3,9 @@
 import math
 from typing import Any
 
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
-from ..kernel.jit import index, outlined, select
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from ..motion import Guide
@@ -14,13 +15,12 @@ from .fields.grid import cell_of
 from .fields.members import Members, member
 from .fields.moved import until_next_in_frame
 from .flights import NEVER, Hit, hit, sooner, soonest
-from .fold import Chain, Field, count, each
-from .moving import Driven, Following, Marched, Moving, Translated, at
+from .moving import Driven, Following, Marched, Moving, Translated
 from .posed import Drifting, Posed
 from .relative import flight_of
-from .rising import needs_bend, safe_step
 from .rotation import Rotated
 from .surface import Surface
+from .walls import Field, Walls
 
 _EPSILON = 2.220446049250313e-16
 # Safe steps of one flight; what is not found by then goes on in the next pass.
@@ -51,17 +51,14 @@ _NOBODY = Nearest(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 def seen_by_walls(chain, flight, t):
     """(wall, its number, `Seen`) of each wall in no field that is met by safe steps, last to first."""
     found: Any = ()
-    number, seen = 0.0, None
-    for link in each(chain):
-        wall = link.first
-        if isinstance(link, Field):
-            number += count(wall)
+    seen = None
+    for number, wall in chain.numbered():
+        if isinstance(wall, Field):
             continue
         if not isinstance(wall, Following):
             seen = wall.seen(flight, t) if isinstance(wall, Driven) else None
         if seen is not None:
             found = ((wall, number, seen), *found)
-        number += 1.0
     return found
 
 
@@ -70,23 +67,18 @@ def _nearest(chain, flight, t, longest):
     found = _NOBODY
     for wall, number, seen in seen_by_walls(chain, flight, t):
         found = _nearer(seen, wall.body, number, found, longest)
-    return _nearest_of_fields(chain, 0.0, found, flight, t, longest)
-
-
-def _nearest_of_fields(chain, number, found, flight, t, longest):
-    """The `Nearest` of the bodies of all fields and what is found."""
-    if not isinstance(chain, Field):
-        return found
-    field = chain.first
-    found = _nearest_of_fields(chain.rest, number + count(field), found, flight, t, longest)
-    if not isinstance(field, Moving) or isinstance(field, Translated):
-        return found
-    return _nearest_in_cell(field, number, found, flight, t, longest)
+    for number, field in reversed(chain.fields()):
+        if isinstance(field.members, Moving) and not isinstance(field.members, Translated):
+            found = _nearest_in_cell(field.members, number, found, flight, t, longest)
+    return found
 
 
 @outlined
 def _nearest_in_cell(field, number, found, flight, t, longest):
-    """The same by the bodies of the cell in which a particle is then; to leave the cell ends a step, but is no hit."""
+    """The nearest of what is found and the bodies of the cell in which a particle is then.
+
+    To leave the cell ends a step, but is no hit.
+    """
     grid, seen = field.body.grid, field.seen(flight, t)
     until = until_next_in_frame(grid, seen, min(found.time, longest))
     if until < found.time:
@@ -100,7 +92,7 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
 
 def _nearer(seen, body, number, rest, longest):
     """The `Nearest` of one wall and the rest."""
-    step = safe_step(body, seen, longest)
+    step = body.moving_step(seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
     speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
@@ -157,7 +149,7 @@ def _needs_steps(surface: Surface) -> bool:
     if surface.motion is None:
         return False
     drive = drive_of(surface, 0.0)
-    return drive.swings is not None or drive.track is not None or drive.turn is not None
+    return bool(drive.swings) or drive.track is not None or drive.turn is not None
 
 
 def _is_unknown(wall: Any) -> bool:
@@ -165,7 +157,7 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
-    return needs_bend(wall) and not wall.gives("bend")
+    return wall.needs_bend and not wall.gives("bend")
 
 
 # --- Free time -------------------------------------------------------------------------------------------
@@ -176,11 +168,11 @@ def free_time(chain, gravity, r, v, left):
 
     0 for a particle that is in contact now.
     """
-    now, time = at(chain, left), math.inf
+    now, time = chain.at(left), math.inf
     if not isinstance(chain, Marched):
         return flights.free_time(gravity, now, r, v)
-    for link in reversed(each(now)):
-        here = _free_of(link.first, gravity, r, v)
+    for wall in reversed(now.walls):
+        here = _free_of(wall, gravity, r, v)
         time = select(time < here, time, here)
     return time
 
@@ -188,9 +180,9 @@ def free_time(chain, gravity, r, v, left):
 def _free_of(surface, gravity, r, v):
     """The free time of one wall."""
     if not _is_marched(surface):
-        return flights.free_time(gravity, Chain(surface, None), r, v)
+        return flights.free_time(gravity, Walls((surface,)), r, v)
     # One safe step: of a flight of many steps the next one begins nearer to the wall.
-    step = safe_step(surface.body, _seen_now(surface, gravity, r, v), surface.left)
+    step = surface.body.moving_step(_seen_now(surface, gravity, r, v), surface.left)
     return select(step.level > 0.0, 0.0, step.time)
 
 
@@ -211,9 +203,9 @@ def _seen_now(surface, gravity, r, v):
 @outlined
 def first_hit(chain, gravity, r, v, left):
     """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
-    found = closed_hit(at(chain, left), gravity, r, v)
+    found = closed_hit(chain.at(left), gravity, r, v)
     longest = select(found.time < left, found.time, left)
-    met = march(chain.walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
+    met = march(chain, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
     return found
@@ -222,28 +214,28 @@ def first_hit(chain, gravity, r, v, left):
 def closed_hit(chain, gravity, r, v):
     """The first hit with the walls that have a closed form."""
     found = NEVER
-    for link in reversed(each(chain)):
-        wall, closed = link.first, not _is_marched(link.first)
-        if isinstance(link, Field):
-            found = soonest(wall.field_hit(gravity, r, v) if closed else NEVER, found, count(wall))
+    for number, wall in reversed(chain.numbered()):
+        if isinstance(wall, Field):
+            closed = not _is_marched(wall.members)
+            found = soonest(wall.members.field_hit(gravity, r, v) if closed else NEVER, number, found)
         else:
-            time, meets = hit(gravity, wall, r, v) if closed else (math.inf, True)
-            found = sooner(time, meets, found)
+            time, meets = (math.inf, True) if _is_marched(wall) else hit(gravity, wall, r, v)
+            found = sooner(time, meets, number, found)
     return found
 
 
 @outlined
 def _alone(surface, r, v, pull):
     """When a flight leaves the admissible side of this wall: (time, whether it does then)."""
-    found = march(Chain(Moving(surface.body, surface.drive), None), flight_of(r, v, pull, surface.left), surface.left)
+    found = march(Walls((Moving(surface.body, surface.drive),)), flight_of(r, v, pull, surface.left), surface.left)
     return found.time, found.wall >= 0.0
 
 
 @outlined
 def _field_alone(field, r, v, pull):
     """The first hit of a flight with the bodies of a field, or how far it is surely free."""
-    chain = Field(Moving(field.body, field.drive), None)
-    return march(chain, flight_of(r, v, pull, field.left), field.left)
+    alone = Walls((Field(Moving(field.body, field.drive)),))
+    return march(alone, flight_of(r, v, pull, field.left), field.left)
 
 
 def _first_hit_of_field(members, gravity, r, v):

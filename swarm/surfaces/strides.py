@@ -11,10 +11,9 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import select
 from ..kernel.vector import ZERO
 from .flights import Hit
-from .fold import each
-from .moving import Moving, at
+from .moving import Moving
 from .relative import flight_of
-from .rising import Known, level_of
+from .rising import Known
 from .safe import closed_hit, seen_by_walls
 
 _EPSILON = 2.220446049250313e-16
@@ -27,7 +26,7 @@ _AHEAD = 32.0
 
 def begin(chain, gravity, course, lane, r, v, left):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
-    found = closed_hit(at(chain, left), gravity, r, v)
+    found = closed_hit(chain.at(left), gravity, r, v)
     course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
     course[_CLOSED, lane], course[_OTHER, lane] = found.time, found.wall
 
@@ -38,10 +37,10 @@ def stride(chain, gravity, course, lane, r, v, left, is_first):
     longest = select(closed < left, closed, left) - t
     flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), left)
     known = tuple(
-        (number, Known(wall.body, seen, level_of(wall.body, seen)))
-        for wall, number, seen in seen_by_walls(chain.walls, flight, t)
+        (number, Known(wall.body, seen, wall.body.level_along(seen)))
+        for wall, number, seen in seen_by_walls(chain, flight, t)
     )
-    within, ahead = _first_rise(known), _AHEAD * _pace(chain.walls)
+    within, ahead = _first_rise(known), _AHEAD * _pace(chain)
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
     time, wall, meets = _first_stride(known, within, is_first)
@@ -62,8 +61,8 @@ def end(course, lane):
 def _pace(chain):
     """The shortest pace of all walls that move."""
     shortest = math.inf
-    for link in reversed(each(chain)):
-        mine = link.first.drive.pace if isinstance(link.first, Moving) else math.inf
+    for wall in reversed(chain.walls):
+        mine = wall.drive.pace if isinstance(wall, Moving) else math.inf
         shortest = select(mine < shortest, mine, shortest)
     return shortest
 

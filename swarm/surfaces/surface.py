@@ -1,4 +1,4 @@
-"""What a surface is for a user: a description, checked. The functions of its numbers are in contract.py."""
+"""A surface as users describe it, checked. As kernels take it, it is a record: see contract.py."""
 
 import math
 from collections.abc import Iterable
@@ -98,11 +98,11 @@ class Surface:
         return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in said)})"
 
     def numbers(self) -> Any:
-        """The NamedTuple of numbers that kernels take in place of this description, before it is rotated."""
+        """The record that kernels take in place of this description, before it is rotated."""
         raise NotImplementedError
 
     def walls(self) -> tuple[Any, ...]:
-        """What kernels take: one tuple for a smooth surface, one for each smooth part of a cavity with edges."""
+        """As kernels take it: one record for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
 
     def reacts(self) -> bool:
@@ -239,6 +239,11 @@ def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:
     tilts = np.where(abs(axes) > TILT, axes, 0.0)
     x, y, z = (math.hypot(*(n * a for n, a in zip(row, semi_axes, strict=True) if n)) for row in tilts.tolist())
     return x, y, z
+
+
+def shown(point: Any) -> str:
+    """A point as errors write it."""
+    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"
 
 
 def farthest(point: Vector) -> float:

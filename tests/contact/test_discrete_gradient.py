@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.contact import discrete_gradient as forms
-from swarm.contact.records import Step
+from swarm.contact.impulse import Step
 from swarm.kernel.vector import vec
 
 SMOOTH = [law for law in LAWS.values() if exponent_of(law) > 1.0]

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from swarm.contact import impulse
 from swarm.contact import regularisation as laws
-from swarm.contact.records import Step
+from swarm.contact.impulse import Step
 from swarm.kernel.vector import Vec, vec
-from swarm.surfaces.fold import Chain
+from swarm.surfaces.walls import Walls
 
 mp.mp.dps = 50
 some_laws = pytest.mark.parametrize("law", [LAWS["1.0"], LAWS["1.5"], LAWS["2.0"]], ids=["1", "1.5", "2"])
@@ -98,7 +98,7 @@ class Contact:
         return self.start + self.free
 
     def careful(self):
-        return call(impulse.careful, self.law, None, self.surface, self.step())
+        return call(impulse.equation(self.law, None, self.surface, self.step()).careful)
 
 
 @every_quadric
@@ -132,7 +132,7 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
     """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""
     step = Contact(name, law, **step, reachable=True)
-    chain = Chain(step.surface, None)
+    chain = Walls((step.surface,))
     expected, _ = step.careful()
     kappa, unsolved = call(impulse.guess, chain, 0, law, step.step()), True
     for _ in range(impulse.NEWTON_STEPS):
@@ -156,7 +156,7 @@ def test_a_free_step_has_no_impulse(name, law):
 def test_a_head_on_plane_by_hand(law):
     """Fully inside the wall at both ends (K) is kappa = c V[g0, g1] with g1 = g0 + p - kappa."""
     numbers, c, g0, p = numbers_of("plane")._replace(normal=Vec(1.0, 0.0, 0.0), offset=0.0), 1e-4, 0.2, 0.1
-    kappa, solved = call(impulse.careful, law, None, numbers, Step(Vec(g0, 0.0, 0.0), Vec(p, 0.0, 0.0), c))
+    kappa, solved = call(impulse.equation(law, None, numbers, Step(Vec(g0, 0.0, 0.0), Vec(p, 0.0, 0.0), c)).careful)
     assert solved
     assert kappa == pytest.approx(c * call(law.energy_slope, g0, g0 + p - kappa)[0], rel=8 * EPSILON)
     if isinstance(law, laws.Linear):

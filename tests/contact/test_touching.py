@@ -9,7 +9,7 @@ from conftest import EPSILON, SURFACES, call, wall_point
 import swarm
 from swarm.contact import projection
 from swarm.kernel.vector import vec
-from swarm.surfaces.fold import chain_of
+from swarm.surfaces.walls import all_walls
 
 # Normals: in any direction, in nearly the same one, or nearly in one of two opposite ones, as in a cusp.
 SPREADS = ["any", *itertools.product(("same", "opposite"), (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8))]
@@ -92,7 +92,7 @@ def test_a_sliding_step_keeps_the_energy(name):
             point = wall_point(surface.walls()[0], random.uniform(-0.5, 0.5, 3))
             normal = random.standard_normal(3)
             plane = swarm.Plane(normal, float(normal @ point) / float(np.linalg.norm(normal)))
-            chain = chain_of([surface, plane][:count])
+            chain = all_walls([surface, plane][:count])
             w = random.standard_normal(3)
             number, none = np.arange(count, dtype=float), np.zeros(count)
             touch = projection.Touch(number, np.ones(count, bool), np.zeros((3, count)), none.copy(), none, None)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.contact import uzawa
-from swarm.contact.records import Step
+from swarm.contact.impulse import Step
 from swarm.contact.regularisation import regularisation
 from swarm.kernel.vector import vec
-from swarm.surfaces import fold as walls
+from swarm.surfaces.walls import Walls, all_walls
 
 few = settings(max_examples=3)
 ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
@@ -34,7 +34,7 @@ class Loop:
 
     def __init__(self, surfaces, start, free, acceleration="none", tolerance=1e-28, max_sweeps=300, c=C, exponent=1.0):
         self.law, self.c = regularisation(ALPHA, exponent), c
-        self.chain = walls.chain_of(tuple(surfaces))
+        self.chain = all_walls(surfaces)
         self.method = swarm.AugmentedLagrangian(
             1.0, ALPHA, exponent, tolerance=tolerance, max_sweeps=max_sweeps, acceleration=acceleration
         ).numbers(swarm.Scene([swarm.Sphere(1.0)]))
@@ -42,7 +42,7 @@ class Loop:
         self.start, self.free = np.array(start), np.array(free)
 
     def run(self):
-        reactions = np.zeros((walls.length(self.chain), 4))
+        reactions = np.zeros((self.chain.length(), 4))
         with np.errstate(all="ignore"):
             loop = uzawa.loop(self.method, self.law, self.chain, self.step, reactions)
         self.end, self.sweeps, self.stored, self.converged = np.array(loop.r), loop.sweeps, loop.stored, loop.converged
@@ -240,7 +240,7 @@ def test_the_reflection_multiplier_is_the_fixed_point():
     for name in ("sphere", "ball", "ellipsoid", "egg", "plane"):
         surface, start, free = state_one(name, [0.4, -0.7, 0.5], np.array([0.3, 0.5, -0.6]), 0.8, 0.03)
         c = stiff(surface, start)
-        chain, law = walls.Chain(surface, None), regularisation(ALPHA, 1.0)
+        chain, law = Walls((surface,)), regularisation(ALPHA, 1.0)
         kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, step_of(start, free, c))
         assert kappa == pytest.approx(chord_of(surface, start, free), rel=1e-6)
         loop = Loop([Described(surface)], start, free, c=c).run()

@@ -31,7 +31,7 @@ from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import column, square, vec
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.fold import chain_of
+from swarm.surfaces.walls import all_walls
 
 pytestmark = pytest.mark.long
 
@@ -237,7 +237,7 @@ def test_no_first_hit_is_missed(name, side, falls, capsys):
     tally = Tally()
     for seed, scale in enumerate(SCALES):
         surface = surface_of(name, side, scale)
-        chain = chain_of([surface])
+        chain = all_walls([surface])
         position, velocity, pull = flights(surface, scale, FLIGHTS // len(SCALES), falls, seed)
         for leg in range(LEGS):
             times, index = np.empty(position.shape[1]), np.empty(position.shape[1])

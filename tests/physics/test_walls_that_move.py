@@ -16,7 +16,6 @@ from swarm.kernel.vector import ZERO, Vec, vec
 from swarm.lanes import block
 from swarm.motion import pose
 from swarm.surfaces import safe
-from swarm.surfaces.moving import at
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)
@@ -414,8 +413,7 @@ def test_threads_and_blocks_change_no_bit(motion):
 
 def test_the_walls_of_a_chain_at_an_instant():
     scene = swarm.Scene([CAVITIES["sphere"](None)])
-    assert at(scene.chain(), 0.3) is not None
-    assert at(scene.chain(), 0.3) == scene.chain()
+    assert scene.chain().at(0.3) == scene.chain()
 
 
 # --- Bad input, and walls that close ---------------------------------------------------------------------

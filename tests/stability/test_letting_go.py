@@ -65,18 +65,18 @@ def test_it_flies_on_along_the_tangent(surface, center, restitution, pull, monke
 
 def test_the_steps_of_that_flight_are_few(monkeypatch):
     """From the place where it lets go to 1e-6 off the wall: some hundreds, not 1e-16 of the time each."""
-    count, one = [0], flight._safe_step
+    count, one = [0], flight.SampledNumbers._safe_step
 
     def counted(*arguments):
         count[0] += 1
         return one(*arguments)
 
-    monkeypatch.setattr(flight, "_safe_step", counted)
+    monkeypatch.setattr(flight.SampledNumbers, "_safe_step", counted)
     center = (0.37, -0.21, 0.43)
     wall, r = sampled(center, 0.9).walls()[0], Vec(*center)
     v, g = Vec(1.0, 0.0, -8.9e-16), Vec(0.0, 1.0, 0.0)
     for _pass in range(20):
-        time, found = flight.march(wall, r, v, g)
+        time, found = wall.march(r, v, g)
         assert not found
         r, v = r + time * (v + (0.5 * time) * g), v + time * g
         if center[2] + K * (r.x - center[0]) ** 3 - r.z > 1e-6:

@@ -6,7 +6,7 @@ from conftest import call
 
 import swarm
 from swarm.contact import impulse
-from swarm.contact.records import Step
+from swarm.contact.impulse import Step
 from swarm.contact.regularisation import regularisation
 from swarm.kernel.vector import vec
 
@@ -52,7 +52,7 @@ def taken(axes, start, free, alpha):
     """The root that a contact takes."""
     (numbers,) = swarm.Ellipsoid(tuple(axes)).walls()
     step = Step(vec(start), vec(free), np.float64(1.0))
-    kappa, solved = call(impulse.careful, regularisation(alpha, 1.0), None, numbers, step)
+    kappa, solved = call(impulse.equation(regularisation(alpha, 1.0), None, numbers, step).careful)
     assert solved
     return kappa
 

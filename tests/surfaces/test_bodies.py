@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import swarm
 from swarm.surfaces import rotation
 from swarm.surfaces.flights import first_hit
-from swarm.surfaces.fold import chain_of
 from swarm.surfaces.shapes.plane import PlaneNumbers
 from swarm.surfaces.shapes.slab import SlabNumbers
+from swarm.surfaces.walls import all_walls
 
 TURN = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
 CENTER = (0.3, -0.2, 0.1)
@@ -39,7 +39,7 @@ def inside_by_hand(surface, points):
 
 
 def hit(surface, position, velocity):
-    return call(first_hit, chain_of([surface]), None, position, velocity)
+    return call(first_hit, all_walls([surface]), None, position, velocity)
 
 
 @pytest.mark.parametrize("side", ["inside", "outside"])

@@ -12,7 +12,7 @@ from numba.core.errors import TypingError
 
 import swarm
 from swarm.kernel import cache, jit
-from swarm.kernel.parts import deep
+from swarm.kernel.compilers import deep
 from swarm.kernel.trace import helpers
 from swarm.run.admission import task_of
 from swarm.run.engine import Run
@@ -113,7 +113,7 @@ def test_what_cannot_be_traced_is_compiled_by_numba(function, decorator, left):
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert bits(direct(2.0)) == bits(expected(function))
-    reason = left[function.__name__]
+    reason = left[f"{__name__}.{function.__name__}"]
     first = function.__code__.co_firstlineno
     assert LEFT[function] in reason
     assert any(f"{__file__}, line {line}" in reason for line in range(first, first + 12)), reason
@@ -142,7 +142,7 @@ def test_nothing_stays_of_a_trace_that_was_given_up(left):
     row = np.zeros(2)
     assert numba.njit(**FLAGS)(cache.calling(jit.inlined(calls)))(row) == 2.0
     assert row.tolist() == [1.0, 1.0]
-    assert "writes_and_gives_up" in left
+    assert f"{__name__}.writes_and_gives_up" in left
 
 
 def asks_a_stranger(a):
@@ -173,13 +173,13 @@ def test_what_neither_can_do_is_said_in_one_sentence(function, said, left):
 def test_a_kernel_that_cannot_be_traced_is_compiled(tmp_path, monkeypatch, left):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     assert jit.kernel(loop_with_else)(1.0) == 3.0
-    assert "loop_with_else" in left
+    assert f"{__name__}.loop_with_else" in left
 
 
 def test_an_integer_that_no_kernel_holds(left):
     helper = jit.inlined(copied(of_large_numbers))
     assert numba.njit(**FLAGS)(cache.calling(helper))(np.uint64(3)) == 3
-    assert "more than 64 bits" in left["of_large_numbers"]
+    assert "more than 64 bits" in left[f"{__name__}.of_large_numbers"]
 
 
 def of_large_numbers(a):

@@ -19,7 +19,7 @@ from numba.core.typing.templates import Signature
 from test_helpers import loop_with_else
 
 import swarm
-from swarm.kernel import cache, jit, parts
+from swarm.kernel import cache, compilers, jit
 from swarm.kernel.internals import ALL
 
 pytestmark = compiled_only
@@ -214,16 +214,16 @@ def a_kernel(x):
 
 
 def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
-    """And each of the hooks of `parts.py` is called."""
+    """And each of the hooks of `compilers.py` is called."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     asked = []
-    ours = parts._Kernel._optimize_functions
+    ours = compilers._Kernel._optimize_functions
 
     def seen(self, module):
         asked.append(sum(not function.is_declaration for function in module.functions))
         ours(self, module)
 
-    monkeypatch.setattr(parts._Kernel, "_optimize_functions", seen)
+    monkeypatch.setattr(compilers._Kernel, "_optimize_functions", seen)
     kernel = jit.kernel(a_kernel)
     assert kernel(1.0) == 4.0
     assert asked
@@ -234,9 +234,9 @@ def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_pat
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
     made = []
     for step in ("_optimize_final_module", "_finalize_final_module", "get_pointer_to_function"):
-        ours = getattr(parts._Part, step)
+        ours = getattr(compilers._Part, step)
         monkeypatch.setattr(
-            parts._Part, step, lambda self, *given, ours=ours, step=step: made.append(step) or ours(self, *given)
+            compilers._Part, step, lambda self, *given, ours=ours, step=step: made.append(step) or ours(self, *given)
         )
     helper = jit.inlined(loop_with_else)
     assert jit.kernel(calls_it)(1.0) == 3.0

@@ -211,8 +211,8 @@ def test_a_function_without_source():
             return a * 3.0
         calls = numba.njit(lambda a: (found(a), straight(a)))
         assert calls(2.0) == (4.0, 6.0) and calls(1.0) == (-1.0, 3.0)
-        assert helpers.left_to_numba.keys() == {"found", "straight"}
-        assert "the source of found is not known" in helpers.left_to_numba["found"]
+        assert helpers.left_to_numba.keys() == {"__main__.found", "__main__.straight"}
+        assert "the source of found is not known" in helpers.left_to_numba["__main__.found"]
     """)
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from swarm.kernel import cache, jit
-from swarm.kernel.jit import inlined, outlined, scratch
+from swarm.kernel.arrays import scratch
+from swarm.kernel.jit import inlined, outlined
 from swarm.kernel.trace import helpers
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing is traced")

@@ -22,7 +22,7 @@ from .part import Part, key_of
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
-# Why helpers are compiled by Numba, by their names.
+# Why helpers are compiled by Numba, by their modules and names.
 left_to_numba: dict[str, str] = {}
 
 
@@ -119,9 +119,8 @@ def _tell(function: Any, error: Exception) -> None:
     frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
     code = inspect.unwrap(function).__code__
     places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]
-    left_to_numba.setdefault(
-        function.__name__, f"{type(error).__name__}: {error} ({places[-1][0]}, line {places[-1][1]})"
-    )
+    reason = f"{type(error).__name__}: {error} ({places[-1][0]}, line {places[-1][1]})"
+    left_to_numba.setdefault(f"{function.__module__}.{function.__name__}", reason)
     _LOG.debug("%s is compiled by Numba: %s", function.__name__, error, exc_info=error)
 
 

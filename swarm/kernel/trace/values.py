@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import typeof, types
 from numba.core.datamodel.registry import default_manager
+from numba.core.errors import NumbaError
 from numba.core.typing.templates import Signature
 
 from .notes import Attribute, Call, Element
@@ -199,7 +200,7 @@ def kind_of(value: Any) -> Any:
         raise TraceError("a variable may be used before it has a value, or has values of several kinds")
     try:
         return types.unliteral(typeof(value))
-    except Exception:
+    except (ValueError, NumbaError):
         raise TraceError(f"it uses {value!r:.60}, which no kernel has") from None
 
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from ...kernel.jit import long_kernel, next_of, scratch, select
+from ...kernel.arrays import next_of, scratch
+from ...kernel.jit import long_kernel, select
 from ...kernel.vector import column
 from ...status import Status
-from ...surfaces import fold as walls
 from . import impact, impact_time, prescribed
 from .arrays import PACES, Held, Lanes, Pace, arrays_of_held, shapes_of_lanes
 from .newton import solve
@@ -248,12 +248,12 @@ def _look(contacts, scene, c):
                         for i in range(count):
                             c[x, i] += b * r1[3 * q + x, i]
         for i in range(count):
-            pace.out[i] = pace.out[i] | walls.outside(scene, -1.0, column(c, 0, i))
+            pace.out[i] = pace.out[i] | scene.outside(-1.0, column(c, 0, i))
     # What a point carries is looked at one body after the other: a wall of thousands of bodies is none of theirs.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):
-            pace.out[i] = pace.out[i] | (walls.distance(contacts.chain, wall, touching.place(r1, k, i)) > 0.0)
+            pace.out[i] = pace.out[i] | (contacts.chain.distance(wall, touching.place(r1, k, i)) > 0.0)
 
 
 def _commit(contacts):

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...kernel.jit import outlined
 from ...kernel.vector import Vec, column, cross, dot, norm, put
-from ...surfaces import fold as walls
 from .constraints import Constrained
 
 # A contact this many times round-off away from its wall is at it.
@@ -139,8 +138,8 @@ class Contacts(Constrained):
             met = touching.span(k)
             for j in range(count_at(chain, met, c)):
                 w = wall_at(chain, met, j, c)
-                if found < MOST_CONTACTS and walls.distance(chain, float(w), c) >= -NEAR * self.rule.room:
-                    n = walls.unit_normal(chain, float(w), c)
+                if found < MOST_CONTACTS and chain.distance(float(w), c) >= -NEAR * self.rule.room:
+                    n = chain.unit_normal(float(w), c)
                     # What is left of an approach by round-off is none.
                     if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
                         name[found, 0], name[found, 1] = k, w
@@ -157,35 +156,31 @@ class Contacts(Constrained):
 def count_at(chain, span, c):
     """How many walls of a span a point may be at: of a field those of its cell."""
     first, last = span
-    fields = _fields(chain)
+    fields = chain.fields()
     if len(fields) == 0 or first > 0:
         return last - first
     found = 0
-    for link in reversed(fields):
-        found = int(link.first.count_in_cell(c)) + found
-    return found + last - int(walls.count_in_fields(chain))
+    for _number, field in reversed(fields):
+        found = int(field.members.count_in_cell(c)) + found
+    return found + last - int(chain.count_in_fields())
 
 
 def wall_at(chain, span, j, c):
     """One of these walls."""
-    if len(_fields(chain)) == 0 or span[0] > 0:
+    if len(chain.fields()) == 0 or span[0] > 0:
         return span[0] + j
-    return _wall_of_cells(chain, j, 0, c)
-
-
-def _fields(chain):
-    return tuple(link for link in walls.each(chain) if isinstance(link, walls.Field))
+    return _wall_of_cells(chain, j, c)
 
 
 @outlined
-def _wall_of_cells(chain, j, before, c):
-    """The same of a chain that has so many walls before it."""
-    if not isinstance(chain, walls.Field):
-        return before + j
-    here = int(chain.first.count_in_cell(c))
-    if j < here:
-        return before + int(chain.first.one_in_cell(j, c))
-    return _wall_of_cells(chain.rest, j - here, before + int(walls.count(chain.first)), c)
+def _wall_of_cells(chain, j, c):
+    """The same of a scene with fields."""
+    for number, field in chain.fields():
+        here = int(field.members.count_in_cell(c))
+        if j < here:
+            return int(number) + int(field.members.one_in_cell(j, c))
+        j = j - here
+    return int(chain.count_in_fields()) + j
 
 
 # --- Small arrays of one lane ----------------------------------------------------------------------------

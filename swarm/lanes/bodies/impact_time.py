@@ -4,7 +4,6 @@ import math
 
 from ...kernel.jit import outlined
 from ...kernel.vector import dot
-from ...surfaces import fold as walls
 from .contacts import NEAR, count_at, wall_at
 
 # The action of a lane after a trial.
@@ -43,10 +42,10 @@ def look(bodies, i, larger):
         c, met = touching.place(lanes.r1, k, i), touching.span(k)
         for j in range(count_at(chain, met, c)):
             w = wall_at(chain, met, j, c)
-            gap = walls.distance(chain, float(w), c)
+            gap = chain.distance(float(w), c)
             worst = max(worst, gap)
             if not gap <= room:
-                rate = dot(walls.unit_normal(chain, float(w), c), touching.place(lanes.v1, k, i))
+                rate = dot(chain.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
                 time = tau - gap / rate if rate > 0.0 else 0.0
                 if wall < 0 or time < first:
                     first, point, wall = time, k, w
@@ -59,7 +58,7 @@ def look(bodies, i, larger):
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
-        start = walls.distance(chain, float(wall), touching.place(lanes.r, point, i))
+        start = chain.distance(float(wall), touching.place(lanes.r, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
     closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]

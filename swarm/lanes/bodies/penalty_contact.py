@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import ZERO, column, square
-from ...surfaces import fold as walls
 from . import impact_time
 from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, solve_dense
 
@@ -39,16 +39,22 @@ def _gap_of(surface, r):
     return surface.gap_of(surface.inner(r))
 
 
+def _normal(chain, wall, r0, r1):
+    """The discrete gradient of the gap of a wall."""
+    return chain.of(wall, ZERO, _normal_of, r0, r1)
+
+
+def _gap(chain, wall, r):
+    """The gap of a wall."""
+    return chain.of(wall, 0.0, _gap_of, r)
+
+
 # From this correction on the equations may be worse by the factor, in units of round-off.
 _PATIENT, _LARGER = 30, 1e2
 # An error of the square of a length is round-off up to this many units.
 _ROUND_OFF = 8.0
 # By how much the directions of ties may still change, in units of round-off of a place.
 _SETTLED = 8.0
-
-# The discrete gradient of a gap, and the gap.
-_normal = walls.of_wall(_normal_of, ZERO)
-_gap = walls.of_wall(_gap_of, 0.0)
 
 
 class SoftContacts(Contacts):

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...kernel.jit import outlined, scratch
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
 from ...kernel.vector import dot, norm
-from ...surfaces import fold as walls
 from . import impact, impact_time
 from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, missing, put_direction, put_frame, rubbing
 
@@ -64,7 +64,7 @@ class HardContacts(Contacts):
         for a in range(self.pace.held[i]):
             k, wall = held.name[i, a, 0], held.name[i, a, 1]
             y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
-            n = walls.step_normal(self.chain, float(wall), y0, y1)
+            n = self.chain.step_normal(float(wall), y0, y1)
             if touching.friction[wall] > 0.0:
                 t = direction(frame, a, 1)
                 t = t - dot(t, n) * n
@@ -87,7 +87,7 @@ class HardContacts(Contacts):
             for d in range(wide):
                 gap[wide * a + d] = dot(direction(held.frame[i], a, d), y1 - y0)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
-            away = walls.distance(self.chain, float(wall), y0)
+            away = self.chain.distance(float(wall), y0)
             gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
             off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)
@@ -105,7 +105,7 @@ class HardContacts(Contacts):
         pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
     def gap_gradient(self: Any, wall, y):
-        return walls.unit_normal(self.chain, wall, y)
+        return self.chain.unit_normal(wall, y)
 
     @outlined
     def judge(self: Any, i):
@@ -118,7 +118,7 @@ class HardContacts(Contacts):
         number, pushes = pace.body[i], False
         for a in range(pace.held[i]):
             pushes = pushes or held.press[i, 3 * a] > 0.0
-            state.impulse[walls.row(self.chain, float(held.name[i, a, 1])), number] += held.impulse[i, a]
+            state.impulse[self.chain.row(float(held.name[i, a, 1])), number] += held.impulse[i, a]
         state.dissipated[number] += held.lost[i]
         state.sliding[number] += pace.step[i]
         if not pushes:

@@ -35,7 +35,7 @@ _PARTS = 4.0
 
 
 class Cells(Record):
-    """What is known of each cell, in few bytes: a flight comes through many."""
+    """Each cell in few bytes: a flight comes through many."""
 
     clear: Array  # uint8 (cells along x, y, z): 0 if the surface may be in it, else 1 + the clearance/unit
     unit: float  # [m]

@@ -1,13 +1,12 @@
 """Whether particles stay where all surfaces are known."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ..surface import Surface
+from ..surface import Surface, shown
 
 # Of the width of a box, by how much particles may leave it: round-off.
 _ROUND_OFF = 1e-9
@@ -32,11 +31,7 @@ def require_known(
         if surface.motion is not None or not ((low >= first - room).all() and (high <= last + room).all()):
             raise SceneError(
                 f"surfaces[{i}] must be known wherever particles go, got {surface}, which reaches the border of its "
-                f"grid, from {_shown(first)} to {_shown(last)}, while the surfaces that do not move keep particles "
-                f"from {_shown(low)} to {_shown(high)}; sample it in a larger box, check that phi is below 0 inside, "
+                f"grid, from {shown(first)} to {shown(last)}, while the surfaces that do not move keep particles "
+                f"from {shown(low)} to {shown(high)}; sample it in a larger box, check that phi is below 0 inside, "
                 "or add surfaces that keep particles in the grid"
             )
-
-
-def _shown(point: Any) -> str:
-    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"

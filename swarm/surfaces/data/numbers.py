@@ -1,17 +1,83 @@
-"""What kernels know of a sampled surface: its level set."""
+"""A sampled surface as kernels take it: its level set, and what is known of its cells."""
 
 import math
+from typing import NamedTuple
 
-from ...kernel.vector import ZERO, absolute, dot, norm, times, total
+import numpy as np
+
+from ...kernel.arrays import index
+from ...kernel.jit import outlined, select
+from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
-from . import flight
-from . import spline as splines
-from .cells import Cells
-from .spline import Spline
+from ..course import rise_time
+from .cells import SPREAD, Cells
+from .spline import MARGIN, Spline
+
+_EPSILON = float(np.finfo(np.float64).eps)
+# Cells without the surface that a straight flight comes through in one go.
+_MANY = 200
 
 
-class SampledNumbers(contract.Smooth):
-    """The numbers of a sampled surface."""
+class Cell(NamedTuple):
+    """The cell of a point, from where on, and what is known of it; `inside` is whether it is one of the grid."""
+
+    low: Vec  # in cells from the corner of the grid
+    row: int  # of what is known of the bend there
+    clear: float  # how far from the surface at least [m], below 0 where it may be in the cell
+    inside: bool
+
+
+def _is_in(u, count):
+    return (u >= -0.5 * MARGIN) & (u <= count + 0.5 * MARGIN)
+
+
+def _layer(u, count):
+    return min(max(np.floor(u), 0.0), count - 1.0)
+
+
+def _layers(low, around, count):
+    return max(low - around, 0.0) - MARGIN, min(low + 1.0 + around, count) + MARGIN
+
+
+def _time_out(first, width, layers, x, v, pull):
+    """When a coordinate leaves some layers of cells."""
+    low, high = first + layers[0] * width, first + layers[1] * width
+    if pull == 0.0:
+        return select(v != 0.0, (select(v > 0.0, high, low) - x) / select(v != 0.0, v, 1.0), math.inf)
+    return min(rise_time(x - high, 0.5 * v, 0.5 * pull), rise_time(low - x, -0.5 * v, -0.5 * pull))
+
+
+def _time_in(low, high, x, v, pull):
+    """Before when a coordinate is surely not in an interval."""
+    if x < low:
+        return rise_time(x - low, 0.5 * v, 0.5 * pull)
+    return rise_time(high - x, -0.5 * v, -0.5 * pull) if x > high else 0.0
+
+
+def known(bends, i):
+    """The matrix A of a row of `bends`, and how far H is from it."""
+    a = Symmetric(
+        _at(bends, i, 0), _at(bends, i, 1), _at(bends, i, 2), _at(bends, i, 3), _at(bends, i, 4), _at(bends, i, 5)
+    )
+    return a, _at(bends, i, SPREAD)
+
+
+def _at(bends, i, k):
+    # In plain Python products of short numbers would be short.
+    return np.float64(bends[i, k])
+
+
+def _inverse(x):
+    return select(x != 0.0, 1.0 / select(x != 0.0, x, 1.0), math.inf)
+
+
+def least_of(a):
+    """The least component."""
+    return min(a.x, a.y, a.z)
+
+
+class CellNumbers(contract.Smooth):
+    """The numbers of a sampled surface, but for its flights."""
 
     spline: Spline
     cells: Cells
@@ -20,47 +86,115 @@ class SampledNumbers(contract.Smooth):
     least: float  # the least eigenvalue of side H anywhere on the surface, at least
 
     def phi(self, r):
-        return splines.value(self.spline, r)
+        return self.spline.value(r)
 
     def hessian(self, r):
-        return splines.half_bend(self.spline, r)
+        return self.spline.half_bend(r)
 
     def difference(self, r0, r1):
-        return splines.difference(self.spline, r0, r1)
+        return self.spline.difference(r0, r1)
 
     def gradient(self, r):
-        _value, slope = splines.value_and_slope(self.spline, r)
+        _value, slope = self.spline.value_and_slope(r)
         return slope
 
     def gap_scale(self, r):
-        _value, n = splines.value_and_slope(self.spline, r)
-        return total(times(absolute(n), splines.coordinates(self.spline, r)))
+        _value, n = self.spline.value_and_slope(r)
+        return total(times(absolute(n), self.spline.coordinates(r)))
 
     def settle(self, r):
-        value, n = splines.value_and_slope(self.spline, r)
+        value, n = self.spline.value_and_slope(r)
         return r - (value / dot(n, n)) * n
 
     def distance(self, r):
-        value, n = splines.value_and_slope(self.spline, r)
+        value, n = self.spline.value_and_slope(r)
         return self.side * value / norm(n)
 
     def farthest_push(self):
         # 1 + kappa H has its first pole at the least eigenvalue of side H.
         return self.side * (-1.0 / self.least if self.least < 0.0 else math.inf)
 
-    # --- Flight ---
+    # --- Its cells ---
 
-    def first_hit(self, r, v):
-        return flight.march(self, r, v, ZERO)
+    def _cell_of(self, r):
+        u, n = times(r - self.spline.low, self.spline.inverse), self.spline.shape
+        inside = _is_in(u.x, n.x) & _is_in(u.y, n.y) & _is_in(u.z, n.z)
+        low = Vec(_layer(u.x, n.x), _layer(u.y, n.y), _layer(u.z, n.z))
+        i, j, k = index(int(low.x)), index(int(low.y)), index(int(low.z))
+        cells = self.cells
+        return Cell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
 
-    def falling_hit(self, r, v, pull):
-        return flight.march(self, r, v, pull)
+    def _until_out(self, low, around, r, v, pull):
+        """When a flight is beyond a cell and so many cells around it, as far as they are in the grid."""
+        made = self.spline
+        x = _time_out(made.low.x, made.width.x, _layers(low.x, around, made.shape.x), r.x, v.x, pull.x)
+        y = _time_out(made.low.y, made.width.y, _layers(low.y, around, made.shape.y), r.y, v.y, pull.y)
+        z = _time_out(made.low.z, made.width.z, _layers(low.z, around, made.shape.z), r.z, v.z, pull.z)
+        return min(x, y, z)
 
-    def safe_time(self, r, v, pull):
-        return flight.safe_time(self, r, v, pull)
+    @outlined
+    def _until_in(self, r, v, pull):
+        """Until when a flight from outside of the grid is surely outside; infinite if for ever."""
+        low, width, n = self.spline.low, self.spline.width, self.spline.shape
+        x = _time_in(low.x, low.x + n.x * width.x, r.x, v.x, pull.x)
+        y = _time_in(low.y, low.y + n.y * width.y, r.y, v.y, pull.y)
+        z = _time_in(low.z, low.z + n.z * width.z, r.z, v.z, pull.z)
+        return max(x, y, z)
 
+    @outlined
+    def _through_empty(self, r, v, t):
+        """The time from t on at which a straight flight comes to a cell where the surface may be, or out of the grid.
+
+        A step is as long as the clearance or as the way out of the cell, in units of cells, and without a branch: most
+        of the steps of a flight are these.
+        """
+        made, cells = self.spline, self.cells
+        u, w, n = times(r - made.low, made.inverse), times(v, made.inverse), made.shape
+        # By each part of the clearance, and by each cell along an axis
+        rate, pace = cells.unit / norm(v), Vec(_inverse(w.x), _inverse(w.y), _inverse(w.z))
+        for _i in range(_MANY):
+            p = u + t * w
+            low = Vec(_layer(p.x, n.x), _layer(p.y, n.y), _layer(p.z, n.z))
+            clear = float(cells.clear[index(int(low.x)), index(int(low.y)), index(int(low.z))])
+            if clear == 0.0 or not (_is_in(p.x, n.x) & _is_in(p.y, n.y) & _is_in(p.z, n.z)):
+                break
+            x = (low.x + select(w.x >= 0.0, 1.0 + MARGIN, -MARGIN) - p.x) * pace.x
+            y = (low.y + select(w.y >= 0.0, 1.0 + MARGIN, -MARGIN) - p.y) * pace.y
+            z = (low.z + select(w.z >= 0.0, 1.0 + MARGIN, -MARGIN) - p.z) * pace.z
+            t += max((clear - 1.0) * rate, min(x, y, z), _EPSILON * t)
+        return t
+
+    def _free_time(self, cell, r, v, pull):
+        """How long a flight surely meets no surface, from outside of the grid or from a cell that has none."""
+        if not cell.inside:
+            return self._until_in(r, v, pull) if self.closed > 0.0 else math.inf
+        if cell.clear > 0.0:
+            # speed t + g t^2/2 = clear
+            speed, g = norm(v), norm(pull)
+            return 2.0 * cell.clear / (speed + (speed if g == 0.0 else math.sqrt(speed * speed + 2.0 * g * cell.clear)))
+        return self._until_out(cell.low, 0.0, r, v, pull)
+
+    @outlined
     def bend(self, r):
-        return flight.bend(self, r)
+        """Bounds of the eigenvalues of side H: see `Smooth.bend`."""
+        cell, width = self._cell_of(r), self.spline.width
+        if cell.clear >= 0.0 or not cell.inside:
+            return 0.0, 0.0, 0.0
+        u = times(r - self.spline.low, self.spline.inverse) - cell.low
+        wall = lowest(Vec(1.0 + u.x, 1.0 + u.y, 1.0 + u.z), Vec(2.0 - u.x, 2.0 - u.y, 2.0 - u.z))
+        # |A| is at most the root of the sum of the squares of its entries.
+        a, spread = known(self.cells.bends, cell.row)
+        most = math.sqrt(square(Vec(a.xx, a.yy, a.zz)) + 2.0 * square(Vec(a.xy, a.yz, a.zx))) + spread
+        return most, most, least_of(times(wall, width))
 
+    @outlined
     def clearance(self, r):
-        return flight.clearance(self, r)
+        """The distance to the surface at least; next to its cells, to the wall of the cell."""
+        cell, width = self._cell_of(r), self.spline.width
+        if not cell.inside:
+            return self.closed * max(norm(self.spline.place(r).off), MARGIN * least_of(width))
+        if cell.clear < 0.0:
+            return 0.0
+        u = times(r - self.spline.low, self.spline.inverse) - cell.low
+        wall = times(lowest(u, Vec(1.0 - u.x, 1.0 - u.y, 1.0 - u.z)), width)
+        return max(least_of(wall) + MARGIN * least_of(width), cell.clear)

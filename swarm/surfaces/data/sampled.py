@@ -14,11 +14,10 @@ from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
-from . import flight as _flight  # noqa: F401
 from . import spline
 from .arrays import read
 from .cells import Cells, cells_of, eigenvalues, least_at_border
-from .numbers import SampledNumbers
+from .flight import SampledNumbers
 from .spline import Spline
 
 Floats = NDArray[np.float64]
@@ -137,7 +136,7 @@ class Sampled(Surface):
 
 
 class Samples:
-    """What is made of the samples of a surface, once."""
+    """The samples of a surface and all that is made of them, once."""
 
     def __init__(self, values: Floats, spacing: Vector) -> None:
         self.values, self.spacing = values, spacing

@@ -21,17 +21,6 @@ LEAST = 4
 MARGIN = 1e-6
 
 
-class Spline(Record):
-    """Coefficients of cells from `low` on, two more along each axis than there are samples."""
-
-    low: Vec
-    width: Vec  # of a cell
-    inverse: Vec  # 1/width
-    shape: Vec  # how many cells along x, y, z
-    steepness: float  # by which phi rises outside of the grid, with the distance from it
-    coefficients: Array
-
-
 # --- Coefficients ----------------------------------------------------------------------------------------
 
 
@@ -71,9 +60,6 @@ def along(values: Floats, axis: int) -> Floats:
     return np.moveaxis(c, 0, axis)
 
 
-# --- Where a point is ------------------------------------------------------------------------------------
-
-
 class Place(NamedTuple):
     """The cell of a point, where in it the point is, from 0 to 1, and how far outside of the grid."""
 
@@ -82,15 +68,6 @@ class Place(NamedTuple):
     z: Any
     at: Vec
     off: Vec
-
-
-def place_of(spline, r):
-    """The `Place` of a point, or of the nearest point of the grid."""
-    u, n = times(r - spline.low, spline.inverse), spline.shape
-    c = Vec(_within(u.x, n.x), _within(u.y, n.y), _within(u.z, n.z))
-    cell = Vec(_whole(c.x, n.x), _whole(c.y, n.y), _whole(c.z, n.z))
-    # In plain Python a point may be an array of points.
-    return Place(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, spline.width))
 
 
 def _within(u, count):
@@ -128,50 +105,6 @@ def _bends(t):
     return Four(s, t - 2.0 * s, s - 2.0 * t, t)
 
 
-def value_and_slope(spline, r):
-    """phi and its gradient."""
-    place, table, k = place_of(spline, r), spline.coefficients, spline.inverse
-    x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
-    column, across = over_block(table, place, x, y), over_block(table, place, _slopes(place.at.x), y)
-    sideways = over_block(table, place, x, _slopes(place.at.y))
-    # Outside of the grid phi goes on with the value at its border, and rises.
-    away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
-    further = (place.off / np.maximum(away, np.finfo(np.float64).tiny)) * spline.steepness
-    slope = Vec(
-        inside.x * k.x * sum_of(z, across) + further.x,
-        inside.y * k.y * sum_of(z, sideways) + further.y,
-        inside.z * k.z * sum_of(_slopes(place.at.z), column) + further.z,
-    )
-    return sum_of(z, column) + spline.steepness * away, slope
-
-
-@outlined
-def value(spline, r):
-    """phi alone."""
-    place = place_of(spline, r)
-    column = over_block(spline.coefficients, place, basis(place.at.x), basis(place.at.y))
-    return sum_of(basis(place.at.z), column) + spline.steepness * norm(place.off)
-
-
-@outlined
-def half_bend(spline, r):
-    """H = grad grad phi/2."""
-    place, table, k = place_of(spline, r), spline.coefficients, spline.inverse
-    x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
-    dx, dy, dz = _slopes(place.at.x), _slopes(place.at.y), _slopes(place.at.z)
-    return Symmetric(
-        0.5 * k.x * k.x * sum_of(z, over_block(table, place, _bends(place.at.x), y)),
-        0.5 * k.y * k.y * sum_of(z, over_block(table, place, x, _bends(place.at.y))),
-        0.5 * k.z * k.z * sum_of(_bends(place.at.z), over_block(table, place, x, y)),
-        0.5 * k.x * k.y * sum_of(z, over_block(table, place, dx, dy)),
-        0.5 * k.y * k.z * sum_of(dz, over_block(table, place, x, dy)),
-        0.5 * k.z * k.x * sum_of(dz, over_block(table, place, dx, y)),
-    )
-
-
-# --- Differences -----------------------------------------------------------------------------------------
-
-
 def _steps(t0, t1, d):
     """The basis functions at t1 less those at t0, without cancellation; d is t1 - t0."""
     s0, s1 = 1.0 - t0, 1.0 - t1
@@ -186,22 +119,77 @@ def _steps(t0, t1, d):
     )
 
 
-@outlined
-def difference(spline, r0, r1):
-    """phi(r1) - phi(r0), without cancellation where both are in one cell."""
-    a, b = place_of(spline, r0), place_of(spline, r1)
-    same = a.x == b.x and a.y == b.y and a.z == b.z
-    inside = norm(a.off) == 0.0 and norm(b.off) == 0.0
-    if not (same and inside):
-        return value(spline, r1) - value(spline, r0)
-    # x1 y1 z1 - x0 y0 z0 = (x1 - x0) y1 z1 + x0 (y1 - y0) z1 + x0 y0 (z1 - z0)
-    table, x0, y0 = spline.coefficients, basis(a.at.x), basis(a.at.y)
-    y1, z1, d = basis(b.at.y), basis(b.at.z), times(r1 - r0, spline.inverse)
-    along_x = sum_of(z1, over_block(table, a, _steps(a.at.x, b.at.x, d.x), y1))
-    along_y = sum_of(z1, over_block(table, a, x0, _steps(a.at.y, b.at.y, d.y)))
-    return along_x + along_y + sum_of(_steps(a.at.z, b.at.z, d.z), over_block(table, a, x0, y0))
+class Spline(Record):
+    """Coefficients of cells from `low` on, two more along each axis than there are samples."""
 
+    low: Vec
+    width: Vec  # of a cell
+    inverse: Vec  # 1/width
+    shape: Vec  # how many cells along x, y, z
+    steepness: float  # by which phi rises outside of the grid, with the distance from it
+    coefficients: Array
 
-def coordinates(spline, r):
-    """The magnitudes of those that round a point, in the scene and in the grid: near the origin these are larger."""
-    return absolute(r) + absolute(r - spline.low)
+    def place(self, r):
+        """The `Place` of a point, or of the nearest point of the grid."""
+        u, n = times(r - self.low, self.inverse), self.shape
+        c = Vec(_within(u.x, n.x), _within(u.y, n.y), _within(u.z, n.z))
+        cell = Vec(_whole(c.x, n.x), _whole(c.y, n.y), _whole(c.z, n.z))
+        # In plain Python a point may be an array of points.
+        return Place(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, self.width))
+
+    def value_and_slope(self, r):
+        """phi and its gradient."""
+        place, table, k = self.place(r), self.coefficients, self.inverse
+        x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
+        column, across = over_block(table, place, x, y), over_block(table, place, _slopes(place.at.x), y)
+        sideways = over_block(table, place, x, _slopes(place.at.y))
+        # Outside of the grid phi goes on with the value at its border, and rises.
+        away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
+        further = (place.off / np.maximum(away, np.finfo(np.float64).tiny)) * self.steepness
+        slope = Vec(
+            inside.x * k.x * sum_of(z, across) + further.x,
+            inside.y * k.y * sum_of(z, sideways) + further.y,
+            inside.z * k.z * sum_of(_slopes(place.at.z), column) + further.z,
+        )
+        return sum_of(z, column) + self.steepness * away, slope
+
+    @outlined
+    def value(self, r):
+        """phi alone."""
+        place = self.place(r)
+        column = over_block(self.coefficients, place, basis(place.at.x), basis(place.at.y))
+        return sum_of(basis(place.at.z), column) + self.steepness * norm(place.off)
+
+    @outlined
+    def half_bend(self, r):
+        """H = grad grad phi/2."""
+        place, table, k = self.place(r), self.coefficients, self.inverse
+        x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
+        dx, dy, dz = _slopes(place.at.x), _slopes(place.at.y), _slopes(place.at.z)
+        return Symmetric(
+            0.5 * k.x * k.x * sum_of(z, over_block(table, place, _bends(place.at.x), y)),
+            0.5 * k.y * k.y * sum_of(z, over_block(table, place, x, _bends(place.at.y))),
+            0.5 * k.z * k.z * sum_of(_bends(place.at.z), over_block(table, place, x, y)),
+            0.5 * k.x * k.y * sum_of(z, over_block(table, place, dx, dy)),
+            0.5 * k.y * k.z * sum_of(dz, over_block(table, place, x, dy)),
+            0.5 * k.z * k.x * sum_of(dz, over_block(table, place, dx, y)),
+        )
+
+    @outlined
+    def difference(self, r0, r1):
+        """phi(r1) - phi(r0), without cancellation where both are in one cell."""
+        a, b = self.place(r0), self.place(r1)
+        same = a.x == b.x and a.y == b.y and a.z == b.z
+        inside = norm(a.off) == 0.0 and norm(b.off) == 0.0
+        if not (same and inside):
+            return self.value(r1) - self.value(r0)
+        # x1 y1 z1 - x0 y0 z0 = (x1 - x0) y1 z1 + x0 (y1 - y0) z1 + x0 y0 (z1 - z0)
+        table, x0, y0 = self.coefficients, basis(a.at.x), basis(a.at.y)
+        y1, z1, d = basis(b.at.y), basis(b.at.z), times(r1 - r0, self.inverse)
+        along_x = sum_of(z1, over_block(table, a, _steps(a.at.x, b.at.x, d.x), y1))
+        along_y = sum_of(z1, over_block(table, a, x0, _steps(a.at.y, b.at.y, d.y)))
+        return along_x + along_y + sum_of(_steps(a.at.z, b.at.z, d.z), over_block(table, a, x0, y0))
+
+    def coordinates(self, r):
+        """The magnitudes of those that round a point, in the scene and in the grid: near its origin these are more."""
+        return absolute(r) + absolute(r - self.low)

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...extras import needed_by
-from .triangles import Floats, Indices, Mesh, components, neighbours, shown
+from ..surface import shown
+from .triangles import Floats, Indices, Mesh, components, neighbours
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25

@@ -6,13 +6,14 @@ with the mesh. No feature of a surface that is closed is touched.
 """
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...extras import needed_by
+from ..surface import shown
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -247,8 +248,3 @@ def _is_within(path: Path, points: Floats, vertices: Floats, part: Indices) -> b
             "trimesh.boolean.union"
         )
     return bool(inside.any())
-
-
-def shown(point: Any) -> str:
-    """A point as errors write it."""
-    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from ...kernel import cache
-from ...kernel.jit import index, kernel
-from ...kernel.vector import ZERO, Vec, dot, highest, vec
-from ..shapes.sphere import SphereNumbers
+from ...kernel.arrays import index
+from ...kernel.jit import kernel
+from ...kernel.vector import Vec, vec
 from .grid import MARGIN, Floats, Grid, cells_of
 from .members import gathered
 
@@ -56,7 +56,7 @@ def _enter(like, table, bounds, grid, place, entries):
                 for k in range(z, z_end):
                     near = grid.low + Vec(i * grid.width.x, j * grid.width.y, k * grid.width.z)
                     far = grid.low + Vec((i + 1.0) * grid.width.x, (j + 1.0) * grid.width.y, (k + 1.0) * grid.width.z)
-                    if may_reach(body, near - margin, far + margin):
+                    if body.may_reach(near - margin, far + margin):
                         cell = int((i * n.y + j) * n.z + k)
                         if entries.size > 0:
                             entries[place[cell]] = m
@@ -67,11 +67,3 @@ def _layers(begin, end, width, count):
     """The layers of cells between two places, from the first to the one after the last."""
     first, last = np.floor(begin / width), np.floor(end / width)
     return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1
-
-
-def may_reach(body, low, high):
-    """Whether a body may have a point in common with a box; its bounds do."""
-    if not isinstance(body, SphereNumbers):
-        return True
-    off = highest(highest(low - body.center, body.center - high), ZERO)
-    return dot(off, off) <= body.radius2

@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ...motion import Placed
-from ..fold import Chain, Field, Listed, chain_of, linked
 from ..kinds import by_kind
 from ..moving import walls_of
 from ..surface import Surface
+from ..walls import Field, Listed, Walls, all_walls
 from .many import Many
 from .members import Members, alike, can_be_member, kind_of
 
@@ -77,17 +77,18 @@ def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
     return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others))
 
 
-def chain_in(
+def walls_in(
     order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface],
     taken: Callable[[Members], Members],
-) -> Chain | Field | None:  # fmt: skip
-    """The chain of a scene in which nothing moves, and of a body's own surfaces.
+) -> Walls:  # fmt: skip
+    """The walls of a scene in which nothing moves, and of a body's own surfaces.
 
     `groups` are the order's fields, and `taken` says how kernels take a field.
     """
-    chain = chain_of([*(surfaces[i] for i in order.others), *own])
-    chain = linked(map(taken, groups), chain, Listed)
-    return linked((taken(surfaces[i].walls()[0]) for i in order.fields), chain, Field)  # type: ignore[no-any-return]
+    fields = (Field(taken(surfaces[i].walls()[0])) for i in order.fields)
+    listed = (Listed(taken(group)) for group in groups)
+    others = all_walls([*(surfaces[i] for i in order.others), *own])
+    return Walls((*fields, *listed, *others.walls))
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

@@ -15,8 +15,7 @@ from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .entering import grid_of
 from .grid import one_cell
-from .members import Few, Members, alike, nearest, table_of
-from .within import within
+from .members import Few, Members, alike, nearest, table_of, within
 
 Floats = NDArray[np.float64]
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
@@ -118,7 +117,7 @@ class Many(Surface):
 
     @cached_property
     def members(self) -> Members:
-        """What kernels take."""
+        """The field as kernels take it."""
         return members_of(self.solids(), self.repeated)
 
     def walls(self) -> tuple[Members]:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel.jit import Array, index, kernel, outlined, select
+from ...kernel.arrays import index
+from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
 from .. import flights
-from ..fold import Chain
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
 from ..shapes.quadratic import QuadricNumbers
@@ -25,7 +25,7 @@ _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # Bytes of a line of the cache.
 _LINE = 64
 # What has fields of its own in a table, beside vectors and balls.
-_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, Chain, SolidNumbers)
+_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
 
 
 class Members(Record):
@@ -35,8 +35,12 @@ class Members(Record):
     table: Array  # (members, width) the numbers of each
     grid: Grid
 
-    # As of a wall: what is asked before it is known which one is meant.
+    # What a wall at rest says, as in contract.py.
     flat = False
+
+    def pace(self):
+        """A time in which their motion changes little [s]."""
+        return math.inf
 
     def count(self):
         """How many they are."""
@@ -111,7 +115,7 @@ def gathered(like, table, m, k):
     for part in like:
         parts = (*parts, gathered(part, table, m, k))
         k += width(part)
-    return type(like)(*parts)
+    return parts if type(like) is tuple else type(like)(*parts)
 
 
 def width(like):
@@ -132,11 +136,11 @@ def can_be_member(wall: Any) -> bool:
         return True
     if isinstance(wall, (SphereNumbers, Vec)):
         return True
-    return isinstance(wall, _KINDS) and all(can_be_member(part) for part in wall)
+    return (type(wall) is tuple or isinstance(wall, _KINDS)) and all(can_be_member(part) for part in wall)
 
 
 def kind_of(wall: Any) -> Any:
-    """What numbers have in common that a field may hold: their types, whatever their axes are."""
+    """The types of numbers that one field may hold, whatever their axes are."""
     wall = wall.body if isinstance(wall, Rotated) else wall
     if isinstance(wall, (Vec, *AXES)):
         return Vec
@@ -161,9 +165,10 @@ def _in_general(wall: Any, turned: bool) -> Any:
         return Vec(*(float(isinstance(wall, axis)) for axis in AXES))
     if isinstance(wall, Rotated):
         return wall._replace(body=_in_general(wall.body, False))
-    if isinstance(wall, SlabNumbers | Chain | SolidNumbers):
-        parts = [_in_general(part, isinstance(wall, Chain) and _is_round(part)) for part in wall]
-        return type(wall)(*parts)
+    if isinstance(wall, SolidNumbers):
+        return wall._replace(parts=tuple(_in_general(part, _is_round(part)) for part in wall.parts))
+    if isinstance(wall, SlabNumbers):
+        return SlabNumbers(*(_in_general(part, False) for part in wall))
     return Rotated(wall, *_UNTURNED) if turned else wall
 
 
@@ -276,3 +281,15 @@ def _least_in_shell(members, r, center, shell):
 
 def _around(place, shell, count):
     return range(int(max(place - shell, 0.0)), int(min(place + shell, count - 1.0)) + 1)
+
+
+@kernel
+def within(members, points, found):
+    """Whether each of the points (3, N) is in any body, into `found`; on its surface it is not."""
+    grid = members.grid
+    for i in range(points.shape[1]):
+        r = column(points, 0, i)
+        cell, inside = index(cell_of(grid, r).number), False
+        for k in range(grid.first[cell], grid.first[cell + index(1)]):
+            inside = inside or member(members, index(grid.entries[k])).phi(r) < 0.0
+        found[i] = inside

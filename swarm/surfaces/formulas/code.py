@@ -63,7 +63,7 @@ def _check_function(name: str, function: Any) -> None:
 def _methods(
     names: tuple[str, ...], phi: Function, gradient: Function, hessian: Function | None = None
 ) -> dict[str, Function]:
-    """What the class of numbers knows."""
+    """The methods of the class of numbers."""
     value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
     # A class of the user's is not found by another process: the functions get their parameters in one that is.
     make = collections.namedtuple("Parameters", names)  # type: ignore[misc]

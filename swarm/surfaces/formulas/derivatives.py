@@ -1,4 +1,4 @@
-"""What is derived from a formula: derivatives by SymPy, functions of them; their bounds, and its box, by intervals."""
+"""The derivatives of a formula by SymPy, and functions of them; their bounds, and its box, by intervals."""
 
 import functools
 import hashlib

@@ -12,7 +12,7 @@ from ... import checks
 from ...checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
-from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
+from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
 from .numbers import Bend
 
 _EPSILON = 2.220446049250313e-16
@@ -69,7 +69,7 @@ class FormSurface(Surface):
         raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: the functions of a form are known to the process that has made it, so each makes its own."""
+        """The fields: the functions of a form are known to the process that has made it, so each makes its own."""
         return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -183,8 +183,8 @@ class Form:
         if np.count_nonzero(off) > 0.1 * _ONTO:
             i = int(np.argmax(off))
             raise SceneError(
-                f"gradient must be the gradient of phi, got {_shown(given[:, i])} at {_shown(points[:, i])}, where "
-                f"differences of phi give {_shown(measured[:, i])}"
+                f"gradient must be the gradient of phi, got {shown(given[:, i])} at {shown(points[:, i])}, where "
+                f"differences of phi give {shown(measured[:, i])}"
             )
 
     def check(self) -> None:
@@ -194,7 +194,7 @@ class Form:
         wrong = ~np.isfinite(values)
         if wrong.any():
             i = int(np.argmax(wrong))
-            raise SceneError(f"phi must be a finite number in the bounds, got {values[i]} at {_shown(points[:, i])}")
+            raise SceneError(f"phi must be a finite number in the bounds, got {values[i]} at {shown(points[:, i])}")
         near = self._onto(points[:, np.argsort(np.abs(values))[:_ONTO]])
         if not any((signs <= 0.0).any() and (signs >= 0.0).any() for signs in (values, self.value(near))):
             sign = "below" if values[0] < 0.0 else "above"
@@ -204,7 +204,7 @@ class Form:
         if flat.any():
             i = int(np.argmax(flat))
             raise SceneError(
-                f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {_shown(near[:, i])}"
+                f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {shown(near[:, i])}"
             )
 
     def _onto(self, points: Floats) -> Floats:
@@ -249,7 +249,3 @@ class Form:
         exact = Bend.of_entries(entries, entries)
         wider = 0.5 * (_SAFETY - 1.0) * (exact.most - exact.least) + noise
         return bend._replace(least=float(exact.least - wider), most=float(exact.most + wider))
-
-
-def _shown(point: Any) -> str:
-    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"

@@ -1,4 +1,4 @@
-"""What kernels know of a surface by functions, and its flights by safe steps; its subclasses know phi and gradient."""
+"""A surface by functions as kernels take it: its flights by safe steps. Its subclasses know phi and gradient."""
 
 import math
 from typing import Any, NamedTuple
@@ -43,6 +43,23 @@ class Bend(NamedTuple):
         room = radius.sum(axis=2).max(axis=1) + 64.0 * _EPSILON * np.abs(values).max(axis=1)
         least, most = float((values[:, 0] - room).min()), float((values[:, 2] + room).max())
         return cls(least, most, Symmetric(*low.min(axis=1).tolist()), Symmetric(*high.max(axis=1).tolist()))
+
+
+def _quadratic(v, high, low):
+    """The upper bound of v.H v for entries of H from `low` to `high`; the lower bound with the two exchanged."""
+    xy, yz, zx = 2.0 * v.x * v.y, 2.0 * v.y * v.z, 2.0 * v.z * v.x
+    sum = high.xx * v.x * v.x + high.yy * v.y * v.y + high.zz * v.z * v.z
+    sum += select(xy > 0.0, high.xy, low.xy) * xy
+    return sum + select(yz > 0.0, high.yz, low.yz) * yz + select(zx > 0.0, high.zx, low.zx) * zx
+
+
+def _between(low, high, x, v):
+    """When a flight is between two planes: (from, until)."""
+    if v == 0.0:
+        within = low <= x <= high
+        return select(within, -math.inf, math.inf), select(within, math.inf, -math.inf)
+    a, b = (low - x) / v, (high - x) / v
+    return min(a, b), max(a, b)
 
 
 class OwnNumbers(contract.Smooth):
@@ -93,86 +110,60 @@ class OwnNumbers(contract.Smooth):
         most, magnitude = self.bends.most, max(abs(self.bends.least), abs(self.bends.most))
         if self.closed == 0.0:
             return most, magnitude, self.size
-        out = _outside(self, r)
+        out = self._outside(r)
         return most, magnitude, select(out > 0.5 * self.margin, out, min(self.margin - out, self.size))
 
     def clearance(self, r):
-        return select(self.closed > 0.0, max(_outside(self, r), 0.0), 0.0)
+        return select(self.closed > 0.0, max(self._outside(r), 0.0), 0.0)
 
+    def _outside(self, r):
+        """The distance outside the box, by its largest component; below 0 inside."""
+        d = r - self.center
+        across = max(self.low.x - d.x, d.x - self.high.x)
+        across = max(across, self.low.y - d.y, d.y - self.high.y)
+        return max(across, self.low.z - d.z, d.z - self.high.z)
+
+    @outlined
     def first_hit(self, r, v):
-        return _straight(self, r, v)
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-def _outside(surface, r):
-    """The distance outside the box, by its largest component; below 0 inside."""
-    d = r - surface.center
-    across = max(surface.low.x - d.x, d.x - surface.high.x)
-    across = max(across, surface.low.y - d.y, d.y - surface.high.y)
-    return max(across, surface.low.z - d.z, d.z - surface.high.z)
-
-
-@outlined
-def _straight(surface, r, v):
-    """Safe steps to the first root along a straight flight, whose second derivative has the same bounds everywhere."""
-    t, end = 0.0, math.inf
-    speed2 = square(v)
-    if speed2 == 0.0:
-        return math.inf, True
-    if surface.closed > 0.0:
-        t, end = _in_box(surface, r, v)
-        if not t <= end:
+        # Safe steps: along a straight flight the second derivative has the same bounds everywhere.
+        t, end = 0.0, math.inf
+        speed2 = square(v)
+        if speed2 == 0.0:
             return math.inf, True
-    bend = surface.bends
-    # least <= v.side H v <= most
-    most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
-    least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
-    resolved = 2.0 * _EPSILON / math.sqrt(speed2)
-    before = t
-    for i in range(_MARCH):
-        p = r + t * v
-        level = surface.side * surface.phi(p)
-        half = 0.5 * surface.side * dot(surface.gradient(p), v)
-        if level > 0.0 and half > 0.0 and i > 0:
-            # Past the wall by round-off, or because the surface bends more than was said.
-            return bisected(surface, r, v, ZERO, before, t), True
-        step = rise_time(level, half, most)
-        if not t + step <= end or not step < math.inf:
-            return math.inf, True
-        before, t = t, t + step
-        # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
-        rising = half + least * step
-        shortest = resolved * (total(absolute(p)) + math.sqrt(speed2) * step)
-        if (i > 0 or rising > 0.0 or step == 0.0) and (
-            step <= shortest or (most - least) * step * step <= 2.0 * shortest * rising
-        ):
-            return t, True
-    return t, False
+        if self.closed > 0.0:
+            t, end = self._in_box(r, v)
+            if not t <= end:
+                return math.inf, True
+        bend = self.bends
+        # least <= v.side H v <= most
+        most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
+        least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
+        resolved = 2.0 * _EPSILON / math.sqrt(speed2)
+        before = t
+        for i in range(_MARCH):
+            p = r + t * v
+            level = self.side * self.phi(p)
+            half = 0.5 * self.side * dot(self.gradient(p), v)
+            if level > 0.0 and half > 0.0 and i > 0:
+                # Past the wall by round-off, or because the surface bends more than was said.
+                return bisected(self, r, v, ZERO, before, t), True
+            step = rise_time(level, half, most)
+            if not t + step <= end or not step < math.inf:
+                return math.inf, True
+            before, t = t, t + step
+            # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
+            rising = half + least * step
+            shortest = resolved * (total(absolute(p)) + math.sqrt(speed2) * step)
+            if (i > 0 or rising > 0.0 or step == 0.0) and (
+                step <= shortest or (most - least) * step * step <= 2.0 * shortest * rising
+            ):
+                return t, True
+        return t, False
 
-
-def _quadratic(v, high, low):
-    """The upper bound of v.H v for entries of H from `low` to `high`; the lower bound with the two exchanged."""
-    xy, yz, zx = 2.0 * v.x * v.y, 2.0 * v.y * v.z, 2.0 * v.z * v.x
-    sum = high.xx * v.x * v.x + high.yy * v.y * v.y + high.zz * v.z * v.z
-    sum += select(xy > 0.0, high.xy, low.xy) * xy
-    return sum + select(yz > 0.0, high.yz, low.yz) * yz + select(zx > 0.0, high.zx, low.zx) * zx
-
-
-def _in_box(surface, r, v):
-    """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
-    d, low, high = r - surface.center, surface.low, surface.high
-    from_x, until_x = _between(low.x, high.x, d.x, v.x)
-    from_y, until_y = _between(low.y, high.y, d.y, v.y)
-    from_z, until_z = _between(low.z, high.z, d.z, v.z)
-    return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)
-
-
-def _between(low, high, x, v):
-    """When a flight is between two planes: (from, until)."""
-    if v == 0.0:
-        within = low <= x <= high
-        return select(within, -math.inf, math.inf), select(within, math.inf, -math.inf)
-    a, b = (low - x) / v, (high - x) / v
-    return min(a, b), max(a, b)
+    def _in_box(self, r, v):
+        """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
+        d, low, high = r - self.center, self.low, self.high
+        from_x, until_x = _between(low.x, high.x, d.x, v.x)
+        from_y, until_y = _between(low.y, high.y, d.y, v.y)
+        from_z, until_z = _between(low.z, high.z, d.z, v.z)
+        return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)

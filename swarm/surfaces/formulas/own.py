@@ -89,7 +89,7 @@ class OwnSurface(FormSurface):
         return replace(form, bend=form.sampled_bend() if self.curvature is None else Bend.of_magnitude(self.curvature))
 
     def table(self) -> dict[str, Any]:
-        """What a file says of it: enough to recognise it, not to make it again."""
+        """Its table in a file: enough to recognise it, not to make it again."""
         given = {"code": self._form.kind.__name__, "parameters": self.parameters._asdict(), "size": self.length}
         given |= {"bounds": self.box, "center": self.center, "side": self.side, "curvature": self.curvature}
         given |= {one.name: getattr(self, one.name) for one in fields(Surface)}

@@ -66,7 +66,7 @@ class Capsule(Revolved):
 
 
 class CapsuleNumbers(Distance):
-    """What kernels know of a capsule."""
+    """A capsule as kernels take it, about the z axis."""
 
     center: Vec
     radius: float
@@ -74,17 +74,22 @@ class CapsuleNumbers(Distance):
     half: float  # of the length
     side: float
 
+    def from_segment(self, r):
+        """The vector from the nearest point of the segment."""
+        d = r - self.center
+        return Vec(d.x, d.y, d.z - np.minimum(np.maximum(d.z, -self.half), self.half))
+
     def inner(self, r):
-        return square(_from_segment(self, r))
+        return square(self.from_segment(r))
 
     def slope(self, r):
-        return 2.0 * _from_segment(self, r)
+        return 2.0 * self.from_segment(r)
 
     def hessian(self, r):
         return Symmetric(1.0, 1.0, select(abs(r.z - self.center.z) > self.half, 1.0, 0.0), 0.0, 0.0, 0.0)
 
     def difference(self, r0, r1):
-        w0, w1 = _from_segment(self, r0).z, _from_segment(self, r1).z
+        w0, w1 = self.from_segment(r0).z, self.from_segment(r1).z
         d, both = r1 - r0, r0 + r1 - 2.0 * self.center
         # Beyond the same end w1 - w0 = z1 - z0, without the rounding of either.
         rise = select(w0 * w1 > 0.0, d.z, w1 - w0)
@@ -107,7 +112,7 @@ class CapsuleNumbers(Distance):
     def near(self, gravity, r, v):
         # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by
         # the square of the way beyond: higher than the tube's, lower than the sphere's.
-        g, side, e = as_vector(gravity), self.side, _from_segment(self, r)
+        g, side, e = as_vector(gravity), self.side, self.from_segment(r)
         past = abs(r.z - self.center.z) - self.half
         in_tube, q = past <= 0.0, square(e)
         speed, pull = select(in_tube, 0.0, v.z), select(in_tube, 0.0, g.z)
@@ -126,15 +131,3 @@ class CapsuleNumbers(Distance):
     def bend(self, r):
         # 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
         return (select(self.side > 0.0, 1.0, 0.0), 1.0, self.radius)
-
-
-def _from_segment(surface, r):
-    """The vector from the nearest point of the segment."""
-    d = r - surface.center
-    return Vec(d.x, d.y, d.z - np.minimum(np.maximum(d.z, -surface.half), surface.half))
-
-
-# --- The level set ---------------------------------------------------------------------------------------
-
-
-# --- Flight ----------------------------------------------------------------------------------------------

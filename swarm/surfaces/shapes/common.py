@@ -1,4 +1,4 @@
-"""What several shapes share: bases of their numbers, and the definitions that follow from these."""
+"""Base classes of shapes: of a squared distance as inner function, and of an exact chord."""
 
 import math
 
@@ -13,9 +13,9 @@ _MIDDLE = 1e-100
 
 
 class Distance(contract.Smooth):
-    """Numbers whose inner function is a squared distance: phi = sqrt(q) - radius, with the fields radius and radius2.
+    """A shape whose inner function q is a squared distance: phi = sqrt(q) - radius.
 
-    The shape registers `inner`, and `slope` or its own `gradient`.
+    It has the fields `radius` and `radius2`, its square, and gives `inner`, and `slope` or its own `gradient`.
     """
 
     def phi(self, r):
@@ -48,7 +48,7 @@ class Distance(contract.Smooth):
 
 
 class ExactChord(contract.Smooth):
-    """Numbers whose `chord_guess` is exact, and whose gap is a distance up to round-off."""
+    """A shape that gives an exact `chord_guess`, and whose gap is a distance up to round-off."""
 
     def chord_improve(self, r, p, kappa):
         return 0.0

@@ -10,7 +10,7 @@ from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
 from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
-from .quadratic import QuadricNumbers, form, parabola, turning, widths
+from .quadratic import QuadricNumbers, form, turning, widths
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,13 +100,7 @@ class EllipsoidCavity(EllipsoidNumbers):
     """A cavity: every flight in it meets the wall."""
 
     def first_hit(self, r, v):
-        c, b, a = parabola(self, r, v)
+        c, b, a = self.parabola(r, v)
         return rise_time_inside(c, b, a), True
 
     may_be_far = False
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-# --- Contact ---------------------------------------------------------------------------------------------

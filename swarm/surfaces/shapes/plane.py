@@ -7,6 +7,7 @@ from ...checks import Vector, number
 from ...kernel.jit import select
 from ...kernel.vector import Vec, dot, vec
 from ..course import rise_time
+from ..levels import Level
 from ..rotation import turned, unit
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
 from .common import ExactChord
@@ -59,12 +60,10 @@ class Plane(Surface):
 
 
 class PlaneNumbers(ExactChord):
-    """What kernels know of a plane."""
+    """A plane as kernels take it."""
 
     normal: Vec
     offset: float
-
-    has_levels = True
 
     def phi(self, r):
         return self.inner(r) - self.offset
@@ -72,11 +71,7 @@ class PlaneNumbers(ExactChord):
     def gradient(self, r):
         return self.normal
 
-    def slope(self, r):
-        return self.normal
-
-    def unit_normal(self, r):
-        return self.normal
+    slope = unit_normal = gradient
 
     def inner(self, r):
         return dot(self.normal, r)
@@ -95,6 +90,13 @@ class PlaneNumbers(ExactChord):
 
     flat = True
 
+    def flat_normal(self):
+        return self.normal
+
+    def level_along(self, seen):
+        n = self.normal
+        return Level(dot(n, seen.r) - self.offset, 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a), 1.0, 0.0)
+
     def first_hit(self, r, v):
         approach = dot(self.normal, v)
         time = (self.offset - self.inner(r)) / approach
@@ -111,8 +113,7 @@ class PlaneNumbers(ExactChord):
     def inner_gradient(self, r0, r1):
         return self.normal
 
-    def step_normal(self, r0, r1):
-        return self.normal
+    step_normal = inner_gradient
 
     def push(self, r0, p, kappa):
         return r0 + (p - kappa * self.normal)
@@ -131,12 +132,3 @@ class PlaneNumbers(ExactChord):
 
     def chord_normal(self, r, p, kappa):
         return self.normal
-
-
-# --- The level set ---------------------------------------------------------------------------------------
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-# --- Contact ---------------------------------------------------------------------------------------------

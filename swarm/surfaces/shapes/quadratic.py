@@ -10,9 +10,10 @@ import numpy as np
 
 from ...checks import Vector
 from ...kernel.jit import select
-from ...kernel.vector import Vec, absolute, cross, dot, largest, square, times, total, vec
+from ...kernel.vector import Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
+from ..levels import Level
 from ..surface import side_sign
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
@@ -21,7 +22,7 @@ _TINY = float(np.finfo(np.float64).tiny)
 
 
 class QuadricNumbers(contract.Smooth):
-    """What kernels know of a quadric; it, or its waist, may be small compared with the distance of a flight from it."""
+    """A quadric as kernels take it; it, or its waist, may be small compared with the distance of a flight from it."""
 
     center: Vec
     a: Vec  # the diagonal of A in the principal frame
@@ -29,8 +30,6 @@ class QuadricNumbers(contract.Smooth):
     level: float
     scale: float  # by how much q varies over the surface's size
     side: float
-
-    has_levels = True
 
     def by_right_angles(self, axes: Any) -> Any:
         """The numbers of the quadric whose own axes are these other axes of the scene, or their opposites."""
@@ -75,14 +74,31 @@ class QuadricNumbers(contract.Smooth):
         window = select(abs(window) > 0.0, window, 1.0)
         return select(falling > 0.0, level, c), select(falling > 0.0, window, math.inf)
 
+    def unit_along(self, n):
+        """The unit vector along side n. At the apex of a cone, where n is 0, the answer is 0 and not NaN."""
+        n2 = square(n)
+        return n * (self.side / math.sqrt(select(n2 > _TINY, n2, 1.0)))
+
+    def parabola(self, r, v):
+        """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
+        b = form(self.a, r - self.center, v) + 0.5 * self.linear(v)
+        return self.phi(r), b, form(self.a, v, v)
+
+    def _step(self, r0, p, kappa):
+        """D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
+
+        With G = grad q(r0): D = (G + A p)/(1 + kappa A) and r1 - r0 = (p - kappa G)/(1 + kappa A).
+        """
+        g, w = self.gradient(r0), widths(self.a, kappa)
+        return times(g + times(self.a, p), w), times(p - kappa * g, w), w
+
     def phi(self, r):
         return self.inner(r) - self.level
 
     def gradient(self, r):
         return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
 
-    def slope(self, r):
-        return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
+    slope = gradient
 
     def inner(self, r):
         d = r - self.center
@@ -96,7 +112,7 @@ class QuadricNumbers(contract.Smooth):
         return self.gap_of(self.inner(r)) / math.sqrt(select(g2 > _TINY, g2, _TINY))
 
     def unit_normal(self, r):
-        return _unit(self, self.gradient(r))
+        return self.unit_along(self.gradient(r))
 
     def settle(self, r):
         g = self.gradient(r)
@@ -110,14 +126,14 @@ class QuadricNumbers(contract.Smooth):
         return self.side * (2.0 * form(self.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > _TINY, g2, 1.0))
 
     def first_hit(self, r, v):
-        c, b, a = parabola(self, r, v)
+        c, b, a = self.parabola(r, v)
         d = self.discriminant(r - self.center, v, c, b, a)
         return rise_time_by(self.side * c, self.side * b, self.side * a, d), True
 
     def course(self, r, v, pull):
         # phi(r + v t + G t^2/2), a quartic in t
         d, side = r - self.center, self.side
-        c, b, a = parabola(self, r, v)
+        c, b, a = self.parabola(r, v)
         a2 = a + form(self.a, d, pull) + 0.5 * self.linear(pull)
         a3, a4 = form(self.a, v, pull), 0.25 * form(self.a, pull, pull)
         c, window = self.level_window(c, d, v, pull)
@@ -133,7 +149,7 @@ class QuadricNumbers(contract.Smooth):
         return self.tilted(times(self.a, r0 + r1 - 2.0 * self.center), 1.0)
 
     def step_normal(self, r0, r1):
-        return _unit(self, self.inner_gradient(r0, r1))
+        return self.unit_along(self.inner_gradient(r0, r1))
 
     def push(self, r0, p, kappa):
         a, d, f = self.a, r0 - self.center, self.tilted(p, -kappa)
@@ -146,7 +162,7 @@ class QuadricNumbers(contract.Smooth):
         return self.center + times(widths(self.a, 2.0 * strength), moved)
 
     def rise(self, r0, p, kappa):
-        n, e, w = _step(self, r0, p, kappa)
+        n, e, w = self._step(r0, p, kappa)
         # dr1/dkappa = -D/(1 + kappa A), and grad q(r1) = D + A (r1 - r0)
         return dot(n, e), -total(times(times(n + times(self.a, e), n), w))
 
@@ -159,11 +175,18 @@ class QuadricNumbers(contract.Smooth):
     chord_sweeps = _CHORD_SWEEPS
 
     def chord_normal(self, r, p, kappa):
-        n, _moved, _widths = _step(self, r, p, kappa)
-        return _unit(self, n)
+        n, _moved, _widths = self._step(r, p, kappa)
+        return self.unit_along(n)
+
+    # --- Of walls that move other than uniformly ---
+
+    def level_along(self, seen):
+        n, most, side = self.slope(seen.r), absolute(self.a), self.side
+        bend = form(self.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
+        level = self.level_of(self.inner(seen.r))
+        return Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(most.x, most.y, most.z))
 
     def bend(self, r):
-        # For walls that move other than uniformly
         a, side = self.a, self.side
         return max(side * a.x, side * a.y, side * a.z), largest(a), math.inf
 
@@ -172,7 +195,7 @@ class ConvexQuadric(QuadricNumbers):
     """A convex cavity: the level along a straight flight has no maximum."""
 
     def first_hit(self, r, v):
-        c, b, a = parabola(self, r, v)
+        c, b, a = self.parabola(r, v)
         return rise_time_inside(self.side * c, self.side * b, self.side * a), True
 
 
@@ -198,41 +221,11 @@ def widths(a, kappa):
     return Vec(y * z * inverse, x * z * inverse, x * y * inverse)
 
 
-def _unit(surface, n):
-    """The unit vector along side n. At the apex of a cone, where n is 0, the answer is 0 and not NaN."""
-    n2 = square(n)
-    return n * (surface.side / math.sqrt(select(n2 > _TINY, n2, 1.0)))
-
-
-# --- The level set ---------------------------------------------------------------------------------------
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-def parabola(surface, r, v):
-    """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
-    b = form(surface.a, r - surface.center, v) + 0.5 * surface.linear(v)
-    return surface.phi(r), b, form(surface.a, v, v)
-
-
 def turning(a, w):
     """The terms of w.(det A) A^-1 w."""
     return times(times(Vec(a.y * a.z, a.x * a.z, a.x * a.y), w), w)
 
 
-# --- Contact ---------------------------------------------------------------------------------------------
-
-
 def _pushed(a, d, f, kappa):
     """One component of r1 = [(1 - kappa A) r0 + p - kappa b]/(1 + kappa A)."""
     return ((1.0 - kappa * a) * d + f) / (1.0 + kappa * a)
-
-
-def _step(surface, r0, p, kappa):
-    """D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
-
-    With G = grad q(r0): D = (G + A p)/(1 + kappa A) and r1 - r0 = (p - kappa G)/(1 + kappa A).
-    """
-    g, w = surface.gradient(r0), widths(surface.a, kappa)
-    return times(g + times(surface.a, p), w), times(p - kappa * g, w), w

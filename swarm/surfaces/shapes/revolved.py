@@ -1,4 +1,4 @@
-"""What surfaces of revolution have in common: an axis."""
+"""Surfaces of revolution: their axis."""
 
 import math
 from typing import Any

@@ -12,6 +12,8 @@ from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
 from ..course import rise_time
+from ..levels import Between, Level
+from ..rising import level_step
 from ..rotation import turned, unit
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
 from .common import Distance, ExactChord
@@ -121,28 +123,18 @@ Normal = Vec | AlongX | AlongY | AlongZ
 
 
 def normal_of(vector: Sequence[float]) -> Any:
-    """What kernels take for a unit vector, or for the opposite one where that is an axis."""
+    """A unit vector as kernels take it, or the opposite one where that is an axis."""
     for axis, others in zip(AXES, ((1, 2), (2, 0), (0, 1)), strict=True):
         if not any(vector[k] for k in others):
             return axis(1.0)
     return vec(vector)
 
 
-def along(normal, r):
-    """n.r"""
-    return dot(normal, r) if isinstance(normal, Vec) else normal.part(r)
-
-
-def scaled(normal, k):
-    """k n"""
-    return k * normal if isinstance(normal, Vec) else normal.scaled(k)
-
-
 # --- The numbers -----------------------------------------------------------------------------------------
 
 
 class SlabNumbers(Distance, ExactChord):
-    """What kernels know of a slab."""
+    """A slab as kernels take it."""
 
     normal: Normal
     offset: float  # n.c
@@ -150,48 +142,65 @@ class SlabNumbers(Distance, ExactChord):
     radius2: float
     side: float
 
-    @property
-    def has_levels(self):  # type: ignore[override]
-        # Between its planes; of a solid there is one.
-        return self.side > 0.0
+    def along(self, a):
+        """n.a"""
+        return dot(self.normal, a) if isinstance(self.normal, Vec) else self.normal.part(a)
+
+    def scaled(self, k):
+        """k n"""
+        return k * self.normal if isinstance(self.normal, Vec) else self.normal.scaled(k)
+
+    def off(self, r):
+        """The signed distance from the middle."""
+        return self.along(r) - self.offset
 
     def gradient(self, r):
-        return scaled(self.normal, np.copysign(1.0, _off(self, r)))
+        return self.scaled(np.copysign(1.0, self.off(r)))
 
     def inner(self, r):
-        d = _off(self, r)
+        d = self.off(r)
         return d * d
 
     def slope(self, r):
-        return scaled(self.normal, 2.0 * _off(self, r))
+        return self.scaled(2.0 * self.off(r))
 
     def unit_normal(self, r):
-        return scaled(self.normal, math.copysign(1.0, self.side * _off(self, r)))
+        return self.scaled(math.copysign(1.0, self.side * self.off(r)))
 
     def settle(self, r):
-        d = _off(self, r)
-        return r - scaled(self.normal, d - math.copysign(self.radius, d))
+        d = self.off(r)
+        return r - self.scaled(d - math.copysign(self.radius, d))
 
     def outward_acceleration(self, r, v, pull):
         return dot(self.unit_normal(r), pull)
 
     flat = True
 
+    def flat_normal(self):
+        return self.scaled(1.0)
+
     def first_hit(self, r, v):
-        d, u = _off(self, r), along(self.normal, v)
+        d, u = self.off(r), self.along(v)
         # Between the walls the one ahead, outside of them the one on the side where the flight comes from
         time = (self.side * math.copysign(self.radius, u) - d) / u
         meets = select(self.side > 0.0, abs(u), -d * u) > 0.0
         return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
     def falling_hit(self, r, v, pull):
-        near = near_face_hit(self, r, v, pull)
-        d = _off(self, r)
+        near = self.near_face_hit(r, v, pull)
+        d = self.off(r)
         sign = math.copysign(0.5, d)
-        b, a = sign * along(self.normal, v), sign * along(self.normal, pull)
+        b, a = sign * self.along(v), sign * self.along(pull)
         # Between them the far one too
         far = rise_time(-abs(d) - self.radius, -b, -a)
         return select((self.side > 0.0) & (far < near), far, near), True
+
+    def near_face_hit(self, r, v, pull):
+        """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
+        d = self.off(r)
+        sign = math.copysign(0.5, d)
+        b, a = sign * self.along(v), sign * self.along(pull)
+        return rise_time(self.side * (abs(d) - self.radius), self.side * b, self.side * a)
 
     def safe_time(self, r, v, pull):
         time, _found = self.falling_hit(r, v, pull)
@@ -199,19 +208,19 @@ class SlabNumbers(Distance, ExactChord):
 
     def inner_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
-        return scaled(self.normal, _off(self, r0) + _off(self, r1))
+        return self.scaled(self.off(r0) + self.off(r1))
 
     def step_normal(self, r0, r1):
         return self.unit_normal(r0)
 
     def push(self, r0, p, kappa):
         # r1 = r0 + p - kappa (s0 + s1) n
-        k = kappa * (2.0 * _off(self, r0) + along(self.normal, p)) / (1.0 + kappa)
-        return r0 + (p - scaled(self.normal, k))
+        k = kappa * (2.0 * self.off(r0) + self.along(p)) / (1.0 + kappa)
+        return r0 + (p - self.scaled(k))
 
     def rise(self, r0, p, kappa):
         # q1 - q0 = (s0 + s1)(s1 - s0), and ds1/dkappa = -(s0 + s1)/(1 + kappa)
-        d, u = _off(self, r0), along(self.normal, p)
+        d, u = self.off(r0), self.along(p)
         w = 1.0 / (1.0 + kappa)
         both, change = (2.0 * d + u) * w, (u - 2.0 * kappa * d) * w
         risen = both * change
@@ -219,44 +228,46 @@ class SlabNumbers(Distance, ExactChord):
         return select(risen > -d * d, risen, -d * d), -2.0 * (d + change) * both * w
 
     def resolve(self, r, strength):
-        return r - scaled(self.normal, 2.0 * strength / (1.0 + 2.0 * strength) * _off(self, r))
+        return r - self.scaled(2.0 * strength / (1.0 + 2.0 * strength) * self.off(r))
 
     def chord_guess(self, r, p):
         # q1 = q0 with s0 + s1 = (2 s0 + p)/(1 + kappa) and s1 - s0 = (p - 2 kappa s0)/(1 + kappa)
-        return 0.5 * along(self.normal, p) / _off(self, r)
+        return 0.5 * self.along(p) / self.off(r)
 
     def chord_normal(self, r, p, kappa):
-        d = 2.0 * _off(self, r) + along(self.normal, p)
-        return scaled(self.normal, math.copysign(1.0, self.side * d))
+        d = 2.0 * self.off(r) + self.along(p)
+        return self.scaled(math.copysign(1.0, self.side * d))
+
+    # --- Of walls that move other than uniformly ---
 
     def bend(self, r):
-        # H = n n^T: for walls that move other than uniformly
+        # H = n n^T
         return (select(self.side > 0.0, 1.0, 0.0), 1.0, math.inf)
+
+    @property
+    def has_levels(self):
+        # Between its planes; of a solid there is one.
+        return self.side > 0.0
+
+    def level_along(self, seen):
+        # Of the two planes: a bound of the third derivative of the square would be ten times as far from it.
+        half = 0.5 * self.along(seen.v)
+        x, bend = self.off(seen.r), 0.5 * self.along(seen.a)
+        # Without a speed the plane behind is the near one, from which it leaves.
+        sign = math.copysign(1.0, select(half == 0.0, -x, half))
+        return Between(sign * x, abs(half), sign * bend, self.radius)
+
+    def moving_step(self, seen, longest):
+        x, side = self.off(seen.r), self.side
+        sign = select(x > 0.0, 1.0, -1.0)
+        x, half, bend = sign * x, 0.5 * sign * self.along(seen.v), 0.5 * sign * self.along(seen.a)
+        near = Level(side * (x - self.radius), side * half, side * bend, 1.0, 0.0)
+        near = level_step(self, seen, near, longest)
+        far = level_step(self, seen, Level(-x - self.radius, -half, -bend, 1.0, 0.0), longest)
+        return near._replace(time=select((side > 0.0) & (far.time < near.time), far.time, near.time))
 
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
     """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
-    across = normal_of(normal)
-    return SlabNumbers(across, float(along(across, vec(center))), half, half * half, side)
-
-
-def _off(surface, r):
-    """The signed distance from the middle."""
-    return along(surface.normal, r) - surface.offset
-
-
-# --- The level set ---------------------------------------------------------------------------------------
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
-def near_face_hit(surface, r, v, pull):
-    """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
-    d = _off(surface, r)
-    sign = math.copysign(0.5, d)
-    b, a = sign * along(surface.normal, v), sign * along(surface.normal, pull)
-    return rise_time(surface.side * (abs(d) - surface.radius), surface.side * b, surface.side * a)
-
-
-# --- Contact ---------------------------------------------------------------------------------------------
+    made = SlabNumbers(normal_of(normal), 0.0, half, half * half, side)
+    return made._replace(offset=float(made.along(vec(center))))

@@ -15,10 +15,10 @@ from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract, flights
 from ..approach import place, under_way
 from ..course import rise_near
-from ..fold import each, linked
+from ..rising import Step
 from ..rotation import Rotated
 from .plane import PlaneNumbers
-from .slab import SlabNumbers, near_face_hit
+from .slab import SlabNumbers
 
 _EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.
@@ -33,9 +33,9 @@ _SPACING = 6e-6
 
 
 class SolidNumbers(contract.Smooth):
-    """What kernels know of a body: its parts, and a length that bounds the round-off of their coordinates."""
+    """A body as kernels take it: its parts, and a length that bounds the round-off of their coordinates."""
 
-    parts: Any  # Chain or None
+    parts: tuple[Any, ...]
     side: float
     extent: float
 
@@ -58,22 +58,35 @@ class SolidNumbers(contract.Smooth):
     def safe_time(self, r, v, pull):
         # Outside of one part is outside of the body.
         longest = 0.0
-        for link in reversed(each(self.parts)):
-            longest = max(link.first.safe_time(r, v, pull), longest)
+        for part in reversed(self.parts):
+            longest = max(part.safe_time(r, v, pull), longest)
         return longest
 
     def unit_normal(self, r):
         # That of the part which the point is least deep in
         least, normal = math.inf, ZERO
-        for link in reversed(each(self.parts)):
-            depth = link.first.distance(r)
+        for part in reversed(self.parts):
+            depth = part.distance(r)
             if not depth > least:
-                least, normal = depth, link.first.unit_normal(r)
+                least, normal = depth, part.unit_normal(r)
         return normal
 
     def farthest_push(self):
         # phi is about the distance, whose faces are flat or wide: no pole within a push.
         return -math.inf
+
+    def moving_step(self, seen, longest):
+        # Of the part that the particle is least deep in: outside of one part is outside of the body.
+        found = Step(math.inf, 0.0, 0.0)
+        for part in reversed(self.parts):
+            here = part.moving_step(seen, longest)
+            # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
+            depth = part.gap_of(part.inner(seen.r))
+            time = select(depth > noise(part, self.extent, seen.r), 0.0, here.time)
+            least = here.level < found.level
+            level, half = select(least, here.level, found.level), select(least, here.half, found.half)
+            found = Step(level, half, select(time > found.time, time, found.time))
+        return found
 
     # --- Flight in lanes ---
 
@@ -96,7 +109,7 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
         parts: numbers of walls with side -1, or of planes, whose part is where normal.r > offset.
         extent: distance from the origin within which the parts' centres lie [m], where that is far.
     """
-    return SolidNumbers(linked(parts), -1.0, float(extent))
+    return SolidNumbers(tuple(parts), -1.0, float(extent))
 
 
 def _sign(part):
@@ -111,26 +124,26 @@ def _sign(part):
 def _largest(parts, r):
     """The largest phi of the parts, and its gradient."""
     most, gradient = -math.inf, ZERO
-    for link in reversed(each(parts)):
-        sign = _sign(link.first)
-        here = sign * link.first.phi(r)
+    for part in reversed(parts):
+        sign = _sign(part)
+        here = sign * part.phi(r)
         # No select: these may be arrays.
         use = 1.0 * (here >= most)
         most = np.maximum(here, most)
-        gradient = (use * sign) * link.first.gradient(r) + (1.0 - use) * gradient
+        gradient = (use * sign) * part.gradient(r) + (1.0 - use) * gradient
     return most, gradient
 
 
 def _bend_of_largest(parts, r, h):
     """The largest phi of the parts, and half its second derivatives, by differences."""
     most, bend = -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for link in reversed(each(parts)):
-        sign = _sign(link.first)
-        here = sign * link.first.phi(r)
+    for part in reversed(parts):
+        sign = _sign(part)
+        here = sign * part.phi(r)
         if not here < most:
             f = 0.25 * sign / h
-            x, y = _turn(link.first, r, Vec(h, 0.0, 0.0), f), _turn(link.first, r, Vec(0.0, h, 0.0), f)
-            z = _turn(link.first, r, Vec(0.0, 0.0, h), f)
+            x, y = _turn(part, r, Vec(h, 0.0, 0.0), f), _turn(part, r, Vec(0.0, h, 0.0), f)
+            z = _turn(part, r, Vec(0.0, 0.0, h), f)
             most, bend = here, Symmetric(x.x, y.y, z.z, x.y, y.z, x.z)
     return most, bend
 
@@ -172,11 +185,11 @@ def _entry_step(surface, gravity, r, v, t, last):
 def _last_entry(parts, gravity, extent, r, v):
     """When the last of the parts is entered that the particle is not inside of: (time, whether it is then)."""
     time, found = 0.0, True
-    for link in reversed(each(parts)):
-        here, found_here = _entry_of(link.first, gravity, r, v)
+    for part in reversed(parts):
+        here, found_here = _entry_of(part, gravity, r, v)
         # On the face of a part, which is left or entered now, the sign of the approach decides.
-        depth = link.first.gap_of(link.first.inner(r))
-        later = (here > time) & (not (depth > noise(link.first, extent, r)))
+        depth = part.gap_of(part.inner(r))
+        later = (here > time) & (not (depth > noise(part, extent, r)))
         time, found = select(later, here, time), select(later, found_here, found)
     return time, found
 
@@ -187,7 +200,7 @@ def _entry_of(part, gravity, r, v):
         return part.first_hit(r, v)
     pull = as_vector(gravity)
     if isinstance(part, SlabNumbers):
-        return near_face_hit(part, r, v, pull), True
+        return part.near_face_hit(r, v, pull), True
     if part.is_quartic:
         return rise_near(part.course(r, v, pull))
     return part.falling_hit(r, v, pull)
@@ -198,6 +211,3 @@ def noise(part, extent, r):
     gradient = total(absolute(part.gradient(r)))
     terms = part.gap_scale(r) + extent * gradient + abs(part.gap_of(0.0))
     return _ULPS * _EPSILON * terms
-
-
-# --- Contact ---------------------------------------------------------------------------------------------

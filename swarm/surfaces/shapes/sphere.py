@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 from ...checks import Vector, length
 from ...kernel.jit import select
-from ...kernel.vector import Vec, absolute, dot, norm, square, total, vec
+from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
+from ..levels import Level
+from ..relative import Bounds
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from .common import Distance, ExactChord
 
@@ -56,16 +58,20 @@ class Sphere(Surface):
         return farthest(self.center) + self.radius
 
 
+def _risen(d, p):
+    """2 d.p, and |d + p|^2 - |d|^2."""
+    dp = 2.0 * dot(d, p)
+    return dp, dp + p.x * p.x + p.y * p.y + p.z * p.z
+
+
 class SphereNumbers(Distance, ExactChord):
-    """What kernels know of a sphere; a ball may be small compared with the distance of a flight from it."""
+    """A sphere as kernels take it; a ball may be small compared with the distance of a flight from it."""
 
     center: Vec
     radius: float
     radius2: float
     curvature: float  # side/R
     side: float
-
-    has_levels = True
 
     def inner(self, r):
         return square(r - self.center)
@@ -85,6 +91,9 @@ class SphereNumbers(Distance, ExactChord):
         # 1/(2 R^2)
         k = 0.5 * self.curvature * self.curvature
         return r - ((square(d) - self.radius2) * k) * d
+
+    def may_reach(self, low, high):
+        return square(highest(highest(low - self.center, self.center - high), ZERO)) <= self.radius2
 
     def outward_acceleration(self, r, v, pull):
         # |v|^2/R + n.G
@@ -139,9 +148,26 @@ class SphereNumbers(Distance, ExactChord):
         n = 2.0 * (r - self.center) + p
         return n * (self.side / norm(n))
 
+    # --- Of walls that move other than uniformly ---
+
     def bend(self, r):
-        # H = 1: for walls that move other than uniformly
+        # H = 1
         return (self.side, 1.0, math.inf)
+
+    def level_along(self, seen):
+        d, side = seen.r - self.center, self.side
+        q, bend = square(d), square(seen.v) + dot(d, seen.a)
+        return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, 2.0 * math.sqrt(q), 1.0)
+
+    def bounds_along(self, seen, within):
+        # In a frame that its centre carries along: it does not turn.
+        drive = seen.drive
+        spin, arm = drive.angular_speed(), norm(self.center - drive.center)
+        return Bounds(
+            seen.speed + seen.weight * within + drive.fastest + spin * arm,
+            seen.weight + drive.hardest + spin * spin * arm,
+            drive.jerk + spin * spin * spin * arm,
+        )
 
 
 class SphereCavity(SphereNumbers):
@@ -160,16 +186,4 @@ def ball(center, radius):
     return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
 
 
-# --- The level set ---------------------------------------------------------------------------------------
-
-
-# --- Flight ----------------------------------------------------------------------------------------------
-
-
 # --- Contact ---------------------------------------------------------------------------------------------
-
-
-def _risen(d, p):
-    """2 d.p, and |d + p|^2 - |d|^2."""
-    dp = 2.0 * dot(d, p)
-    return dp, dp + p.x * p.x + p.y * p.y + p.z * p.z

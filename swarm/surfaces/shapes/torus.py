@@ -74,7 +74,7 @@ class Torus(Surface):
 
 
 class TorusNumbers(Distance):
-    """What kernels know of a torus."""
+    """A torus as kernels take it, about the z axis."""
 
     center: Vec
     major: float
@@ -83,31 +83,34 @@ class TorusNumbers(Distance):
     side: float
 
     def inner(self, r):
-        across, dz = _from_axis(self, r) - self.major, r.z - self.center.z
+        across, dz = self._from_axis(r) - self.major, r.z - self.center.z
         return across * across + dz * dz
 
     def slope(self, r):
-        d, f = r - self.center, 2.0 - 2.0 * self.major / _from_axis(self, r)
+        d, f = r - self.center, 2.0 - 2.0 * self.major / self._from_axis(r)
         return Vec(f * d.x, f * d.y, 2.0 * d.z)
 
     def hessian(self, r):
         # 1 across the tube, 1 - R/rho along it: I - (R/rho) e e^T
-        d, rho = r - self.center, _from_axis(self, r)
+        d, rho = r - self.center, self._from_axis(r)
         ex, ey, f = -d.y / rho, d.x / rho, self.major / rho
         return Symmetric(1.0 - f * ex * ex, 1.0 - f * ey * ey, 1.0, -f * ex * ey, 0.0, 0.0)
 
     def difference(self, r0, r1):
-        rho0, rho1 = _from_axis(self, r0), _from_axis(self, r1)
+        rho0, rho1 = self._from_axis(r0), self._from_axis(r1)
         d, both = r1 - r0, r0 + r1 - 2.0 * self.center
         across = d.x * both.x + d.y * both.y
         return across * (1.0 - 2.0 * self.major / (rho0 + rho1)) + d.z * both.z
 
+    # Of the same sign as the gap is F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho), along a
+    # flight a polynomial of degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without what cancels on the wall.
+
     def near(self, gravity, r, v):
-        return _near(self, r, v) if gravity is None else _near_of_fall(self, as_vector(gravity), r, v)
+        return self._near(r, v) if gravity is None else self._near_of_fall(as_vector(gravity), r, v)
 
     def bend(self, r):
         # Half way to the axis at most, where 1 - R/rho is largest.
-        rho = _from_axis(self, r)
+        rho = self._from_axis(r)
         along = 2.0 * self.major / rho
         return select(self.side > 0.0, 1.0, along - 1.0), 1.0 + along, 0.5 * rho
 
@@ -119,96 +122,79 @@ class TorusNumbers(Distance):
         # Where I + kappa H has its first pole: along the inner equator of a cavity, across the tube of a solid.
         return select(self.side > 0.0, self.major / self.radius - 1.0, -1.0)
 
+    def _from_axis(self, r):
+        """rho, never 0: on the axis the direction to the tube is not defined."""
+        d = r - self.center
+        return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), np.finfo(np.float64).tiny)
 
-def _from_axis(surface, r):
-    """rho, never 0: on the axis the direction to the tube is not defined."""
-    d = r - surface.center
-    return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), np.finfo(np.float64).tiny)
+    def _tube2(self, q):
+        """a^2, or that of a thicker tube that is near: from afar round-off of F is that of the distance."""
+        return select(q > _AFAR * self.radius2, q * (1.0 / _AFAR), self.radius2)
 
+    def _nearly(self):
+        return _CLOSE * self.major * self.major * self.radius2
 
-# --- The level set ---------------------------------------------------------------------------------------
+    def _near(self, r, v):
+        d, major, side = r - self.center, self.major, self.side
+        rho = self._from_axis(r)
+        across = rho - major
+        q, d2 = across * across + d.z * d.z, square(d)
+        tube2 = self._tube2(q)
+        level, bp, wp, wz = q - tube2, d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y, v.z * v.z
+        b, w = bp + d.z * v.z, wp + wz
+        # |d|^2 + R^2 - a^2 and its powers: level + 2 R rho, 2 b, w
+        f0 = level * (level + 4.0 * major * rho)
+        f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * d.z * v.z))
+        f2 = 4.0 * b * b + 2.0 * level * w + 4.0 * major * (across * wp + rho * wz)
+        far, ball2 = self._ball(d2)
+        size2 = major * self.radius + q
+        window = 2.0 * math.sqrt(size2 / w)
+        return Near(
+            select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -w, side * f2),
+            (select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w)),
+            select(far, math.inf, window), self._nearly(), (not far) & (tube2 == self.radius2),
+        )  # fmt: skip
 
+    def _near_of_fall(self, g, r, v):
+        d, major, side = r - self.center, self.major, self.side
+        rho = self._from_axis(r)
+        across = rho - major
+        q, d2 = across * across + d.z * d.z, square(d)
+        tube2 = self._tube2(q)
+        # |d + v t + G t^2/2|^2 by powers of t, and that of its components across the axis
+        bp, p2 = d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y + d.x * g.x + d.y * g.y
+        bz, z2 = d.z * v.z, v.z * v.z + d.z * g.z
+        b, s2 = bp + bz, p2 + z2
+        p3, p4 = v.x * g.x + v.y * g.y, 0.25 * (g.x * g.x + g.y * g.y)
+        s3, s4 = p3 + v.z * g.z, p4 + 0.25 * g.z * g.z
+        level, four = q - tube2, 4.0 * major * major
+        s0 = level + 2.0 * major * rho
+        f0 = level * (level + 4.0 * major * rho)
+        f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * bz))
+        f2 = 4.0 * b * b + 2.0 * level * s2 + 4.0 * major * (across * p2 + rho * z2)
+        f3 = 2.0 * (s0 * s3 + 2.0 * b * s2) - four * p3
+        f4 = 2.0 * (s0 * s4 + 2.0 * b * s3) + s2 * s2 - four * p4
+        far, ball2 = self._ball(d2)
+        size2 = major * self.radius + q
+        window = 2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * 4.0 * s4)))
+        return Near(
+            select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -s2, side * f2),
+            (
+                select(far, -s3, side * f3), select(far, -s4, side * f4),
+                select(far, 0.0, side * 2.0 * (2.0 * b * s4 + s2 * s3)),
+                select(far, 0.0, side * (2.0 * s2 * s4 + s3 * s3)),
+                select(far, 0.0, side * 2.0 * s3 * s4), select(far, 0.0, side * s4 * s4),
+            ),
+            window, self._nearly(), (not far) & (tube2 == self.radius2),
+        )  # fmt: skip
 
-# --- Flight ----------------------------------------------------------------------------------------------
-#
-# Of the same sign as the gap is F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho), along a flight
-# a polynomial of degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without what cancels on the wall.
+    def _ball(self, d2):
+        """Whether a solid is within a ball that a point is outside of; the square radius of one that is nearer to it.
 
-
-def _tube2(surface, q):
-    """a^2, or that of a thicker tube that is near: from afar round-off of F is that of the distance."""
-    return select(q > _AFAR * surface.radius2, q * (1.0 / _AFAR), surface.radius2)
-
-
-def _nearly(surface):
-    return _CLOSE * surface.major * surface.major * surface.radius2
-
-
-def _near(surface, r, v):
-    d, major, side = r - surface.center, surface.major, surface.side
-    rho = _from_axis(surface, r)
-    across = rho - major
-    q, d2 = across * across + d.z * d.z, square(d)
-    tube2 = _tube2(surface, q)
-    level, bp, wp, wz = q - tube2, d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y, v.z * v.z
-    b, w = bp + d.z * v.z, wp + wz
-    # |d|^2 + R^2 - a^2 and its powers: level + 2 R rho, 2 b, w
-    f0 = level * (level + 4.0 * major * rho)
-    f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * d.z * v.z))
-    f2 = 4.0 * b * b + 2.0 * level * w + 4.0 * major * (across * wp + rho * wz)
-    far, ball2 = _ball(surface, d2)
-    size2 = major * surface.radius + q
-    window = 2.0 * math.sqrt(size2 / w)
-    return Near(
-        select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -w, side * f2),
-        (select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w)),
-        select(far, math.inf, window), _nearly(surface), (not far) & (tube2 == surface.radius2),
-    )  # fmt: skip
-
-
-def _near_of_fall(surface, g, r, v):
-    d, major, side = r - surface.center, surface.major, surface.side
-    rho = _from_axis(surface, r)
-    across = rho - major
-    q, d2 = across * across + d.z * d.z, square(d)
-    tube2 = _tube2(surface, q)
-    # |d + v t + G t^2/2|^2 by powers of t, and that of its components across the axis
-    bp, p2 = d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y + d.x * g.x + d.y * g.y
-    bz, z2 = d.z * v.z, v.z * v.z + d.z * g.z
-    b, s2 = bp + bz, p2 + z2
-    p3, p4 = v.x * g.x + v.y * g.y, 0.25 * (g.x * g.x + g.y * g.y)
-    s3, s4 = p3 + v.z * g.z, p4 + 0.25 * g.z * g.z
-    level, four = q - tube2, 4.0 * major * major
-    s0 = level + 2.0 * major * rho
-    f0 = level * (level + 4.0 * major * rho)
-    f1 = 2.0 * (level * b + 2.0 * major * (across * bp + rho * bz))
-    f2 = 4.0 * b * b + 2.0 * level * s2 + 4.0 * major * (across * p2 + rho * z2)
-    f3 = 2.0 * (s0 * s3 + 2.0 * b * s2) - four * p3
-    f4 = 2.0 * (s0 * s4 + 2.0 * b * s3) + s2 * s2 - four * p4
-    far, ball2 = _ball(surface, d2)
-    size2 = major * surface.radius + q
-    window = 2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * 4.0 * s4)))
-    return Near(
-        select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -s2, side * f2),
-        (
-            select(far, -s3, side * f3), select(far, -s4, side * f4),
-            select(far, 0.0, side * 2.0 * (2.0 * b * s4 + s2 * s3)), select(far, 0.0, side * (2.0 * s2 * s4 + s3 * s3)),
-            select(far, 0.0, side * 2.0 * s3 * s4), select(far, 0.0, side * s4 * s4),
-        ),
-        window, _nearly(surface), (not far) & (tube2 == surface.radius2),
-    )  # fmt: skip
-
-
-def _ball(surface, d2):
-    """Whether a solid is within a ball that a point is outside of, and the square radius of one that is nearer to it.
-
-    To that ball the level is a quartic, or a parabola. Outside of it a cavity is not admissible, where soft walls let
-    a particle be.
-    """
-    wide2 = surface.major + surface.radius
-    wide2 = wide2 * wide2
-    ball2 = select(d2 > _AFAR * wide2, d2 * (1.0 / _AFAR), _NEARER * wide2)
-    return (surface.side < 0.0) & (d2 > _OUTER * wide2), ball2
-
-
-# --- Contact ---------------------------------------------------------------------------------------------
+        To that ball the level is a quartic, or a parabola. Outside of it a cavity is not admissible, where soft walls
+        let a particle be.
+        """
+        wide2 = self.major + self.radius
+        wide2 = wide2 * wide2
+        ball2 = select(d2 > _AFAR * wide2, d2 * (1.0 / _AFAR), _NEARER * wide2)
+        return (self.side < 0.0) & (d2 > _OUTER * wide2), ball2

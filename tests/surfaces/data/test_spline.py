@@ -46,10 +46,10 @@ def test_few_samples_of_a_cubic_are_that_cubic(least):
     made = spline.Spline(Vec(0.0, 0.0, 0.0), *(2 * [Vec(1.0, 1.0, 1.0)]), vec(3 * [least - 1.0]), 1.0, found)
     for point in np.random.default_rng(1).uniform(0.0, least - 1.0, (10, 3)):
         a, b, c = point
-        assert call(spline.value, made, point) == pytest.approx(a**3 - 2.0 * a * b + c**2 - 3.0, abs=1e-12)
-        value, slope = call(spline.value_and_slope, made, point)
+        assert call(made.value, point) == pytest.approx(a**3 - 2.0 * a * b + c**2 - 3.0, abs=1e-12)
+        value, slope = call(made.value_and_slope, point)
         assert np.allclose([value, *slope], [a**3 - 2 * a * b + c**2 - 3, 3 * a * a - 2 * b, -2 * a, 2 * c], atol=1e-12)
-        assert np.allclose(call(spline.half_bend, made, point), [3 * a, 0.0, 1.0, -1.0, 0.0, 0.0], atol=1e-12)
+        assert np.allclose(call(made.half_bend, point), [3 * a, 0.0, 1.0, -1.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_the_error_is_of_order_four():

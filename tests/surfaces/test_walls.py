@@ -1,4 +1,4 @@
-"""The folds over a chain are minima, sums and picks over the list of surfaces."""
+"""What is asked of all walls: minima, sums and picks over the list of surfaces."""
 
 import math
 
@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import flights, fold
+from swarm.surfaces import flights
+from swarm.surfaces.walls import Walls, all_walls
 
 every_chain = pytest.mark.parametrize(
     "names",
@@ -26,9 +27,9 @@ every_chain = pytest.mark.parametrize(
 
 
 def both(names):
-    """The chain, and the surfaces' numbers one by one."""
+    """The walls, and the surfaces' numbers one by one."""
     surfaces = tuple(SURFACES[name]() for name in names)
-    return fold.chain_of(surfaces), [wall for surface in surfaces for wall in surface.walls()]
+    return all_walls(surfaces), [wall for surface in surfaces for wall in surface.walls()]
 
 
 def is_out(numbers, point):
@@ -53,7 +54,7 @@ def test_first_hit_is_the_least_of_all(names, falling, point, velocity, pull):
     gravity = Gravity(*pull) if falling else None
     one, more = ("falling_hit", (pull,)) if falling else ("first_hit", ())
     hits = [call(getattr(numbers, one), point, velocity, *more) for numbers in single]
-    assert fold.length(whole) == len(names)
+    assert whole.length() == len(names)
     assert call(flights.first_hit, whole, gravity, point, velocity) == first_least(hits)
     for index, hit in enumerate(hits):
         assert call(flights.hit_of, whole, gravity, index, point, velocity) == hit
@@ -91,16 +92,16 @@ def test_free_time_is_the_least_safe_time(names, point, velocity, pull):
 def test_an_index_picks_its_surface(names, point, free, kappa):
     whole, single = both(names)
     for index, numbers in enumerate(single):
-        for pick, one, arguments in [
-            (fold.unit_normal, "unit_normal", (point,)),
-            (fold.chord_guess, "chord_guess", (point, 0.1 * free)),
-            (fold.chord_improve, "chord_improve", (point, 0.1 * free, kappa)),
-            (fold.chord_normal, "chord_normal", (point, 0.1 * free, kappa)),
-            (fold.settle, "settle", (point,)),
-            (fold.push, "push", (point, free, kappa)),
-            (fold.inner_gradient, "inner_gradient", (point, free)),
+        for name, arguments in [
+            ("unit_normal", (point,)),
+            ("chord_guess", (point, 0.1 * free)),
+            ("chord_improve", (point, 0.1 * free, kappa)),
+            ("chord_normal", (point, 0.1 * free, kappa)),
+            ("settle", (point,)),
+            ("push", (point, free, kappa)),
+            ("inner_gradient", (point, free)),
         ]:
-            assert call(pick, whole, index, *arguments) == call(getattr(numbers, one), *arguments), one
+            assert call(getattr(whole, name), index, *arguments) == call(getattr(numbers, name), *arguments), name
 
 
 @every_chain
@@ -108,9 +109,9 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
 def test_who_is_outside_and_who_is_touched(names, point, free):
     whole, single = both(names)
     out = [is_out(numbers, point) for numbers in single]
-    assert call(fold.outside, whole, -1.0, point) == any(out)
+    assert call(Walls.outside, whole, -1.0, point) == any(out)
     for index in range(len(single)):
-        assert call(fold.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
+        assert call(Walls.outside, whole, index, point) == any(out[:index] + out[index + 1 :])
     touched = [now or is_out(numbers, point + free) for now, numbers in zip(out, single, strict=True)]
     first = touched.index(True) if any(touched) else -1
-    assert call(fold.touched, whole, point, free) == (first, sum(touched))
+    assert call(Walls.touched, whole, point, free) == (first, sum(touched))

@@ -16,8 +16,7 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-# Frames that a trace may nest. A fold over the walls of a scene is a function of the first that calls itself for the
-# others: 24 planes, the most that a scene has, nest 1600, in less than 512 kB of a stack.
+# Frames that a trace may nest; 1600 take less than 512 kB of a stack.
 _DEEPEST = 10_000
 
 # LLVM's levels: for one function by itself, and for a module.
@@ -104,7 +103,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
 
 
 class LongKernelCompiler(KernelCompiler):
-    """The same for a `_LongKernel`."""
+    """Numba's compiler for a `_LongKernel`."""
 
     library = _LongKernel
 

@@ -1,0 +1,188 @@
+"""The fields of bodies by their kind: each body at its place, with its size and its rotation or axis."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...kernel.vector import vec
+from ..shapes.box import Box
+from ..shapes.capsule import Capsule
+from ..shapes.cylinder import Cylinder
+from ..shapes.ellipsoid import Ellipsoid
+from ..shapes.sphere import Sphere, ball
+from ..surface import Surface
+from .many import Floats, Many, field_of
+from .members import Members, aligned
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Spheres(Many):
+    """Many solid balls, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
+
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
+
+    Args:
+        centers: (n, 3) [m], one row a ball.
+        radii: (n,) or one number for all, above 0 [m].
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next ball: see `python -m bench fields`; memory and time to build linear in n.
+
+    >>> Spheres([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25).phi([[0.25, 0.6], [0.0, 0.0], [0.0, 0.0]])
+    array([0.  , 0.15])
+    """
+
+    kind: ClassVar[type[Surface]] = Sphere
+    centers: Any
+    radii: Any
+    side: str = "outside"
+
+    def size(self) -> float:
+        return float(self.radii.min())
+
+    def extent(self) -> float:
+        return float((np.abs(self.centers).max(axis=1) + self.radii).max())
+
+    def corners(self) -> tuple[Floats, Floats]:
+        return self.centers.T - self.radii, self.centers.T + self.radii
+
+    @cached_property
+    def members(self) -> Members:
+        """The field as kernels take it."""
+        table = aligned(np.column_stack([self.centers, self.radii]))
+        return field_of(ball(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Cylinders(Many):
+    """Many solid cylinders, endless or capped, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
+
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius
+    and optionally axis_x, axis_y, axis_z, length.
+
+    Args:
+        centers: (n, 3) [m], one row a cylinder.
+        radii: (n,) or one number for all, above 0 [m].
+        axes: (n, 3) or three numbers for all, not all 0.
+        lengths: None (endless), or (n,) or one number for all, the distances above 0 [m] between the caps.
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next one. One that is endless along no axis of the scene is in all cells.
+
+    >>> Cylinders([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25).phi([[0.25], [0.0], [7.0]])
+    array([0.])
+    """
+
+    kind: ClassVar[type[Surface]] = Cylinder
+    centers: Any
+    radii: Any
+    axes: Any = (0.0, 0.0, 1.0)
+    lengths: Any = None
+    side: str = "outside"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Capsules(Many):
+    """Many solid capsules, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
+
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius, length
+    and optionally axis_x, axis_y, axis_z.
+
+    Args:
+        centers: (n, 3) [m], one row a capsule.
+        radii: (n,) or one number for all, above 0 [m].
+        lengths: of the straight parts, (n,) or one number for all, above 0 [m].
+        axes: (n, 3) or three numbers for all, not all 0.
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next one.
+
+    >>> Capsules([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25, 0.5).phi([[0.25], [0.0], [0.2]])
+    array([0.])
+    """
+
+    kind: ClassVar[type[Surface]] = Capsule
+    centers: Any
+    radii: Any
+    lengths: Any
+    axes: Any = (0.0, 0.0, 1.0)
+    side: str = "outside"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Boxes(Many):
+    """Many solid boxes, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
+
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, half_x, half_y, half_z
+    and optionally q_w, q_x, q_y, q_z.
+
+    Args:
+        centers: (n, 3) [m], one row a box.
+        half_widths: (n, 3) or three numbers for all, above 0 [m].
+        rotations: None, or (n, 4), a quaternion (w, x, y, z) of any length for each, about its centre.
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next one.
+
+    >>> Boxes([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (0.25, 0.25, 0.25)).phi([[0.25, 0.5], [0.0, 0.0], [0.0, 0.0]])
+    array([0.  , 0.25])
+    """
+
+    kind: ClassVar[type[Surface]] = Box
+    centers: Any
+    half_widths: Any
+    rotations: Any = None
+    side: str = "outside"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Ellipsoids(Many):
+    """Many solid ellipsoids, one surface; the space outside of all of them.
+
+    They may overlap one another, and reach through other walls.
+
+    In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, a, b, c
+    and optionally q_w, q_x, q_y, q_z.
+
+    Args:
+        centers: (n, 3) [m], one row an ellipsoid.
+        semi_axes: (n, 3) or three numbers for all, above 0 [m].
+        rotations: None, or (n, 4), a quaternion (w, x, y, z) of any length for each, about its centre.
+        side: "outside".
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    Cost: a grid of cells finds the next one.
+
+    >>> Ellipsoids([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (0.25, 0.25, 0.5)).phi([[0.25, 1.0], [0.0, 0.0], [0.0, 0.5]])
+    array([0., 0.])
+    """
+
+    kind: ClassVar[type[Surface]] = Ellipsoid
+    centers: Any
+    semi_axes: Any
+    rotations: Any = None
+    side: str = "outside"

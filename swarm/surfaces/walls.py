@@ -1,0 +1,190 @@
+"""All walls of a scene at once, and what is asked of one of them by its number."""
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from ..kernel.jit import select
+from ..kernel.record import Record
+from ..kernel.vector import ZERO
+
+
+class Field(Record):
+    """Many walls of one kind, each of which has a number."""
+
+    members: Any
+
+    def count(self):
+        """How many they are."""
+        return self.members.count()
+
+
+class Listed(Field):
+    """A field of walls that are surfaces of their own: each has a row of what it gives."""
+
+
+class Touched(Record):
+    """The first wall that a step is in contact with, or -1, and how many there are."""
+
+    wall: float
+    number: float
+
+
+class Walls(Record):
+    """The walls of a scene: its fields, those that are `Listed` last, and then all other walls.
+
+    What is asked of one wall is a method too, with the number of the wall before the other arguments.
+    """
+
+    walls: tuple[Any, ...]
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    def at(self, left):
+        """The walls when so much of the frame is left [s]: themselves, where none moves."""
+        return self
+
+    def during(self, left, after):
+        """The walls over a step, at whose start and end so much of the frame is left [s]."""
+        return self
+
+    def in_steps(self):
+        """A number where a straight flight to any wall takes steps in lanes: a type for the compiler.
+
+        None where its hit has a closed form, or is asked for as a whole.
+        """
+        steps = None
+        for wall in self.walls:
+            steps = wall.in_steps if steps is None else steps
+        return steps
+
+    # --- Their numbers and rows ---
+
+    def numbered(self):
+        """(number of the first, wall or field) of each."""
+        found: tuple[Any, ...] = ()
+        number = 0.0
+        for wall in self.walls:
+            found = (*found, (number, wall))
+            number = number + (wall.count() if isinstance(wall, Field) else 1.0)
+        return found
+
+    def fields(self):
+        """`numbered` of the fields."""
+        return tuple((number, wall) for number, wall in self.numbered() if isinstance(wall, Field))
+
+    def others(self):
+        """The walls that are in no field."""
+        return Walls(tuple(wall for wall in self.walls if not isinstance(wall, Field)))
+
+    def count_in_fields(self):
+        """How many walls its fields have."""
+        return sum((wall.count() for wall in self.walls if isinstance(wall, Field)), 0.0)
+
+    def length(self):
+        """How many rows there are, one for a field: a constant for the compiler if none is `Listed`."""
+        rows = 0
+        for wall in self.walls:
+            rows += int(wall.count()) if isinstance(wall, Listed) else 1
+        return rows
+
+    def row(self, number):
+        """The row in which it is booked what this wall gives: a field has one."""
+        stops = tuple(first + wall.count() for first, wall in self.fields() if not isinstance(wall, Listed))
+        row = int(number - stops[-1]) + len(stops) if stops else int(number)
+        for k, stop in reversed(tuple(enumerate(stops))):
+            row = select(number < stop, k, row)
+        return row
+
+    # --- Of one wall ---
+
+    def of(self, number, neutral, ask, *given):
+        """ask(wall, *given) of the wall with this number.
+
+        Of any other number it is that of the last wall: a caller that has no wall ignores it. `neutral` is any value of
+        its type.
+        """
+        answer = None
+        for first, wall in reversed(self.numbered()):
+            if isinstance(wall, Field):
+                one, here = wall.members.wall(number - first), number < first + wall.count()
+            else:
+                one, here = wall, number == first
+            value = ask(one, *given)
+            answer = value if answer is None else select(here, value, answer)
+        return neutral if answer is None else answer
+
+    # --- Of all ---
+
+    def shortest_pace(self):
+        """The shortest pace of all walls."""
+        shortest = math.inf
+        for wall in reversed(self.walls):
+            one = wall.members if isinstance(wall, Field) else wall
+            shortest = min(one.pace(), shortest)
+        return shortest
+
+    def chord_sweeps(self):
+        """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
+        return max((0, *(wall.chord_sweeps for wall in self.walls)))
+
+    def outside(self, number, r):
+        """Whether a point is outside any wall but this one (-1: any at all)."""
+        found = False
+        for first, wall in self.numbered():
+            if isinstance(wall, Field):
+                found = wall.members.is_in_another(number - first, r) | found
+            else:
+                here = wall.level_of(wall.inner(r)) > 0.0
+                found = (here & (number != first)) | found
+        return found
+
+    def pushes(self, number, kappa):
+        """Whether this wall can push with kappa: in its direction and short of the pole."""
+        found = False
+        for k, wall in enumerate(self.walls):
+            farthest = wall.farthest_push()
+            here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
+            found = ((number == k) & here) | found
+        return found
+
+    def touched(self, r, p):
+        """The walls that a step with free displacement p is in contact with."""
+        found = Touched(-1.0, 0.0)
+        for k, wall in reversed(tuple(enumerate(self.walls))):
+            before = wall.level_of(wall.inner(r))
+            after = wall.level_of(wall.end_inner(r + p))
+            contact = (before > 0.0) | (after > 0.0)
+            found = Touched(select(contact, float(k), found.wall), found.number + select(contact, 1.0, 0.0))
+        return found
+
+
+# What is asked of one wall by its number, and any value of the type of the answer.
+_ASKED = {
+    **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "way"), ZERO),
+    **dict.fromkeys(("unit_normal", "settle", "push", "inner_gradient", "step_normal", "chord_normal"), ZERO),
+    **dict.fromkeys(("distance", "outward_acceleration", "chord_guess", "chord_improve"), 0.0),
+    "flat": False,
+}
+
+
+def _asked(name: str, neutral: Any) -> Any:
+    def ask(wall, *given):
+        answer = getattr(wall, name)
+        return answer(*given) if callable(answer) else answer
+
+    def asked(self, number, *given):
+        return self.of(number, neutral, ask, *given)
+
+    return asked
+
+
+for _name, _neutral in _ASKED.items():
+    setattr(Walls, _name, _asked(_name, _neutral))
+
+
+def all_walls(surfaces: Iterable[Any]) -> Walls:
+    """The walls of surfaces, in their order."""
+    return Walls(tuple(wall for surface in surfaces for wall in surface.walls()))
