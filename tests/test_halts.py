@@ -13,7 +13,7 @@ import pytest
 
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
-from swarm.lanes import block, meet, slide
+from swarm.lanes import block, contact_events, slide
 from swarm.lanes.table import LANES
 from swarm.reacting import queue
 from swarm.run import reacting, turns
@@ -53,9 +53,9 @@ def test_turns_between_kernels_without_time_are_bounded(monkeypatch, every):
         turned.append(about[-1])
         return in_turn(*about)
 
-    monkeypatch.setattr(meet, "_decide", decide)
-    monkeypatch.setattr(meet, "_step", in_turn)
-    monkeypatch.setattr(meet, "return_particle", lambda *about: None)
+    monkeypatch.setattr(contact_events, "_decide", decide)
+    monkeypatch.setattr(contact_events, "_step", in_turn)
+    monkeypatch.setattr(contact_events, "return_particle", lambda *about: None)
     where = r"at \(0\.2, 0, 0\) m, at surfaces\[0\] \(Plane\) at 0(\.\d+|e-\d+)? s"
     with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is {where}"):
         run_in_plain_python(FLOOR, TWO, **({} if every is None else {"every": every}))
@@ -79,13 +79,14 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
     """Also one whose time passes by a hair a step: a crossing would take 1e9 steps."""
     passes = []
 
-    def creep(kind, method, chain, gravity, lanes, live):
+    def creep(call, live):
         passes.append(1)
-        lanes.lane(0).left -= 1e-15
-        lanes.event[0] = 0
+        call.lanes.lane(0).left -= 1e-15
+        call.lanes.event[0] = 0
 
-    for name, instead in (("compose", creep), ("end_steps", lambda *about: None), ("account", lambda *about: None)):
-        monkeypatch.setattr(slide, name, instead)
+    monkeypatch.setattr(slide, "compose", creep)
+    monkeypatch.setattr(slide, "end_steps", lambda *about: None)
+    monkeypatch.setattr(slide.Slide, "account", lambda *about: None)
     with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is at \(0\.2, 0, 0\) m"):
         run_in_plain_python(FLOOR, TWO)
     assert len(passes) <= 2 * slide.LOOK
@@ -131,7 +132,7 @@ ALL_END = "WallTimeError True\nKeyboardInterrupt True\nKeyboardInterrupt True\n"
 # Turns between kernels without end.
 IN_TURN = """
 from swarm.contact.events import CAREFUL, EVENT
-from swarm.lanes import meet
+from swarm.lanes import contact_events
 from swarm.run import turns
 turns.MOST = 10**12
 
@@ -149,10 +150,10 @@ def in_turn(method, chain, gravity, share, i):
 
 tier, every = {tier!r}, {every!r}
 if tier == "always":
-    meet.meet_block = again  # of all kernels only this one is not compiled
+    contact_events.meet_block = again  # of all kernels only this one is not compiled
 else:
-    meet._decide = meet._step = in_turn
-    meet.return_particle = lambda *about: None
+    contact_events._decide = contact_events._step = in_turn
+    contact_events.return_particle = lambda *about: None
 # It chatters for 0.04 s first.
 scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5)], (0.0, 0.0, -9.81))
 start = swarm.Particles([0.0, 0.0, 1e-3], [1.0, 0.0, 0.0])
@@ -267,7 +268,7 @@ scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0), plate])
 report(scene, swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01), swarm.Impact(), until=1e9, compile="never")
 """
 CHAIN = """
-from swarm.lanes.tied import advance
+from swarm.lanes.bodies import advance
 real = advance._judge
 def noted(*about):
     note()
@@ -279,12 +280,12 @@ report(scene, start, swarm.Impact(dt=1e-2), until=1e9, compile="never")
 """
 # What rests on a wall that moves, in a frame of 2e9 of its swings.
 RESTING = """
-from swarm.lanes import stay
-real = stay._clear
+from swarm.lanes import sticking
+real = sticking._clear
 def noted(*about):
     note()
     return real(*about)
-stay._clear = noted
+sticking._clear = noted
 floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.9, motion=swarm.Oscillation((0.01, 0.0, 0.0), 0.5))
 start = swarm.Particles([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
 report(swarm.Scene([floor], (0.0, 0.0, -9.81)), start, swarm.Impact(), until=1e8, compile="never")

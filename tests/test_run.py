@@ -49,16 +49,13 @@ def test_every_particle_that_is_not_done_follows_once(n, size):
     number, pending = -(-n // size), np.zeros(events.PHASES, np.int64)
     draws = lanes.Draws(np.zeros(1, np.int64), np.arange(number), size, np.empty(number, np.int64))
     share = lanes.Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0, 0, 1.0)
-    i, stop, drawn, found = 0, 0, 0, []
-    while True:
-        i, stop, drawn = lanes.following_particle(share, events.FLYING, i, stop, drawn)
-        if i == stop:
-            break
-        found.append(i)
-        i += 1
+    place, found = share.following(events.FLYING, lanes.Place(0, 0, 0)), []
+    while not place.is_end():
+        found.append(place.i)
+        place = share.following(events.FLYING, place.after())
     assert found == np.flatnonzero(phase == events.FLYING).tolist()
     assert pending.sum() == pending[events.ARRIVED] == n - len(found)
-    assert draws.mine[:drawn].tolist() == list(range(len(draws.mine)))
+    assert draws.mine[: place.drawn].tolist() == list(range(len(draws.mine)))
 
 
 @pytest.mark.parametrize("n", [1, observables.CHUNK, 3 * observables.CHUNK + 5])

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from ..lanes.tied.arrays import Ties, Touching
-from ..lanes.tied.contacts import MOST_CONTACTS
-from ..lanes.tied.soft import Soft
+from ..lanes.bodies.arrays import Ties, Touching
+from ..lanes.bodies.contacts import MOST_CONTACTS
+from ..lanes.bodies.penalty_contact import Soft
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
 from ..particles import Floats

@@ -13,16 +13,13 @@ from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
 from ..surfaces import flights
 from ..surfaces.moving import Carried
-from .table import EIGHT, MOVED, STRIDE, Number, Rows, copy_lane, table
+from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 
 _named = Rows()
 
 
-class Flying(Record):
+class Flying(Advanced):
     """A particle that flies, in its lane."""
-
-    rows: Array
-    i: int
 
     r, v, left, own, hits = _named.vector(), _named.vector(), _named.number(), _named.vector(), _named.number()
     # The first of what its method keeps of it, where contacts change the energy: twice that, per mass.
@@ -68,8 +65,80 @@ class Lanes(NamedTuple):
     def given(self, method, i):
         """A lane as methods are given it."""
         lane = self.lane(i)
-        kept = method.own(*lane.own)
-        return methods.Lane(lane.r, lane.v, lane.left, lane.hits, kept)
+        return methods.Lane(lane.r, lane.v, lane.left, lane.hits, method.own(*lane.own))
+
+    def load(self, method, chain, share, i, k):
+        """Particle i into lane k, as it starts the frame, or as a halt left it."""
+        self.particle[k] = i
+        state, lane, left = share.state, self.lane(k), 0.0
+        if state.contacts is not None:
+            left = state.contacts.left[i]
+            # Where nothing lasts none of these arrays is written: their memory is not even there.
+            if left > 0.0:
+                state.contacts.left[i] = 0.0
+        if share.halted.particle.size > 0 and not left > 0.0 and self._pick_up(share.halted, i, k):
+            return
+        i = index(i)
+        lane.r, lane.v = column(state.position, 0, i), column(state.velocity, 0, i)
+        lane.own = Vec(*method.constants(state.mass[i], state.energy[i], speed2_scale(state, i)))
+        lane.left, lane.hits = select(left > 0.0, left, share.span), 0.0
+        for s in range(booked(chain)):
+            self.impulse[s, k] = 0.0
+
+    @outlined
+    def _pick_up(self, halted, i, k):
+        """Particle i into lane k as a halt left it, if one did; whether one did."""
+        first, last = 0, halted.particle.size
+        while first < last:
+            middle = (first + last) // 2
+            if halted.particle[middle] < i:
+                first = middle + 1
+            else:
+                last = middle
+        if first == halted.particle.size or halted.particle[first] != i:
+            return False
+        copy_lane(halted.rows, first, self.rows, k, Flying.ROWS)
+        for s in range(self.impulse.shape[0]):
+            self.impulse[s, k] = halted.rows[Flying.ROWS + s, first]
+        return True
+
+    @outlined
+    def leave(self, live):
+        """The live lanes, between two passes: what one pass leaves for the next."""
+        for k in range(live):
+            copy_lane(self.rows, k, self.left_behind, k, Flying.ROWS)
+            for s in range(self.impulse.shape[0]):
+                self.left_behind[Flying.ROWS + s, k] = self.impulse[s, k]
+
+    def retire(self, method, chain, share, k):
+        """Lane k back into its particle, which has arrived or goes on along a wall."""
+        state, lane, i = share.state, self.lane(k), index(self.particle[k])
+        put(state.position, 0, i, lane.r)
+        put(state.velocity, 0, i, lane.v)
+        state.impacts[i] += np.int64(lane.hits)
+        for s in range(booked(chain)):
+            state.impulse[s, i] += self.impulse[s, k] * state.mass[i]
+        if method.dissipates:
+            # Each particle knows its energy: what it has lost is accounted for with it.
+            now = 0.5 * lane.twice
+            if method.laws.loses:
+                work = 0.0
+                for s in range(chain.length(), booked(chain)):
+                    work += self.impulse[s, k]
+                state.dissipated[i] += state.mass[i] * (state.energy[i] - now + work)
+            state.energy[i] = now
+        phase = ARRIVED
+        if state.contacts is not None and lane.left > 0.0:
+            phase, contacts = EVENT, state.contacts
+            contacts.left[i], contacts.met[i] = lane.left, self.wall[k]
+            contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+        share.hand_over(i, phase)
+
+    def move(self, chain, source, target):
+        """The last live lane into the free slot. What flight and contact leave for each other need not move."""
+        copy_lane(self.rows, source, self.rows, target, Flying.ROWS)
+        copy_lane(self.impulse, source, self.impulse, target, booked(chain))
+        self.particle[target] = self.particle[source]
 
 
 class Halted(Record):
@@ -82,7 +151,7 @@ class Halted(Record):
     rows: Array  # (ROWS + booked, particles) the lane's rows, then its impulses
 
     def time_left(self):
-        """What is left of the frame of each."""
+        """The time left of the frame of each."""
         return self.rows[Flying.left.row]
 
 
@@ -98,6 +167,22 @@ class Draws(NamedTuple):
     order: Array  # int64, the draws
     size: int
     mine: Array  # int64, the draws of this thread, in order
+
+
+class Place(Record):
+    """Where a thread is among the particles that it draws."""
+
+    i: int  # the next particle
+    stop: int  # after the last one of its draw
+    drawn: int  # draws so far
+
+    def is_end(self):
+        """Whether no particle is left."""
+        return self.i == self.stop
+
+    def after(self):
+        """The place of the particle after this one."""
+        return Place(self.i + 1, self.stop, self.drawn)
 
 
 class Share(NamedTuple):
@@ -120,10 +205,37 @@ class Share(NamedTuple):
         """The log and the counts of impacts, if the run has any."""
         return tuple(one for one in (self.log, self.counts) if one is not None)
 
+    def note_impact(self, method, chain, i, struck):
+        """Log and count an impact of particle i, a `log.Struck`."""
+        for watch in self.watches():
+            watch.add_row(method, chain, self.state, i, struck)
+
     def hand_over(self, i, phase):
         """Leave particle i to the kernel of a phase."""
         self.phase[i] = phase
         self.pending[phase] += 1
+
+    def following(self, phase, place):
+        """The `Place` of the first particle from this one on that is in a phase, of another draw if need be.
+
+        Counts those in other phases, which other kernels advance.
+        """
+        draws, phases, pending = self.draws, self.phase, self.pending
+        i, stop, drawn = place
+        while True:
+            while i < stop and phases[i] != phase:
+                pending[phases[i]] += 1
+                i += 1
+            if i < stop:
+                return Place(i, stop, drawn)
+            k = next_of(draws.ticket)
+            if k >= draws.order.size:
+                return Place(i, i, drawn)
+            k = draws.order[k]
+            i = k * draws.size
+            stop = min(i + draws.size, phases.size)
+            draws.mine[drawn] = k
+            drawn += 1
 
 
 def empty(walls: int, rows: int, period: Any = None) -> Lanes:
@@ -160,107 +272,7 @@ def take(draws: Draws, some: int) -> Array:
     return draws.order[first : first + some]
 
 
-def following_particle(share, phase, i, stop, drawn):
-    """(particle, stop, draws so far): the first from i on that is in this phase, of another draw if need be; or stop.
-
-    Counts those in other phases, which other kernels advance.
-    """
-    draws, phases, pending = share.draws, share.phase, share.pending
-    while True:
-        while i < stop and phases[i] != phase:
-            pending[phases[i]] += 1
-            i += 1
-        if i < stop:
-            return i, stop, drawn
-        k = next_of(draws.ticket)
-        if k >= draws.order.size:
-            return i, i, drawn
-        k = draws.order[k]
-        i = k * draws.size
-        stop = min(i + draws.size, phases.size)
-        draws.mine[drawn] = k
-        drawn += 1
-
-
-# --- Into lanes and out of them --------------------------------------------------------------------------
-
-
-def load(method, chain, lanes, k, share, i):
-    """Particle i into lane k, as it starts the frame, or as a halt left it."""
-    lanes.particle[k] = i
-    state, halted, lane = share.state, share.halted, lanes.lane(k)
-    left = 0.0 if state.contacts is None else rest_of_frame(state.contacts, i)
-    if halted.particle.size > 0 and not left > 0.0 and _pick_up(lanes, k, halted, i):
-        return
-    i = index(i)
-    lane.r, lane.v = column(state.position, 0, i), column(state.velocity, 0, i)
-    lane.own = Vec(*method.constants(state.mass[i], state.energy[i], speed2_scale(state, i)))
-    lane.left, lane.hits = select(left > 0.0, left, share.span), 0.0
-    for s in range(booked(chain)):
-        lanes.impulse[s, k] = 0.0
-
-
-def rest_of_frame(contacts, i):
-    """What is left of the frame of a particle that comes from a wall; 0 at its start."""
-    left = contacts.left[i]
-    # Where nothing lasts none of these arrays is written: their memory is not even there.
-    if left > 0.0:
-        contacts.left[i] = 0.0
-    return left
-
-
-@outlined
-def _pick_up(lanes, k, halted, i):
-    """What a halt left of particle i into lane k; whether there is any."""
-    first, last = 0, halted.particle.size
-    while first < last:
-        middle = (first + last) // 2
-        if halted.particle[middle] < i:
-            first = middle + 1
-        else:
-            last = middle
-    if first == halted.particle.size or halted.particle[first] != i:
-        return False
-    copy_lane(halted.rows, first, lanes.rows, k, Flying.ROWS)
-    for s in range(lanes.impulse.shape[0]):
-        lanes.impulse[s, k] = halted.rows[Flying.ROWS + s, first]
-    return True
-
-
-@outlined
-def leave(lanes, live):
-    """The live lanes, between two passes: what one pass leaves for the next."""
-    for k in range(live):
-        copy_lane(lanes.rows, k, lanes.left_behind, k, Flying.ROWS)
-        for s in range(lanes.impulse.shape[0]):
-            lanes.left_behind[Flying.ROWS + s, k] = lanes.impulse[s, k]
-
-
-def retire(method, chain, lanes, k, share):
-    """Lane k back into its particle, which has arrived or goes on along a wall."""
-    state, lane, i = share.state, lanes.lane(k), index(lanes.particle[k])
-    put(state.position, 0, i, lane.r)
-    put(state.velocity, 0, i, lane.v)
-    state.impacts[i] += np.int64(lane.hits)
-    for s in range(booked(chain)):
-        state.impulse[s, i] += lanes.impulse[s, k] * state.mass[i]
-    if method.dissipates:
-        # Each particle knows its energy: what it has lost is accounted for with it.
-        now = 0.5 * lane.twice
-        if method.laws.loses:
-            state.dissipated[i] += state.mass[i] * (state.energy[i] - now + _work(chain, lanes.impulse, k))
-        state.energy[i] = now
-    phase = ARRIVED if state.contacts is None else _phase_after(state.contacts, i, lane.left, lanes.wall[k])
-    share.hand_over(i, phase)
-
-
-def _phase_after(contacts, i, left, wall):
-    """The phase of a particle that has arrived, or whose contact lasts."""
-    if not left > 0.0:
-        return ARRIVED
-    contacts.left[i], contacts.met[i] = left, wall
-    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
-    return EVENT
+# --- Of one particle -------------------------------------------------------------------------------------
 
 
 def booked(chain):
@@ -268,30 +280,7 @@ def booked(chain):
     return 2 * chain.length() if isinstance(chain, Carried) else chain.length()
 
 
-def _work(chain, impulse, k):
-    """The energy per mass that walls that move have given a lane."""
-    total = 0.0
-    for s in range(chain.length(), booked(chain)):
-        total += impulse[s, k]
-    return total
-
-
-def move(chain, lanes, source, target):
-    """The last live lane into the free slot. What flight and contact leave for each other need not move."""
-    copy_lane(lanes.rows, source, lanes.rows, target, Flying.ROWS)
-    copy_lane(lanes.impulse, source, lanes.impulse, target, booked(chain))
-    lanes.particle[target] = lanes.particle[source]
-
-
-# --- Of one particle -------------------------------------------------------------------------------------
-
-
 def speed2_scale(state, i):
     """The square of the speed that a particle's energy scale is that of."""
     scale = state.inverse_scale[i]
     return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)
-
-
-def goes_on_by(method, v, left):
-    """The time from one look to the next by which a particle must go on that has so much left of its frame [s]."""
-    return min(method.instant(v), MOVED * left)

@@ -20,13 +20,12 @@ from ..surfaces.moving import Carried
 from ..surfaces.walls import Field, Listed
 from . import log as impact_log
 from .accounts import book_heat
-from .arrays import following_particle, goes_on_by, leave, load, move, retire
 from .escape import let_out_lanes
-from .fly import go
-from .picked import of_lane, pick, picks
+from .flight import go
+from .hit_member import of_lane, pick, picks
+from .periodic import return_lanes
 from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
-from .wrap import return_lanes
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8
@@ -51,50 +50,49 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
     lanes, state, picked = with_distances(lanes), share.state, picks(chain)
-    following, stop, drawn, live, passes = impact_log.gone_on(share.log)
+    place, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
-        following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
-        if following == stop:
+        place = share.following(FLYING, place)
+        if place.is_end():
             break
-        load(method, chain, lanes, index(live), share, following)
+        lanes.load(method, chain, share, place.i, index(live))
         lanes.lane(live).looked_particle = -1.0
-        following += 1
-        live += 1
+        place, live = place.after(), live + 1
     while live > 0:
-        status = _halts(share, lanes, following, stop, drawn, live, passes)
+        status = _halts(share, lanes, place, live, passes)
         if status != Status.DONE.value:
-            return status, live, drawn
+            return status, live, place.drawn
         passes += 1
         some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
         if some_hard or passes % LOOK == 0:
             status, lane = _rare(hard, method, chain, gravity, state, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
-                return status, lanes.particle[lane], drawn
+                return status, lanes.particle[lane], place.drawn
         count_sweeps(state.multipliers, lanes, live)
         if not (some_arrived or some_hard):
             continue
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
         for k in range(marked_lanes(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
-            retire(method, chain, lanes, lane, share)
-            following, stop, drawn = following_particle(share, FLYING, following, stop, drawn)
-            if following < stop:
-                load(method, chain, lanes, lane, share, following)
-                following += 1
+            lanes.retire(method, chain, share, lane)
+            place = share.following(FLYING, place)
+            if place.i < place.stop:
+                lanes.load(method, chain, share, place.i, lane)
+                place = place.after()
             else:
                 live -= 1
-                move(chain, lanes, live, lane)
-    return Status.DONE.value, 0, drawn
+                lanes.move(chain, live, lane)
+    return Status.DONE.value, 0, place.drawn
 
 
-def _halts(share, lanes, following, stop, drawn, live, passes):
+def _halts(share, lanes, place, live, passes):
     """Whether the call ends before the next pass."""
     if passes >= share.halt[0]:
-        leave(lanes, live)
+        lanes.leave(live)
         return Status.INTERRUPTED.value
     if impact_log.is_full(share.log):
-        impact_log.keep_going(share.log, following, stop, drawn, live, passes)
+        impact_log.keep_going(share.log, place, live, passes)
         return Status.LOG_FULL.value
     return Status.DONE.value
 
@@ -118,19 +116,18 @@ def _look(method, chain, state, lanes, live):
     # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
     most_hits = 0.1 * MOST_HITS if isinstance(chain, Carried) else MOST_HITS
     for i in range(live):
-        lane = lanes.lane(i)
-        status, p, left = Status.DONE.value, float(lanes.particle[i]), lane.left
-        still = goes_on_by(method, lane.v, left) >= lane.looked_left - left
+        lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
         if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
-        elif lane.looked_particle == p and still and lane.looked_hits == lane.hits:
+        elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], lane.r)
             if state.contacts is not None:
                 state.contacts.left[lanes.particle[i]] = lane.left
             return status, i
-        lane.looked_particle, lane.looked_left, lane.looked_hits = p, left, lane.hits
+        lane.look(p)
+        lane.looked_hits = lane.hits
     return Status.DONE.value, 0
 
 
@@ -165,17 +162,26 @@ def _pass(method, chain, gravity, share, lanes, picked, live):
     if method.laws.thermal is not None:
         _exchange_heat(method, chain, gravity, share, lanes, live)
     pick(chain, lanes, picked, live)
+    some_arrived, some_hard = _make_contacts(method, chain, gravity, watches, lanes, picked, live)
+    for watch in watches:
+        watch.add_rows(method, chain, state, lanes, live)
+    return some_arrived, some_hard
+
+
+def _make_contacts(method, chain, gravity, watches, lanes, picked, live):
+    """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = method.walls_of(of_lane(chain, picked, i), lane.left)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
-        arrived, hard = _end(method, chain, lanes, i, contact)
+        arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
+        _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
+        _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
+        lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
-    for watch in watches:
-        watch.add_rows(method, chain, state, lanes, live)
     return some_arrived, some_hard
 
 
@@ -202,24 +208,15 @@ def _exchange_heat(method, chain, gravity, share, lanes, live):
                 lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
 
 
-def _end(method, chain, lanes, i, contact):
-    """The end of a lane's contact: (whether it reached the end of the frame, whether it is hard)."""
-    _put_contact(method, lanes, i, contact)
-    _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-    _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
-    lanes.wall[i] = contact.wall
-    hard = (contact.wall <= methods.HARD) & (not method.holds)
-    return contact.lasts | (not (contact.left > 0.0)), hard
-
-
 def _put_contact(method, lanes, i, contact):
-    """A lane after its contact, its impacts and its energy where contacts change that, and whether it has arrived."""
+    """A lane after its contact, its impacts and its energy where contacts change that; whether it has arrived."""
     lane = lanes.lane(i)
     lane.put_end(contact)
     lane.hits += contact.hits
     if method.dissipates:
         lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
+    return contact.lasts | (not (contact.left > 0.0))
 
 
 def _add_impulse(chain, impulse, i, wall, given):

@@ -1,7 +1,7 @@
-"""What rests in a corner of three walls of which some move: it goes with them as long as all three press on it.
+"""Particles that rest in a corner of three walls, some of which move, and go with them while all three press.
 
-Where it is and how fast follow from the three walls alone, so a step of it may be as long as their motion changes
-little; the forces follow from its acceleration. Until one lets go another wall may come, and strike it.
+Their places and velocities follow from the three walls alone, so a step may be as long as the motion of these changes
+little; the forces follow from the acceleration. Until one lets go another wall may come, and strike the particle.
 """
 
 import math

@@ -1,21 +1,19 @@
 """Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
 
 from ..contact import crossing
-from ..contact.passing import hit_wall, open_wall_at, open_wall_of
+from ..contact.passing import hit_wall, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import column
 from ..surfaces.openings import is_open
 from . import log as impact_log
-from .sliding import with_kept
 from .table import marked_lanes
 
 
-def _escape(share, p, wall, r, v, left):
+def escape(share, p, wall, r, v, left):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
     share.state.escape_time[p] = share.moment - left
     if share.log is not None:
-        impact_log.add_escape(share.log, share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
+        share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
 
 
 def let_out_lanes(openings, method, chain, share, lanes, live):
@@ -30,44 +28,19 @@ def let_out_lanes(openings, method, chain, share, lanes, live):
         if not is_open(openings, wall, r, 0.0):
             lanes.wall[i] = wall
             continue
-        _escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.left)
+        escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.left)
         flier.left, lanes.wall[i] = 0.0, -1.0
 
 
 @outlined
-def is_at_opening(openings, kind, method, chain, state, lanes, i):
+def is_at_opening(slide, now, i):
     """Whether a lane that slides is where a wall that holds it is open: it is at that wall then, as if it flew."""
-    lane = lanes.lane(i)
-    r = lane.r
-    wall = open_wall_of(openings, method, chain, lane.held(kind), r, crossing.near(method, r))
+    lanes, lane = slide.lanes, slide.lanes.lane(i)
+    near = crossing.near(slide.method, lane.r)
+    wall = open_wall_of(lanes.openings, slide.method, now, slide.held(lane), lane.r, near)
     if wall < 0.0:
         return False
-    state.contacts.met[lanes.particle[i]] = wall
-    lane.v = with_kept(kind, chain, lane)
+    slide.state.contacts.met[lanes.particle[i]] = wall
+    lane.v = slide.with_kept(now, lane)
     lane.keep = 0.0
-    return True
-
-
-@outlined
-def met_wall(openings, method, chain, wall, r, v):
-    """The wall that a particle meets that is at this one: where this is open, a closed one at the same place."""
-    return hit_wall(openings, method, chain, (r, v), wall, crossing.near(method, r))
-
-
-@outlined
-def let_out_of(openings, method, share, p, wall, r, left):
-    """Whether a particle at a wall has escaped, since it is open there, with so much of the frame left."""
-    if not is_open(openings, wall, r, crossing.near(method, r)):
-        return False
-    _escape(share, p, wall, r, column(share.state.velocity, 0, p), left)
-    return True
-
-
-@outlined
-def let_out_at(openings, method, chain, share, p, r, left):
-    """The same of one that all walls within a small distance hold."""
-    wall = open_wall_at(openings, method, chain, r, crossing.near(method, r))
-    if wall < 0.0:
-        return False
-    _escape(share, p, wall, r, column(share.state.velocity, 0, p), left)
     return True

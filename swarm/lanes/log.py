@@ -12,7 +12,8 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from .table import LANES, Rows
+from .arrays import Place
+from .table import LANES, Lane, Rows
 
 # What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.
 GOING = 5
@@ -20,11 +21,8 @@ GOING = 5
 _named = Rows()
 
 
-class Before(Record):
+class Before(Lane):
     """A lane before its contact: its flight, the wall, and the impulse that this has given it since."""
-
-    rows: Array
-    i: int
 
     r, v, left = _named.vector(), _named.vector(), _named.number()
     hits, wall, impulse = _named.number(), _named.number(), _named.number()
@@ -74,18 +72,65 @@ class Log(NamedTuple):
         """Note the impulse per mass that the wall of a lane gives."""
         Before(lanes.before, i).impulse += impulse
 
+    @outlined
     def add_rows(self, method, chain, state, lanes, live):
         """A row for each lane with one more impact than before its contact."""
-        _add_rows(self, method, chain, state, lanes, live)
+        order, n = self.order, index(0)
+        for i in range(index(live)):
+            order[n] = i
+            n += index((lanes.lane(i).hits > Before(lanes.before, i).hits) & self.has(lanes.particle[i]))
+        for k in range(n):
+            i = index(order[k])
+            before = Before(lanes.before, i)
+            struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.left, before.impulse)
+            self._add(state, lanes.particle[i], struck, self._slip_of(method, chain, struck))
 
     def add_row(self, method, chain, state, particle, struck):
         """A row for an impact of a particle."""
         if self.has(particle):
-            _add_row(self, method, chain, state, particle, struck)
+            self._add_impact(method, chain, state, particle, struck)
+
+    @outlined
+    def _add_impact(self, method, chain, state, particle, struck):
+        self._add(state, particle, struck, self._slip_of(method, chain, struck))
+
+    @outlined
+    def add_escape(self, state, particle, struck):
+        """A row, without an impulse or a slip, for a particle that passes an opening."""
+        if self.has(particle):
+            self._add(state, particle, struck, ZERO)
 
     def has(self, particle):
         """Whether a particle has rows."""
         return True if self.chosen is None else self.chosen[index(particle)]
+
+    def _slip_of(self, method, chain, struck):
+        """How fast a particle slips along the wall that it strikes, where the log has that."""
+        if self.slip is None:
+            return ZERO
+        now = chain.at(struck.left)
+        u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
+        n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
+        return before - dot(before, n) * n
+
+    def _add(self, state, particle, struck, slip):
+        k, p = index(self.filled[0]), index(particle)
+        self.filled[0] += 1
+        self.time[k] = max(self.begin, self.end - struck.left)
+        self.particle[k], self.wall[k] = np.int32(particle), np.int32(struck.wall)
+        _put(self.position, k, struck.r)
+        _put(self.velocity_before, k, struck.before)
+        _put(self.velocity_after, k, struck.after)
+        self.impulse[k] = struck.impulse * state.mass[p]
+        if self.slip is not None:
+            _put(self.slip, k, slip)
+        if self.image is not None:
+            for axis in range(3):
+                self.image[k, axis] = np.int32(state.image[axis, p])
+
+
+def _put(rows, k, vector):
+    rows[k, 0], rows[k, 1], rows[k, 2] = vector.x, vector.y, vector.z
 
 
 class Counts(Record):
@@ -122,76 +167,17 @@ def is_full(log):
     return False if log is None else log.filled[0] + LANES > log.time.size
 
 
-def keep_going(log, *places):
-    """Keep where a kernel is that ends since its log is full: (particle, stop, draws, live lanes, passes)."""
-    for k, place in enumerate(places):
-        log.going[k] = place
+def keep_going(log, place, live, passes):
+    """Keep where a kernel is that ends since its log is full."""
+    for k, number in enumerate((*place, live, passes)):
+        log.going[k] = number
 
 
 def gone_on(log):
-    """Where a kernel goes on: (particle, stop, draws, live lanes, passes)."""
+    """Where a kernel goes on: (`Place`, live lanes, passes)."""
     if log is None:
-        return 0, 0, 0, 0, 0
-    places = tuple(log.going[k] for k in range(GOING))
+        return Place(0, 0, 0), 0, 0
+    i, stop, drawn, live, passes = tuple(log.going[k] for k in range(GOING))
     for k in range(GOING):
         log.going[k] = 0
-    return places
-
-
-# --- Rows ------------------------------------------------------------------------------------------------
-
-
-@outlined
-def _add_rows(log, method, chain, state, lanes, live):
-    order, n = log.order, index(0)
-    for i in range(index(live)):
-        order[n] = i
-        n += index((lanes.lane(i).hits > Before(lanes.before, i).hits) & log.has(lanes.particle[i]))
-    for k in range(n):
-        i = index(order[k])
-        before = Before(lanes.before, i)
-        struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.left, before.impulse)
-        _add(log, method, chain, state, lanes.particle[i], struck)
-
-
-@outlined
-def _add_row(log, method, chain, state, particle, struck):
-    _add(log, method, chain, state, particle, struck)
-
-
-@outlined
-def add_escape(log, state, particle, struck):
-    """A row, without an impulse or a slip, for a particle that passes an opening."""
-    if log.has(particle):
-        k = _add_struck(log, state, particle, struck)
-        if log.slip is not None:
-            _put(log.slip, k, ZERO)
-
-
-def _add(log, method, chain, state, particle, struck):
-    k = _add_struck(log, state, particle, struck)
-    if log.slip is not None:
-        now = chain.at(struck.left)
-        u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
-        n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
-        _put(log.slip, k, before - dot(before, n) * n)
-
-
-def _add_struck(log, state, particle, struck):
-    """The columns of every row; its number."""
-    k, p = index(log.filled[0]), index(particle)
-    log.filled[0] += 1
-    log.time[k] = max(log.begin, log.end - struck.left)
-    log.particle[k], log.wall[k] = np.int32(particle), np.int32(struck.wall)
-    _put(log.position, k, struck.r)
-    _put(log.velocity_before, k, struck.before)
-    _put(log.velocity_after, k, struck.after)
-    log.impulse[k] = struck.impulse * state.mass[p]
-    if log.image is not None:
-        for axis in range(3):
-            log.image[k, axis] = np.int32(state.image[axis, p])
-    return k
-
-
-def _put(rows, k, vector):
-    rows[k, 0], rows[k, 1], rows[k, 2] = vector.x, vector.y, vector.z
+    return Place(i, stop, drawn), live, passes

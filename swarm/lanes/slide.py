@@ -14,12 +14,12 @@ from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put
 from ..status import Status
-from .arrays import following_particle, goes_on_by, speed2_scale
-from .compose import compose, end_steps
-from .ends import decide, set_going
-from .sliding import AGAIN, account, phase_of, with_kept
+from .arrays import Place, speed2_scale
+from .periodic import return_particle, return_sliding
+from .sliding import AGAIN, Slide
+from .sliding_ends import decide, set_going
+from .sliding_step import compose, end_steps
 from .table import LANES, LOOK, with_distances
-from .wrap import return_particle, return_sliding
 
 
 @long_kernel
@@ -29,39 +29,35 @@ def slide_block(kind, method, chain, gravity, share, lanes):
     Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
     """
     lanes = with_distances(lanes)
-    following, stop, drawn, live, passes = 0, 0, 0, 0, 0
-    while live < LANES:
-        following, stop, drawn, loaded = _refill(
-            kind, method, chain, gravity, share, lanes, live, (following, stop, drawn, passes)
-        )
-        if not loaded:
-            break
-        lanes.lane(live).looked_particle = -1.0
-        live += 1
+    slide = Slide(kind, method, chain, gravity, share.state, lanes)
+    place, live, passes, loaded = Place(0, 0, 0), 0, 0, True
+    while live < LANES and loaded:
+        place, loaded = _refill(slide, share, live, place, passes)
+        if loaded:
+            lanes.lane(live).looked_particle = -1.0
+            live += 1
     while live > 0:
         status, particle = _over(method, share, lanes, live, passes)
         if status != Status.DONE.value:
             for i in range(live):
-                _retire(kind, method, chain, share, lanes, i, phase_of(kind))
-            return status, particle, drawn
+                _retire(slide, share, i, slide.phase())
+            return status, particle, place.drawn
         passes += 1
-        compose(kind, method, chain, gravity, lanes, live)
-        end_steps(kind, method, chain, gravity, lanes, live)
+        compose(slide, live)
+        end_steps(slide, live)
         for i in range(live):
-            account(method, chain, share.state, lanes, i)
+            slide.account(i)
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
-            phase = _next_phase(kind, method, chain, gravity, share.state, lanes, i)
-            if phase != phase_of(kind):
-                _retire(kind, method, chain, share, lanes, i, phase)
-                following, stop, drawn, loaded = _refill(
-                    kind, method, chain, gravity, share, lanes, i, (following, stop, drawn, passes)
-                )
+            phase = _next_phase(slide, i)
+            if phase != slide.phase():
+                _retire(slide, share, i, phase)
+                place, loaded = _refill(slide, share, i, place, passes)
                 if not loaded:
                     live -= 1
                     lanes.move(live, i)
     # A halt may have kept it from loading more.
-    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, drawn
+    return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, place.drawn
 
 
 @outlined
@@ -69,95 +65,92 @@ def _over(method, share, lanes, live, passes):
     """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0
-    if passes % LOOK != 0:
-        return Status.DONE.value, 0
-    for i in range(live):
-        lane, p = lanes.lane(i), lanes.particle[i]
-        left = lane.left
-        if lane.looked_particle == float(p) and goes_on_by(method, lane.v, left) >= lane.looked_left - left:
-            return Status.TIMELESS.value, p
-        lane.looked_particle, lane.looked_left = float(p), left
+    if passes % LOOK == 0:
+        for i in range(live):
+            lane, p = lanes.lane(i), lanes.particle[i]
+            if lane.stands(method, float(p)):
+                return Status.TIMELESS.value, p
+            lane.look(float(p))
     return Status.DONE.value, 0
 
 
-def _next_phase(kind, method, chain, gravity, state, lanes, i):
+def _next_phase(slide, i):
     """The phase of a lane after a step."""
-    phase = phase_of(kind)
+    phase, lanes = slide.phase(), slide.lanes
     if lanes.event[i] != 0:
-        phase = decide(kind, method, chain, gravity, state, lanes, i)
+        phase = decide(slide, i)
     phase = phase if lanes.lane(i).left > 0.0 else ARRIVED
-    return phase if lanes.period is None else return_sliding(lanes.period, chain, state, lanes, i, phase)
+    return phase if lanes.period is None else return_sliding(lanes.period, slide.chain, slide.state, lanes, i, phase)
 
 
 # --- Into lanes and out of them --------------------------------------------------------------------------
 
 
 @outlined
-def _refill(kind, method, chain, gravity, share, lanes, i, at):
-    """The next particle that slides into lane i: (particle, stop, draws) to go on from, and whether there is one.
+def _refill(slide, share, i, place, passes):
+    """The next particle that slides into lane i: the `Place` to go on from, and whether there is one.
 
     None after a halt: what is loaded may rest or fly at once, one particle after the other.
     """
-    following, stop, drawn, passes = at
-    while True:
-        if passes >= share.halt[0]:
-            return following, stop, drawn, False
-        following, stop, drawn = following_particle(share, phase_of(kind), following, stop, drawn)
-        if following == stop:
-            return following, stop, drawn, False
-        following += 1
-        if _load(kind, method, chain, gravity, share, lanes, i, following - 1):
-            return following, stop, drawn, True
+    while passes < share.halt[0]:
+        place = share.following(slide.phase(), place)
+        if place.is_end():
+            return place, False
+        place = place.after()
+        if _load(slide, share, i, place.i - 1):
+            return place, True
+    return place, False
 
 
 @outlined
-def _load(kind, method, chain, gravity, share, lanes, i, p):
+def _load(slide, share, i, p):
     """Particle p into lane i; whether it slides: it may also rest until the end of the frame, or fly."""
-    lane, state, contacts = lanes.lane(i), share.state, share.state.contacts
+    lane, state, contacts = slide.lanes.lane(i), slide.state, slide.state.contacts
     begins = not contacts.left[p] > 0.0
     left = share.span if begins else contacts.left[p]
     r, v = column(state.position, 0, p), column(state.velocity, 0, p)
-    lanes.particle[i] = p
+    slide.lanes.particle[i] = p
     lane.left, lane.step, lane.cut, lane.trials = left, contacts.step[p], np.inf, 0.0
     lane.first, lane.second = contacts.walls[0, p], contacts.walls[1, p]
     lane.keep, lane.twice, lane.scale2 = contacts.keep[p], 2.0 * state.energy[p], speed2_scale(state, p)
     if begins:
-        held, now = lane.held(kind), chain.at(left)
+        held, now = slide.held(lane), slide.chain.at(left)
         # Frames show the speed that is kept across the walls too.
-        v = held.split_at(now, hold.drift(method.laws.moving, held, now, r), r, v).along
+        v = held.split_at(now, hold.drift(slide.moving(), held, now, r), r, v).along
     lane.r, lane.v = r, v
-    phase = set_going(kind, method, chain, gravity, state, lanes, i)
-    if phase != phase_of(kind):
-        _retire(kind, method, chain, share, lanes, i, phase)
+    phase = set_going(slide, i)
+    if phase != slide.phase():
+        _retire(slide, share, i, phase)
         return False
     return True
 
 
 @outlined
-def _retire(kind, method, chain, share, lanes, i, phase):
+def _retire(slide, share, i, phase):
     """A lane back into its particle, for its next phase."""
-    lane, p, contacts = lanes.lane(i), index(lanes.particle[i]), share.state.contacts
+    lanes, state, contacts = slide.lanes, slide.state, slide.state.contacts
+    lane, p = lanes.lane(i), index(lanes.particle[i])
+    now = slide.chain.at(lane.left)
     if phase == AGAIN:
-        phase = phase_of(kind)
+        phase = slide.phase()
     v, keep = lane.v, lane.keep
     slid = phase != FLYING and phase != CAREFUL
     if not (slid and lane.left > 0.0):
-        v = with_kept(kind, chain.at(lane.left), lane)
+        v = slide.with_kept(now, lane)
     if phase == FLYING:
-        now, r = chain.at(lane.left), lane.r
-        u = wall_velocity(method.laws.moving, now, lane.first, r)
-        v = events.off_the_wall(now, lane.first, r, v, u)
-    put(share.state.position, 0, p, lane.r)
-    put(share.state.velocity, 0, p, v)
+        u = wall_velocity(slide.moving(), now, lane.first, lane.r)
+        v = events.off_the_wall(now, lane.first, lane.r, v, u)
+    put(state.position, 0, p, lane.r)
+    put(state.velocity, 0, p, v)
     contacts.walls[0, p] = lane.first if slid else -1.0
     contacts.walls[1, p] = lane.second if slid else -1.0
     if phase != ARRIVED:
         contacts.phase[p] = phase if slid else FLYING
     elif contacts.phase[p] != ARRIVED:
-        contacts.phase[p] = phase_of(kind)
+        contacts.phase[p] = slide.phase()
     contacts.left[p] = lane.left if phase != ARRIVED else 0.0
     contacts.step[p] = lane.step if slid else 0.0
     contacts.keep[p] = keep
     if lanes.period is not None:
-        return_particle(lanes.period, chain, share.state, p)
+        return_particle(lanes.period, slide.chain, state, p)
     share.hand_over(p, phase)

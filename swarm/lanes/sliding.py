@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 
 from ..contact import hold
+from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from .table import STRIDE, Rows, copy_lane, table
+from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
 LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES = 1, 2, 4, 8, 16, 32, 64
@@ -18,11 +19,8 @@ AGAIN = -1
 _named = Rows()
 
 
-class Sliding(Record):
+class Sliding(Advanced):
     """A particle that slides, in its lane. What its second wall has is 0 where it has none."""
-
-    rows: Array
-    i: int
 
     r, v, a = _named.vector(), _named.vector(), _named.vector()
     # The numbers of its walls, -1 for none, and how they press on it.
@@ -49,10 +47,6 @@ class Sliding(Record):
     # The changes of velocity that the accelerations of the last two parts would make in the whole step.
     change, before = _named.vector(), _named.vector()
     ALL = _named.count
-
-    def held(self, kind):
-        """The walls that hold it."""
-        return kind.of_lane(self.first, self.second)
 
 
 class Lanes(Record):
@@ -91,63 +85,79 @@ def empty(period: Any = None, openings: Any = None) -> Lanes:
     )
 
 
-def phase_of(kind):
-    """The phase of particles that one wall holds, or two."""
-    return EDGE if isinstance(kind, hold.Two) else HELD
+class Slide(Record):
+    """A call of the kernel of what slides: on which walls, one or two, by which method, and in which lanes."""
 
+    kind: Any
+    method: Any
+    chain: Any
+    gravity: Any
+    state: Any
+    lanes: Lanes
 
-def moves(method):
-    """Whether a wall moves: a constant for the compiler."""
-    return method.laws.moving is not None
+    def phase(self):
+        """The phase of particles that one wall holds, or two."""
+        return EDGE if isinstance(self.kind, hold.Two) else HELD
 
+    def moving(self):
+        """The walls' numbers where some move, else None."""
+        return self.method.laws.moving
 
-@outlined
-def with_kept(kind, chain, lane):
-    """The velocity of a lane with the speed that it keeps across its walls."""
-    v, keep = lane.v, lane.keep
-    if not keep > 0.0:
-        return v
-    held = lane.held(kind)
-    taken = held.split_at(chain, None, lane.r, v)
-    return v + keep * held.inward(taken.n, taken.m)
+    def moves(self):
+        """Whether a wall moves: a constant for the compiler."""
+        return self.moving() is not None
 
+    def held(self, lane):
+        """The walls that hold a lane."""
+        return self.kind.of_lane(lane.first, lane.second)
 
-# --- Accounts --------------------------------------------------------------------------------------------
+    def force(self, lane, now, r, v):
+        """The force on a lane at a place, from the walls of this instant."""
+        return slides.force(self.method.laws, self.held(lane), now, self.gravity, r, v)
 
+    @outlined
+    def with_kept(self, now, lane):
+        """The velocity of a lane with the speed that it keeps across its walls."""
+        v, keep = lane.v, lane.keep
+        if not keep > 0.0:
+            return v
+        held = self.held(lane)
+        taken = held.split_at(now, None, lane.r, v)
+        return v + keep * held.inward(taken.n, taken.m)
 
-def account(method, chain, state, lanes, i):
-    """Book a step that is taken."""
-    if not lanes.unsolved[i]:
-        return
-    lane = lanes.lane(i)
-    state.contacts.sliding[lanes.particle[i]] += lane.h
-    push(chain, state, lanes, i, lane.impulse, lane.impulse_second)
-    lane.trials = 0.0
-    if method.laws.friction is not None:
-        lose(state, lanes, i, lane.work)
-    if moves(method):
-        work(chain, state, lanes, i, lanes.gained[i], lane.given_by_second)
+    # --- Accounts
 
+    def account(self, i):
+        """Book a step that is taken."""
+        lanes, lane = self.lanes, self.lanes.lane(i)
+        if not lanes.unsolved[i]:
+            return
+        self.state.contacts.sliding[lanes.particle[i]] += lane.h
+        self.push(i, lane.impulse, lane.impulse_second)
+        lane.trials = 0.0
+        if self.method.laws.friction is not None:
+            self.lose(i, lane.work)
+        if self.moves():
+            self.work(i, lanes.gained[i], lane.given_by_second)
 
-def push(chain, state, lanes, i, first, second):
-    """Impulses per mass to the walls that hold a lane."""
-    lane, p = lanes.lane(i), lanes.particle[i]
-    state.impulse[chain.row(lane.first), p] += first * state.mass[p]
-    if lane.second >= 0.0:
-        state.impulse[chain.row(lane.second), p] += second * state.mass[p]
+    def push(self, i, first, second):
+        """Impulses per mass to the walls that hold a lane."""
+        state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
+        state.impulse[self.chain.row(lane.first), p] += first * state.mass[p]
+        if lane.second >= 0.0:
+            state.impulse[self.chain.row(lane.second), p] += second * state.mass[p]
 
+    def work(self, i, twice, second):
+        """Book twice the work per mass of walls that move, and of it that of the second wall."""
+        state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
+        behind = state.impulse.shape[0] // 2
+        state.energy[p] = 0.5 * lane.twice
+        state.impulse[behind + self.chain.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+        if lane.second >= 0.0:
+            state.impulse[behind + self.chain.row(lane.second), p] += 0.5 * second * state.mass[p]
 
-def work(chain, state, lanes, i, twice, second):
-    """Book twice the work per mass of walls that move, and of it that of the second wall."""
-    lane, p, behind = lanes.lane(i), lanes.particle[i], state.impulse.shape[0] // 2
-    state.energy[p] = 0.5 * lane.twice
-    state.impulse[behind + chain.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
-    if lane.second >= 0.0:
-        state.impulse[behind + chain.row(lane.second), p] += 0.5 * second * state.mass[p]
-
-
-def lose(state, lanes, i, twice):
-    """Book twice the energy per mass that a lane has lost; its row knows what is left."""
-    p = lanes.particle[i]
-    state.energy[p] = 0.5 * lanes.lane(i).twice
-    state.dissipated[p] += 0.5 * twice * state.mass[p]
+    def lose(self, i, twice):
+        """Book twice the energy per mass that a lane has lost; its row knows what is left."""
+        state, p = self.state, self.lanes.particle[i]
+        state.energy[p] = 0.5 * self.lanes.lane(i).twice
+        state.dissipated[p] += 0.5 * twice * state.mass[p]

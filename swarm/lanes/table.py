@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.arrays import index, spaced
+from ..kernel.jit import Array
+from ..kernel.record import Record
 from ..kernel.vector import column, put
 
 # Lanes of a block: 256 x 16 rows of 8 bytes fit in the L1 cache.
@@ -62,6 +64,26 @@ class Rows:
     def vector(self) -> Any:
         """The next three rows."""
         return Vector(self.take(3))
+
+
+class Lane(Record):
+    """The view of a lane; a table names its rows in a class of its own."""
+
+    rows: Array
+    i: int
+
+
+class Advanced(Lane):
+    """That of a particle on its way, whose rows say where it was when all lanes were looked at last."""
+
+    def stands(self, method, p):
+        """Whether particle p, of this lane, has not gone on by what it must since a look."""
+        least = min(method.instant(self.v), MOVED * self.left)
+        return self.looked_particle == p and least >= self.looked_left - self.left
+
+    def look(self, p):
+        """Keep what the next look asks for."""
+        self.looked_particle, self.looked_left = p, self.left
 
 
 def table(rows: int) -> NDArray[np.float64]:

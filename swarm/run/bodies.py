@@ -9,9 +9,9 @@ import numpy as np
 from ..bodies.numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
 from ..bodies.state import Bodies
 from ..errors import RunError
-from ..lanes.tied.advance import advance_bodies
-from ..lanes.tied.arrays import BodyState, Rule
-from ..lanes.tied.contacts import MOST_CONTACTS
+from ..lanes.bodies.advance import advance_bodies
+from ..lanes.bodies.arrays import BodyState, Rule
+from ..lanes.bodies.contacts import MOST_CONTACTS
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Floats, Particles, State

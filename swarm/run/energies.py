@@ -9,7 +9,7 @@ from ..bodies.body import Body
 from ..bodies.numbers import led_points
 from ..contact.energy import contact_energy
 from ..kernel.vector import column
-from ..lanes.tied.arrays import Ties
+from ..lanes.bodies.arrays import Ties
 from ..particles import Floats
 from ..scene import Scene
 

@@ -16,8 +16,8 @@ from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
+from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
-from ..lanes import meet, slide, sliding, table
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles
 from ..scene import Scene
@@ -234,7 +234,7 @@ class Run(BaseRun):
         """The kernel that advances particles in this phase, which is not flight, and its arguments."""
         common = self._numbers, self._chain, self._gravity, share
         if _KINDS[phase] is None:
-            return meet.meet_block if phase == EVENT else meet.careful_block, common
+            return contact_events.meet_block if phase == EVENT else contact_events.careful_block, common
         return slide.slide_block, (_KINDS[phase], *common, sliding.empty(self.state.period, self.state.openings))
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:

@@ -1,18 +1,17 @@
-"""What rests where walls move: it goes with its wall as long as friction, or a balance of forces, holds it there.
+"""Particles that rest where walls move: each goes with its wall as long as friction, or a balance of forces, holds it.
 
 Until then another wall may come, and strike it.
 """
 
 from ..contact import crossing, hold
-from ..contact import sliding as slides
 from ..contact.events import ARRIVED, EVENT
 from ..contact.projection import ALLOWED
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, norm, square
-from .compose import SLOWEST
-from .sliding import AGAIN, phase_of, push, work
+from .sliding import AGAIN
+from .sliding_step import SLOWEST
 
 # Halvings of the interval in which a wall lets a particle go that rests on it.
 _HALVINGS = 60
@@ -31,32 +30,29 @@ class Clear(Record):
 
 
 @outlined
-def stay(kind, method, chain, gravity, state, lanes, i):
+def stay(slide, i):
     """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
-    lane = lanes.lane(i)
-    left, first, r = lane.left, lane.first, lane.r
+    chain, lanes, contacts, lane = slide.chain, slide.lanes, slide.state.contacts, slide.lanes.lane(i)
+    left, first = lane.left, lane.first
     now = chain.at(left)
-    u, slowest = now.velocity(first, r), SLOWEST * lane.scale2
-    moves_on = square(lane.v - u) > slowest or _rubs(kind, method.laws, now, lane, r, slowest)
-    if moves_on or not _rests(kind, method, now, gravity, lane, r):
-        return phase_of(kind)
+    u, slowest = now.velocity(first, lane.r), SLOWEST * lane.scale2
+    moves_on = square(lane.v - u) > slowest or _rubs(slide, now, lane, slowest)
+    if moves_on or not _rests(slide, now, lane, lane.r):
+        return slide.phase()
     pace, low, high, met, paces = now.shortest_pace(), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
-        clear = _clear(kind, method, chain, lane, low, left if low + step >= left else low + step)
+        clear = _clear(slide, lane, low, left if low + step >= left else low + step)
         high = clear.time
         middle = 0.5 * (low + high)
-        if not (
-            _rests_later(kind, method, chain, gravity, lane, middle)
-            and _rests_later(kind, method, chain, gravity, lane, high)
-        ):
+        if not (_rests_later(slide, lane, middle) and _rests_later(slide, lane, high)):
             break
         # Simpson's rule for what presses
         one, two, three = (
-            _press_later(kind, method, chain, gravity, lane, low),
-            _press_later(kind, method, chain, gravity, lane, middle),
-            _press_later(kind, method, chain, gravity, lane, high),
+            _press_later(slide, lane, low),
+            _press_later(slide, lane, middle),
+            _press_later(slide, lane, high),
         )
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
@@ -65,47 +61,47 @@ def stay(kind, method, chain, gravity, state, lanes, i):
     if low < left and met < 0.0 and not goes_on:
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if _rests_later(kind, method, chain, gravity, lane, middle):
+            if _rests_later(slide, lane, middle):
                 low = middle
             else:
                 high = middle
         end = high
-        one = _press_later(kind, method, chain, gravity, lane, start)
-        two = _press_later(kind, method, chain, gravity, lane, low)
+        one, two = _press_later(slide, lane, start), _press_later(slide, lane, low)
         pressed += 0.5 * (one.n + two.n) * (end - start)
         pressed_second += 0.5 * (one.m + two.m) * (end - start)
     after = left - end
     r1, then = _carried(chain, lane, end), chain.at(after)
     v1 = then.velocity(first, r1)
-    twice = square(v1) + 2.0 * potential(gravity, r1)
+    twice = square(v1) + 2.0 * potential(slide.gravity, r1)
     given = twice - lane.twice
     lane.r, lane.v, lane.left, lane.twice, lane.keep = r1, v1, after, twice, 0.0
-    push(chain, state, lanes, i, pressed, pressed_second)
-    work(chain, state, lanes, i, given, 0.0)
-    state.contacts.sliding[lanes.particle[i]] += end
+    slide.push(i, pressed, pressed_second)
+    slide.work(i, given, 0.0)
+    contacts.sliding[lanes.particle[i]] += end
     if goes_on or not after > 0.0:
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
-        state.contacts.met[lanes.particle[i]] = met
+        contacts.met[lanes.particle[i]] = met
         lane.r = then.settle(met, r1)
         return EVENT
-    force = slides.force(method.laws, lane.held(kind), then, gravity, r1, v1)
+    force = slide.force(lane, then, r1, v1)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
-    return phase_of(kind)
+    return slide.phase()
 
 
-def _rubs(kind, laws, now, lane, r, slowest):
+def _rubs(slide, now, lane, slowest):
     """Whether the second wall has friction and slips on a lane that moves with the first one."""
-    if not isinstance(kind, hold.Two):
+    if not isinstance(slide.kind, hold.Two):
         return False
-    slip = lane.v - now.velocity(lane.second, r)
-    return laws.friction_of(lane.second) > 0.0 and square(slip) > slowest
+    slip = lane.v - now.velocity(lane.second, lane.r)
+    friction = slide.method.laws.friction_of(lane.second)
+    return friction > 0.0 and square(slip) > slowest
 
 
 @outlined
-def _clear(kind, method, chain, lane, low, high):
+def _clear(slide, lane, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
-    left, held, near = lane.left, lane.held(kind), crossing.near(method, lane.r)
+    chain, left, held, near = slide.chain, lane.left, slide.held(lane), crossing.near(slide.method, lane.r)
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
@@ -140,24 +136,23 @@ def _way(chain, lane, start, end):
 
 
 @outlined
-def _rests(kind, method, now, gravity, lane, r):
+def _rests(slide, now, lane, r):
     """Whether a lane that moves with its first wall goes on to do so from here."""
-    force, acceleration = _force_at_rest(kind, method, now, gravity, lane, r), now.acceleration(lane.first, r)
-    pull = norm(accelerated(gravity, ZERO, 1.0)) + norm(acceleration)
-    pressed = not kind.lets_go(force.n, force.m)
+    force, acceleration = _force_at_rest(slide, now, lane, r), now.acceleration(lane.first, r)
+    pull = norm(accelerated(slide.gravity, ZERO, 1.0)) + norm(acceleration)
+    pressed = not slide.kind.lets_go(force.n, force.m)
     return pressed and pull > 0.0 and norm(force.acceleration - acceleration) <= ALLOWED * pull
 
 
 @outlined
-def _force_at_rest(kind, method, now, gravity, lane, r):
+def _force_at_rest(slide, now, lane, r):
     """The force on a lane at r that moves with its first wall."""
-    u = now.velocity(lane.first, r)
-    return slides.force(method.laws, lane.held(kind), now, gravity, r, u)
+    return slide.force(lane, now, r, now.velocity(lane.first, r))
 
 
-def _rests_later(kind, method, chain, gravity, lane, t):
-    return _rests(kind, method, chain.at(lane.left - t), gravity, lane, _carried(chain, lane, t))
+def _rests_later(slide, lane, t):
+    return _rests(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))
 
 
-def _press_later(kind, method, chain, gravity, lane, t):
-    return _force_at_rest(kind, method, chain.at(lane.left - t), gravity, lane, _carried(chain, lane, t))
+def _press_later(slide, lane, t):
+    return _force_at_rest(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))

@@ -2,49 +2,53 @@
 
 import math
 
+from ...kernel.vector import column, put
 
-def lead(ties, rule, state, lanes, pace, elapsed):
+
+def lead(bodies, state, elapsed):
     """Put led points where their paths are at the end of a stage, with the velocity there.
 
     `elapsed` is the part of the step at the end of the stage. A point goes on from where it is by the difference of its
     path, which is smooth in the length of the stage: a place of its own for each time has steps of the round-off of the
     time, 6e-15 m after a second at 26 m/s, in which no time of impact is found.
     """
-    for q in range(lanes.r1.shape[0]):
-        row = ties.led[q]
-        if row >= 0:
-            path = state.path
-            for i in range(lanes.r1.shape[2]):
+    led, lanes, pace = bodies.ties.led, bodies.lanes, bodies.pace
+    for q in range(led.size):
+        if led[q] >= 0:
+            path = state.path[led[q]]
+            for i in range(pace.h.size):
                 if pace.body[i] >= 0:
-                    n = pace.body[i]
+                    n, h = pace.body[i], pace.h[i]
                     part = 1.0 if pace.whole[i] else elapsed
-                    t = rule.end - (pace.left[i] - part * pace.step[i])
-                    rate, h = path[row, 12, n], pace.h[i]
+                    t = bodies.rule.end - (pace.left[i] - part * pace.step[i])
+                    along, cosines, sines, rate = (
+                        column(path, 3, n),
+                        column(path, 6, n),
+                        column(path, 9, n),
+                        path[12, n],
+                    )
                     middle, chord = rate * (t - 0.5 * h), 2.0 * math.sin(0.5 * rate * h)
                     ahead, down = chord * math.cos(middle), chord * math.sin(middle)
                     sine, cosine = math.sin(rate * t), math.cos(rate * t)
-                    for x in range(3):
-                        turned = path[row, 9 + x, n] * ahead - path[row, 6 + x, n] * down
-                        lanes.r1[q, x, i] = lanes.ra[q, x, i] + (path[row, 3 + x, n] * h + turned)
-                        turned = path[row, 9 + x, n] * cosine - path[row, 6 + x, n] * sine
-                        lanes.v1[q, x, i] = path[row, 3 + x, n] + rate * turned
+                    moved = along * h + (sines * ahead - cosines * down)
+                    put(lanes.r1, 3 * q, i, column(lanes.ra, 3 * q, i) + moved)
+                    put(lanes.v1, 3 * q, i, along + rate * (sines * cosine - cosines * sine))
 
 
-def book(body, lanes, paces, last):
+def book(bodies, last):
     """Add the work of led points in a stage on ties and contacts: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
-    ties, touching = body
-    pace, held = paces
-    for q in range(lanes.r1.shape[0]):
+    ties, lanes, pace, held = bodies.ties, bodies.lanes, bodies.pace, bodies.held
+    for q in range(ties.led.size):
         if ties.led[q] >= 0:
-            for i in range(lanes.r1.shape[2]):
+            for i in range(pace.h.size):
                 if pace.body[i] >= 0 and (last or not pace.whole[i]):
                     for x in range(3):
                         force = 0.0
                         for a in range(ties.ends.shape[0]):
                             sign = (1.0 if ties.ends[a, 0] == q else 0.0) - (1.0 if ties.ends[a, 1] == q else 0.0)
-                            force += sign * lanes.multiplier[a, i] * lanes.d[a, x, i]
+                            force += sign * lanes.multiplier[a, i] * lanes.d[3 * a + x, i]
                         for a in range(pace.held[i]):
-                            b = touching.coefficients[held.name[i, a, 0], q]
+                            b = bodies.touching.coefficients[held.name[i, a, 0], q]
                             for d in range(3):
                                 force += b * held.press[i, 3 * a + d] * held.frame[i, a, d, x]
-                        pace.work[i] += force * (lanes.r1[q, x, i] - lanes.ra[q, x, i])
+                        pace.work[i] += force * (lanes.r1[3 * q + x, i] - lanes.ra[3 * q + x, i])

@@ -4,6 +4,8 @@ What the loops write is on the stack: of an array that comes from elsewhere the 
 the tables, whose rows are looked up, and vectorises nothing.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..kernel.arrays import copy_row, index, unwritten
@@ -36,12 +38,54 @@ class Seen(Record):
     which: Array  # the number of body k
     body: Array  # (stride, width), its numbers
 
+    def give_back(self, lanes, i):
+        """Keep the hit that a lane has found."""
+        owner = index(self.owner[i])
+        lanes.course[_TIME, owner], lanes.course[_WALL, owner] = self.time[i], self.wall[i]
 
-class Near(Record):
-    """Which of the bodies of their cells lanes look at, and from which row on their flights are in `lanes.rows`."""
 
-    k: int
-    row: int
+class Look(Record):
+    """A look of all lanes at the next of the bodies in their cells."""
+
+    seen: Seen
+    like: Any  # a body
+    gravity: Any
+    lanes: Any
+    before: Any  # how many walls are before these bodies
+    k: int  # which bodies of the cells they are
+    row: int  # of `lanes.rows`, from which on the flights are
+
+    def flight(self, i):
+        """The position and the velocity of a lane."""
+        return column(self.lanes.rows, index(self.row), i), column(self.lanes.rows, index(self.row + 3), i)
+
+    def one(self, i):
+        """The body of a lane, as a scene of one wall."""
+        return Walls((gathered(self.like, self.seen.body, i, 0),))
+
+    def take(self, i, time, wall):
+        """A hit of a lane with its body, if there is one and it is the first so far."""
+        seen = self.seen
+        sooner = (self.k < seen.number[i]) & (time < seen.time[i])
+        seen.time[i] = select(sooner, time, seen.time[i])
+        seen.wall[i] = select(sooner, wall, seen.wall[i])
+
+    def step(self, course, i):
+        """A safe step of a lane."""
+        flights.step(self.one(i), self.gravity, course, 0, i, *self.flight(i))
+
+    def goes_on(self, course, i):
+        """Whether more safe steps may find a hit that is the first so far."""
+        hit = flights.end(self.one(i), course, 0, i)
+        return (hit.wall < 0.0) & (hit.time < self.seen.time[i]) & (self.k < self.seen.number[i])
+
+    @outlined
+    def go_on(self, course, i, steps):
+        """So many more steps of one lane, if need be."""
+        for _step in range(steps):
+            self.step(course, i)
+            if not self.goes_on(course, i):
+                break
 
 
 def keep_hit(lanes, i, hit, before):
@@ -102,13 +146,13 @@ def _look_at_near(gravity, members, before, lanes, live):
         for i in range(index(n)):
             seen.which[i] = grid.entries[index(select(k < seen.number[i], seen.first[i] + k, 0))]
             copy_row(seen.body, i, members.table, index(int(seen.which[i])), columns)
-        _look(gravity, members.like, before, lanes, n, seen, Near(k, row))
+        _look(Look(seen, members.like, gravity, lanes, before, k, row), n)
     if n == live:
         for i in range(index(live)):
             course[_TIME, i], course[_WALL, i] = seen.time[i], seen.wall[i]
     else:
         for i in range(index(n)):
-            _give_back(seen, lanes, i)
+            seen.give_back(lanes, i)
 
 
 def _find_near(members, gravity, lanes, live, seen):
@@ -144,7 +188,7 @@ def _close_up(seen, k, lanes, n, row):
     if 2 * some > n:
         return n
     for i in range(index(n)):
-        _give_back(seen, lanes, i)
+        seen.give_back(lanes, i)
         number = seen.number[i]
         put(lanes.rows, Flying.CLOSED_UP, j, column(lanes.rows, row, i))
         put(lanes.rows, Flying.CLOSED_UP + 3, j, column(lanes.rows, row + 3, i))
@@ -154,72 +198,35 @@ def _close_up(seen, k, lanes, n, row):
     return some
 
 
-def _give_back(seen, lanes, i):
-    """Keep the hit that a lane has found."""
-    owner = index(seen.owner[i])
-    lanes.course[_TIME, owner], lanes.course[_WALL, owner] = seen.time[i], seen.wall[i]
-
-
-def _look(gravity, like, before, lanes, live, seen, near):
-    """Every lane at the next of these bodies: in closed form where flights are straight and none is met by steps."""
-    if gravity is None and like.in_steps is None:
+def _look(look, live):
+    """Every lane at its body: in closed form where flights are straight and none is met by steps."""
+    if look.gravity is None and look.like.in_steps is None:
+        seen = look.seen
         for i in range(index(live)):
-            time, hits = gathered(like, seen.body, i, 0).first_hit(*_flight(lanes.rows, near, i))
-            _take(seen, i, near, time, select(hits, seen.which[i] + before, -1.0))
+            time, hits = gathered(look.like, seen.body, i, 0).first_hit(*look.flight(i))
+            look.take(i, time, select(hits, seen.which[i] + look.before, -1.0))
     else:
-        _look_by_steps(gravity, like, before, lanes, live, seen, near)
+        _look_by_steps(look, live)
 
 
-def _look_by_steps(gravity, like, before, lanes, live, seen, near):
+def _look_by_steps(look, live):
     """The same by safe steps."""
-    rows, marked, order, course = lanes.rows, lanes.marked, lanes.order, unwritten((flights.COURSE, STRIDE), np.float64)
+    marked, order, course = look.lanes.marked, look.lanes.order, unwritten((flights.COURSE, STRIDE), np.float64)
     for i in range(index(live)):
-        flights.begin(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
+        flights.begin(look.one(i), look.gravity, course, 0, i, *look.flight(i))
     steps, some = SAFE_STEPS + MORE_STEPS, live
     while steps > 0 and some > 0:
         for i in range(index(live)):
-            marked[i] = _goes_on(like, course, seen, i, near)
-        some = marked_lanes(lanes, live)
+            marked[i] = look.goes_on(course, i)
+        some = marked_lanes(look.lanes, live)
         if some > live // _MANY:
             for i in range(index(live)):
-                flights.step(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
+                look.step(course, i)
             steps -= 1
         else:
             for j in range(some):
-                _go_on(like, gravity, rows, course, seen, index(order[j]), near, steps)
+                look.go_on(course, index(order[j]), steps)
             some = 0
     for i in range(index(live)):
-        hit = flights.end(_one(like, seen, i), course, 0, i)
-        _take(seen, i, near, hit.time, select(hit.wall < 0.0, -1.0, seen.which[i] + before))
-
-
-def _flight(rows, near, i):
-    """The position and the velocity of a lane."""
-    return column(rows, index(near.row), i), column(rows, index(near.row + 3), i)
-
-
-def _one(like, seen, i):
-    """The body of a lane, as a scene of one wall."""
-    return Walls((gathered(like, seen.body, i, 0),))
-
-
-def _goes_on(like, course, seen, i, near):
-    """Whether more safe steps may find a hit that is the first so far."""
-    hit = flights.end(_one(like, seen, i), course, 0, i)
-    return (hit.wall < 0.0) & (hit.time < seen.time[i]) & (near.k < seen.number[i])
-
-
-@outlined
-def _go_on(like, gravity, rows, course, seen, i, near, steps):
-    """So many more steps of one lane, if need be."""
-    for _step in range(steps):
-        flights.step(_one(like, seen, i), gravity, course, 0, i, *_flight(rows, near, i))
-        if not _goes_on(like, course, seen, i, near):
-            break
-
-
-def _take(seen, i, near, time, wall):
-    """A hit with that body, if there is one and it is the first so far."""
-    sooner = (near.k < seen.number[i]) & (time < seen.time[i])
-    seen.time[i] = select(sooner, time, seen.time[i])
-    seen.wall[i] = select(sooner, wall, seen.wall[i])
+        hit = flights.end(look.one(i), course, 0, i)
+        look.take(i, hit.time, select(hit.wall < 0.0, -1.0, look.seen.which[i] + look.before))

@@ -5,8 +5,6 @@ The system of the ties is factored once for several corrections, which are cheap
 """
 
 from ...kernel.jit import select
-from . import guides as guides_of
-from . import hold, ties
 
 # Most corrections, and after how many the system is factored again.
 _MOST, _AGAIN = 40, 5
@@ -23,51 +21,50 @@ def solve(contacts):
 
     Points that are led must be in r1 already. Lanes that are done at the start are left out.
     """
-    body, chain, rule, lanes, pace, _held = contacts
-    tied, touching = body
-    count, guides = pace.h.size, touching.guides
-    alone = rule.stages.size == 1 and guides == 0 and not rule.loop
-    ties.launch(tied, rule.gravity, lanes, pace)
-    more = guides
-    is_rigid = guides == 0 and tied.links == tied.ends.shape[0]
+    ties, rule, lanes, pace = contacts.ties, contacts.rule, contacts.lanes, contacts.pace
+    count, more = pace.h.size, contacts.touching.guides
+    has_guides = more > 0
+    alone = rule.stages.size == 1 and not has_guides and not rule.loop
+    contacts.launch()
+    is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
     for i in range(count):
         brief = is_rigid & (pace.held[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
         pace.done[i] = pace.done[i] | brief
         more += pace.held[i] > 0
-        if _is_held(touching, pace, i):
+        if _is_held(contacts, i):
             _turn(contacts, i, lanes.ra)
-    if tied.ends.shape[0] > 1:
+    if ties.ends.shape[0] > 1:
         # Where the multipliers are guessed well, D is the only error, and with one tie none: it follows once more.
         _push(contacts, 0)
-        ties.follow(tied, lanes, pace)
+        contacts.follow()
     for turn in range(_MOST + 1):
         # D follows the multipliers before they are corrected: together, the second makes up again for the first.
         _push(contacts, more)
-        ties.follow(tied, lanes, pace)
+        contacts.follow()
         if more > 0:
             for i in range(count):
-                if _is_held(touching, pace, i):
+                if _is_held(contacts, i):
                     _turn(contacts, i, lanes.r1)
         _push(contacts, more)
         if turn == _MOST or _all(pace.done):
             break
-        ties.residual(tied, lanes, pace, turn, rule)
-        if turn % _AGAIN == 0 or guides > 0:
-            ties.assemble(tied, lanes, pace)
-            if guides > 0:
+        contacts.residual(turn)
+        if turn % _AGAIN == 0 or has_guides:
+            contacts.assemble()
+            if has_guides:
                 for i in range(count):
                     if not pace.done[i]:
-                        guides_of.guide(body, chain, lanes, pace, i)
-            ties.factor(tied.start, lanes.a)
+                        contacts.guide(i)
+            _factor(ties.start, lanes.a)
         if more > 0:
             for i in range(count):
-                pace.residue[i] = guides_of.worst(touching, lanes, pace, rule, i)
-        ties.substitute(tied.start, lanes.a, lanes.f)
+                pace.residue[i] = contacts.worst(i)
+        _substitute(ties.start, lanes.a, lanes.f)
         if more > 0:
             for i in range(count):
-                if _is_held(touching, pace, i):
+                if _is_held(contacts, i):
                     contacts.correct(i, turn)
-        ties.correct(lanes, pace)
+        contacts.correct_ties()
         if alone and turn <= _SOON:
             for i in range(count):
                 late = (turn == _SOON) & (pace.held[i] == 0) & (not pace.done[i])
@@ -76,29 +73,28 @@ def solve(contacts):
         if _all(pace.done):
             _push(contacts, more)
             break
-    ties.arrive(tied, rule.gravity, lanes, pace)
+    contacts.arrive()
 
 
 def _turn(contacts, i, r1):
     """Directions of guides and contacts."""
-    guides_of.turn(contacts.body, contacts.chain, contacts.lanes, i, r1)
+    contacts.turn_guides(i, r1)
     contacts.turn(i, r1)
 
 
-def _is_held(touching, pace, i):
+def _is_held(contacts, i):
     """Whether more than ties is to be solved in a lane."""
-    return (not pace.done[i]) and (touching.guides > 0 or pace.held[i] > 0)
+    return (not contacts.pace.done[i]) and (contacts.touching.guides > 0 or contacts.pace.held[i] > 0)
 
 
 def _push(contacts, more):
     """r1 = p - (h^2/2) W (sum lambda D + sum p b d)"""
-    body, _chain, _rule, lanes, pace, held = contacts
-    ties.accelerate(body[0], lanes)
+    contacts.accelerate()
     if more > 0:
-        for i in range(pace.h.size):
-            if body[1].guides > 0 or pace.held[i] > 0:
-                hold.push(body, lanes, held, pace, i)
-    ties.move(lanes, pace)
+        for i in range(contacts.pace.h.size):
+            if contacts.touching.guides > 0 or contacts.pace.held[i] > 0:
+                contacts.push(i)
+    contacts.move()
 
 
 def _all(done):
@@ -107,3 +103,39 @@ def _all(done):
     for i in range(done.size):
         undone += select(done[i], 0, 1)
     return undone == 0
+
+
+def _factor(start, a):
+    """A = L U in place, with 1/U on the diagonal; the entries before `start` of a row, and of its column, are 0."""
+    count = a.shape[2]
+    for row in range(a.shape[0]):
+        first = start[row]
+        for column in range(first, row):
+            for k in range(max(first, start[column]), column):
+                for i in range(count):
+                    a[column, row, i] -= a[column, k, i] * a[k, row, i]
+                for i in range(count):
+                    a[row, column, i] -= a[row, k, i] * a[k, column, i]
+            for i in range(count):
+                a[row, column, i] *= a[column, column, i]
+        for k in range(first, row):
+            for i in range(count):
+                a[row, row, i] -= a[row, k, i] * a[k, row, i]
+        for i in range(count):
+            a[row, row, i] = 1.0 / a[row, row, i]
+
+
+def _substitute(start, a, f):
+    """f = A^-1 f, where A is factored."""
+    count = f.shape[1]
+    for row in range(f.shape[0]):
+        for k in range(start[row], row):
+            for i in range(count):
+                f[row, i] -= a[row, k, i] * f[k, i]
+    for row in range(f.shape[0] - 1, -1, -1):
+        for k in range(row + 1, f.shape[0]):
+            if start[k] <= row:
+                for i in range(count):
+                    f[row, i] -= a[row, k, i] * f[k, i]
+        for i in range(count):
+            f[row, i] *= a[row, row, i]

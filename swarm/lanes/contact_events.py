@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from ..contact import events, touching
+from ..contact import crossing, events, touching
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import Draw, exchange
 from ..contact.hold import One, Two, drift
+from ..contact.passing import hit_wall, open_wall_at
 from ..contact.reflection import given, wall_velocity
 from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
@@ -14,20 +15,19 @@ from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
 from ..surfaces.near import count_near, list_near
+from ..surfaces.openings import is_open
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
-from .arrays import booked, following_particle, speed2_scale
+from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
-from .escape import let_out_at, let_out_of, met_wall
+from .escape import escape
+from .periodic import return_particle
 from .table import LANES
-from .wrap import return_particle
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7
-# A call goes on with its next particle: no status.
-_GOES_ON = -1
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -35,32 +35,35 @@ _MOVED = 1e-9
 @long_kernel
 def meet_block(method, chain, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
-    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
+    return _one_by_one(EVENT, _decide, (method, chain, gravity), share)
+
+
+@long_kernel
+def careful_block(method, chain, gravity, share):
+    """A short step of each particle that several walls hold: (status, particle, drawn)."""
+    return _one_by_one(CAREFUL, _take_care, (method, chain, gravity), share)
+
+
+def _one_by_one(phase, advance, scene, share):
+    """Advance the particles in a phase that a thread draws, as long as they move on."""
+    place, _live, done = impact_log.gone_on(share.log)
     while True:
-        following, stop, drawn = following_particle(share, EVENT, following, stop, drawn)
-        status = _ends(share, following, stop, drawn, done)
-        if status != _GOES_ON:
-            return status, 0, drawn
-        if not _decide(method, chain, gravity, share, following):
-            return Status.STALLED.value, following, drawn
-        following, done = following + 1, done + 1
-
-
-def _ends(share, following, stop, drawn, done):
-    """The status with which a call ends before its next particle, or that it goes on."""
-    if following == stop:
-        return Status.DONE.value
-    if done // LANES >= share.halt[0]:
-        return Status.INTERRUPTED.value
-    if impact_log.is_full(share.log):
-        impact_log.keep_going(share.log, following, stop, drawn, 0, done)
-        return Status.LOG_FULL.value
-    return _GOES_ON
+        place = share.following(phase, place)
+        if place.is_end():
+            return Status.DONE.value, 0, place.drawn
+        if done // LANES >= share.halt[0]:
+            return Status.INTERRUPTED.value, 0, place.drawn
+        if impact_log.is_full(share.log):
+            impact_log.keep_going(share.log, place, 0, done)
+            return Status.LOG_FULL.value, 0, place.drawn
+        if not advance(*scene, share, place.i):
+            return Status.STALLED.value, place.i, place.drawn
+        place, done = place.after(), done + 1
 
 
 @outlined
 def _decide(method, chain, gravity, share, i):
-    """What becomes of particle i; whether it moves on."""
+    """Decide whether particle i goes on along its walls, or flies; whether it moves on."""
     state, contacts = share.state, share.state.contacts
     r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
     carried, chain = chain, chain.at(left)
@@ -71,10 +74,9 @@ def _decide(method, chain, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = left, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    is_hot = method.laws.thermal is not None
-    if is_hot and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
+    if method.laws.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
-    settles = _settles(method, carried, gravity, p)
+    moving, settles = method.laws.moving, _settles(method, carried, gravity, p)
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -86,12 +88,10 @@ def _decide(method, chain, gravity, share, i):
     state.impulse[chain.row(wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
-        struck = impact_log.Struck(r, v, found.v, wall, left, found.impulse)
-        for watch in share.watches():
-            watch.add_row(method, carried, state, i, struck)
+        share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, left, found.impulse))
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
-        _spare(method.laws.moving, chain, state, i, found, wall)
-    u = wall_velocity(method.laws.moving, chain, wall, r)
+        _spare(moving, chain, state, i, found, wall)
+    u = wall_velocity(moving, chain, wall, r)
     book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), method.laws.loses)
     contacts.sliding[i] -= min(found.wait, left)
     phase, v = found.phase, found.v
@@ -117,19 +117,22 @@ def _settles(method, chain, gravity, p):
     return events.settles(method, chain, gravity, p, scratch((2, chain.length()), np.float64))
 
 
+@outlined
 def _let_out(method, chain, share, i, r, v, left):
     """Whether particle i has escaped, since the wall that it has met is open there."""
-    openings, met = share.state.openings, share.state.contacts.met
-    met[i] = met_wall(openings, method, chain, met[i], r, v)
-    if not let_out_of(openings, method, share, i, met[i], r, left):
+    openings, met, near = share.state.openings, share.state.contacts.met, crossing.near(method, r)
+    # Where this one is open, a closed one at the same place.
+    met[i] = hit_wall(openings, method, chain, (r, v), met[i], near)
+    if not is_open(openings, met[i], r, near):
         return False
-    _leave(share, i)
+    _leave(share, i, met[i], r, v, left)
     return True
 
 
 @outlined
-def _leave(share, i):
-    """Particle i has escaped."""
+def _leave(share, i, wall, r, v, left):
+    """Particle i has escaped through a wall."""
+    escape(share, i, wall, r, v, left)
     contacts = share.state.contacts
     contacts.left[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
@@ -153,8 +156,7 @@ def _exchange_heat(method, chain, gravity, share, i):
     put(state.velocity, 0, i, left.v)
     state.impacts[i] += 1
     struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
-    for watch in share.watches():
-        watch.add_row(method, chain, state, i, struck)
+    share.note_impact(method, chain, i, struck)
     state.impulse[chain.row(wall), i] += left.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
@@ -176,25 +178,18 @@ def _spare(moving, chain, state, i, found, wall):
     state.impulse[chain.row(found.wall), i] += taken.b * state.mass[i]
 
 
-@long_kernel
-def careful_block(method, chain, gravity, share):
-    """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    following, stop, drawn, _live, done = impact_log.gone_on(share.log)
-    while True:
-        following, stop, drawn = following_particle(share, CAREFUL, following, stop, drawn)
-        status = _ends(share, following, stop, drawn, done)
-        if status != _GOES_ON:
-            return status, 0, drawn
-        _step(method, chain, gravity, share, following)
-        if share.state.period is not None:
-            return_particle(share.state.period, chain, share.state, following)
-        contacts = share.state.contacts
-        closed = isinstance(chain, Carried) and _have_closed(
-            chain, method, column(share.state.position, 0, following), contacts.left[following]
-        )
-        if closed or contacts.short_steps[following] > _MOST_SHORT_STEPS:
-            return Status.STALLED.value, following, drawn
-        following, done = following + 1, done + 1
+# --- Short steps -----------------------------------------------------------------------------------------
+
+
+def _take_care(method, chain, gravity, share, i):
+    """A short step of particle i; whether it moves on."""
+    state, contacts = share.state, share.state.contacts
+    _step(method, chain, gravity, share, i)
+    if state.period is not None:
+        return_particle(state.period, chain, state, i)
+    r = column(state.position, 0, i)
+    closed = isinstance(chain, Carried) and _have_closed(chain, method, r, contacts.left[i])
+    return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
 
 
 @outlined
@@ -226,9 +221,11 @@ def _step(method, chain, gravity, share, i):
     # What is carried begins the frame so.
     left = left if left > 0.0 else share.span
     now = chain.at(left)
-    if state.openings is not None and let_out_at(state.openings, method, now, share, i, r, left):
-        _leave(share, i)
-        return
+    if state.openings is not None:
+        wall = open_wall_at(state.openings, method, now, r, crossing.near(method, r))
+        if wall >= 0.0:
+            _leave(share, i, wall, r, v, left)
+            return
     p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
     held = scratch((2, chain.length()), np.float64)
     if method.laws.moving is None and events.settles(method, now, gravity, p, held):

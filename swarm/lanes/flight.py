@@ -5,7 +5,7 @@ from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.moving import Carried, Marched, Strided
 from ..surfaces.period import cut
-from .seek import hit_of_lane, keep_hit, seek
+from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
@@ -13,28 +13,7 @@ _STRIDES = 3
 
 
 def go(method, chain, gravity, lanes, live):
-    """Every lane to its next contact, or to the end of the frame."""
-    met = method.landed_on(chain)
-    if met is None:
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, flights.NEVER)
-    elif met.fields() and not isinstance(met, Carried):
-        _meet_others(chain.others(), gravity, chain.count_in_fields(), lanes, live)
-        seek(chain, gravity, lanes, live)
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, hit_of_lane(lanes, i))
-    elif isinstance(met, Strided):
-        _stride(method, chain, gravity, lanes, live)
-    elif isinstance(met, Marched):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            _flight(method, chain, gravity, lanes, i, safe.first_hit(chain, gravity, lane.r, lane.v, lane.left))
-    else:
-        _fly(method, chain, gravity, lanes, live)
-
-
-def _fly(method, chain, gravity, lanes, live):
-    """The same where no wall is of a field, and those that move do so uniformly.
+    """Every lane to its next contact, or to the end of the frame.
 
     A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
     an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
@@ -42,29 +21,46 @@ def _fly(method, chain, gravity, lanes, live):
     110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
     a particle: the angular momentum in a sphere drifted five times as fast.)
     """
+    met = method.landed_on(chain)
+    _search(met, chain, gravity, lanes, live)
+    for i in range(index(live)):
+        _flight(method, chain, gravity, lanes, i, _first_hit(met, chain, gravity, lanes.lane(i), lanes, i))
+
+
+def _search(met, chain, gravity, lanes, live):
+    """What of the first hits is found in loops of their own."""
+    if met is None:
+        return
+    if _has_fields(met):
+        free, before = chain.others(), chain.count_in_fields()
+        _search(free, free, gravity, lanes, live)
+        for i in range(index(live)):
+            keep_hit(lanes, i, _first_hit(free, free, gravity, lanes.lane(i), lanes, i), before)
+        seek(chain, gravity, lanes, live)
+    elif isinstance(met, Strided):
+        _stride(chain, gravity, lanes, live)
+    elif met.walls and not isinstance(met, Marched) and not _is_closed(gravity, chain):
+        _go_by_steps(chain, gravity, lanes, live)
+
+
+def _first_hit(met, chain, gravity, lane, lanes, i):
+    """The first hit of a lane with the walls that the method lands on."""
+    if met is None or not met.walls:
+        return flights.NEVER
+    if _has_fields(met):
+        return hit_of_lane(lanes, i)
+    if isinstance(met, Strided):
+        return strides.end(lanes.course, i)
+    if isinstance(met, Marched):
+        return safe.first_hit(chain, gravity, lane.r, lane.v, lane.left)
     if _is_closed(gravity, chain):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            _flight(method, chain, gravity, lanes, i, flights.first_hit(chain.at(lane.left), gravity, lane.r, lane.v))
-    else:
-        _go_by_steps(chain, gravity, lanes, live)
-        for i in range(index(live)):
-            _flight(method, chain, gravity, lanes, i, flights.end(chain.at(lanes.lane(i).left), lanes.course, 0, i))
+        return flights.first_hit(chain.at(lane.left), gravity, lane.r, lane.v)
+    return flights.end(chain.at(lane.left), lanes.course, 0, i)
 
 
-def _meet_others(chain, gravity, before, lanes, live):
-    """The first hits with the walls that are in no field; these have so many walls before them."""
-    if not chain.walls:
-        for i in range(index(live)):
-            keep_hit(lanes, i, flights.NEVER, 0.0)
-    elif _is_closed(gravity, chain):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            keep_hit(lanes, i, flights.first_hit(chain, gravity, lane.r, lane.v), before)
-    else:
-        _go_by_steps(chain, gravity, lanes, live)
-        for i in range(index(live)):
-            keep_hit(lanes, i, flights.end(chain, lanes.course, 0, i), before)
+def _has_fields(met):
+    """Whether walls at rest are bodies of a field."""
+    return len(met.fields()) > 0 and not isinstance(met, Carried)
 
 
 def _is_closed(gravity, chain):
@@ -72,8 +68,8 @@ def _is_closed(gravity, chain):
     return gravity is None and chain.in_steps() is None
 
 
-def _stride(method, chain, gravity, lanes, live):
-    """The same where walls move in any way, by safe steps in lanes."""
+def _stride(chain, gravity, lanes, live):
+    """Safe steps of all lanes to walls in any motion."""
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
@@ -85,8 +81,6 @@ def _stride(method, chain, gravity, lanes, live):
         for i in range(index(live)):
             lane = lanes.lane(i)
             strides.stride(chain, gravity, course, i, lane.r, lane.v, lane.left, False)
-    for i in range(index(live)):
-        _flight(method, chain, gravity, lanes, i, strides.end(course, i))
 
 
 def _go_by_steps(chain, gravity, lanes, live):

@@ -3,10 +3,17 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.vector import ZERO, column
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
 
 
 class Ties(NamedTuple):
-    """What ties the points of a body: rows of links, then of springs, then of edges of the elastic strain.
+    """The ties between the points of a body: rows of links, then of springs, then of edges of the elastic strain.
 
     The vector of a row is y = r_a - r_b.
     """
@@ -43,6 +50,30 @@ class Touching(NamedTuple):
     guides: int  # G
     restitution: Any  # (walls + G + C,)
     friction: Any  # (walls + G + C,)
+
+    def place(self, r, k, i):
+        """The place of contact point k of a lane, or with velocities its velocity."""
+        q = self.plain[k]
+        if q >= 0:
+            return column(r, 3 * q, i)
+        c = ZERO
+        for p in range(self.coefficients.shape[1]):
+            c = c + self.coefficients[k, p] * column(r, 3 * p, i)
+        return c
+
+    def span(self, k):
+        """The walls that a contact point can meet: from the first to the one before the last."""
+        own = k - self.points
+        first = 0 if own < 0 else self.walls + own
+        last = self.walls if own < 0 else first + (1 if own >= self.guides else 0)
+        return first, last
+
+    def width(self, name, found):
+        """How many directions of each contact matter: the normal, or the tangents too, where there is friction."""
+        rough = False
+        for a in range(found):
+            rough = rough or self.friction[name[a, 1]] > 0.0
+        return 3 if rough else 1
 
 
 class Rule(NamedTuple):
@@ -83,17 +114,17 @@ class BodyState(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """The bodies that a thread advances at once."""
+    """The bodies that a thread advances at once: three rows for each point, and for each tie and guide."""
 
-    r: Any  # (P, 3, B) at the start of the step
+    r: Any  # (3 P, B) at the start of the step
     v: Any
     ra: Any  # at the start of the stage
     va: Any
     p: Any  # where the stage would end without ties
     r1: Any  # at its end
     v1: Any
-    force: Any  # (P, 3, B) deceleration by the ties
-    y0: Any  # (M, 3, B) of every tie and guide, M = L + G, at the start of the stage
+    force: Any  # (3 P, B) deceleration by the ties
+    y0: Any  # (3 M, B) of every tie and guide, M = L + G, at the start of the stage
     y1: Any
     d: Any  # discrete gradient: y0 + y1 of |y|^2, a unit vector of a guide
     a: Any  # (M, M, B) system of the multipliers, factored
@@ -106,58 +137,71 @@ class Lanes(NamedTuple):
     offset: Any  # (M or 0, B) 4 l lambda/alpha of relaxed links
 
 
+def shapes_of_lanes(points, rows, offsets, count):
+    """The shape of each array of `Lanes`."""
+    tied = (3 * rows, count)
+    return (*8 * ((3 * points, count),), tied, tied, tied, (rows, rows, count), *6 * ((rows, count),), (offsets, count))
+
+
 class Pace(NamedTuple):
     """Numbers of each lane, (B,)."""
 
-    left: Any  # of the frame [s]
-    step: Any  # the step that is tried [s]
-    h: Any  # of the stage [s]
-    error: Any
-    lag: Any  # by how much D changed when it followed last: the sum of squares [m^2]
-    previous: Any  # error
-    rate: Any
-    residue: Any  # of the equations of ties and guides, in units of round-off
-    unsettled: Any  # of those of contacts too
-    trial: Any  # length to try [s]; 0: a whole step
-    low: Any  # bracket of the time of impact [s]
-    high: Any
-    inside: Any  # gap of the bracket's lower end [m], by how much the worst contact is inside
-    outside: Any  # and of its upper end
-    done: Any  # bool: the ties of this stage are solved, or put off
-    last: Any  # bool: after this correction
-    solved: Any  # bool: of all stages
-    out: Any  # bool: a point is outside
-    body: Any  # int: number of the body, -1 for none
-    point: Any  # int: whose impact it is, -1 for none
-    wall: Any
-    stuck: Any  # int: trials since the last step
-    action: Any  # int
-    lasts: Any  # bool: a contact lasts
-    held: Any  # int: contacts that do
-    fresh: Any  # bool: the step begins
-    whole: Any  # bool: the step is one stage
-    work: Any  # of led points in the step [J]
-    waits: Any  # int: how often the solution of this step was put off to the next pass
-    turns: Any  # int: sweeps of Uzawa's loop in this step
-    ease: Any  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
-    loops: Any  # bool: it goes on
-    loose: Any  # bool: it ended above its tolerance
+    left: Floats  # of the frame [s]
+    step: Floats  # the step that is tried [s]
+    h: Floats  # of the stage [s]
+    error: Floats
+    lag: Floats  # by how much D changed when it followed last: the sum of squares [m^2]
+    previous: Floats  # error
+    rate: Floats
+    residue: Floats  # of the equations of ties and guides, in units of round-off
+    unsettled: Floats  # of those of contacts too
+    trial: Floats  # length to try [s]; 0: a whole step
+    low: Floats  # bracket of the time of impact [s]
+    high: Floats
+    inside: Floats  # gap of the bracket's lower end [m], by how much the worst contact is inside
+    outside: Floats  # and of its upper end
+    done: Flags  # the ties of this stage are solved, or put off
+    last: Flags  # after this correction
+    solved: Flags  # of all stages
+    out: Flags  # a point is outside
+    body: Counts  # number of the body, -1 for none
+    point: Counts  # whose impact it is, -1 for none
+    wall: Counts
+    stuck: Counts  # trials since the last step
+    action: Counts
+    lasts: Flags  # a contact lasts
+    held: Counts  # contacts that do
+    fresh: Flags  # the step begins
+    whole: Flags  # the step is one stage
+    work: Floats  # of led points in the step [J]
+    waits: Counts  # how often the solution of this step was put off to the next pass
+    turns: Counts  # sweeps of Uzawa's loop in this step
+    ease: Floats  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
+    loops: Flags  # it goes on
+    loose: Flags  # it ended above its tolerance
 
 
-_FLAGS = frozenset(("done", "last", "solved", "out", "lasts", "fresh", "whole", "loops", "loose"))
-_COUNTS = frozenset(("body", "point", "wall", "stuck", "action", "held", "waits", "turns"))
 # The type of each array of `Pace`.
-PACES = tuple(np.bool_ if one in _FLAGS else np.int64 if one in _COUNTS else np.float64 for one in Pace._fields)
+PACES = tuple(kind.__args__[1].__args__[0] for kind in Pace.__annotations__.values())
 
 
 class Held(NamedTuple):
     """The contacts of each lane that last, at most C of them; of walls that are springs all."""
 
-    name: Any  # (B, C, 2) point and wall
-    frame: Any  # (B, C, 3, 3) normal and two tangents
-    press: Any  # (B, 3 C) force along each [N]
-    before: Any  # (B, 3 C) and in the step before, NaN where there is none
-    impulse: Any  # (B, C) of the step [N s]
-    stages: Any  # (B, C) in how many stages of the step it pushes
-    lost: Any  # (B,) to friction in the step [J]
-    multiplier: Any  # (B, C) lambda of walls that are springs
+    name: Counts  # (B, C, 2) point and wall
+    frame: Floats  # (B, C, 3, 3) normal and two tangents
+    press: Floats  # (B, 3 C) force along each [N]
+    before: Floats  # (B, 3 C) and in the step before, NaN where there is none
+    impulse: Floats  # (B, C) of the step [N s]
+    stages: Counts  # (B, C) in how many stages of the step it pushes
+    lost: Floats  # (B,) to friction in the step [J]
+    multiplier: Floats  # (B, C) lambda of walls that are springs
+
+
+def arrays_of_held(lanes, most):
+    """The shape and the type of each array of `Held`."""
+    whole, real, some = np.int64, np.float64, (lanes, most)
+    return (
+        ((lanes, most, 2), whole), ((lanes, most, 3, 3), real), ((lanes, 3 * most), real), ((lanes, 3 * most), real),
+        (some, real), (some, whole), (lanes, real), (some, real),
+    )  # fmt: skip

@@ -4,7 +4,7 @@ Each contact pushes with F = V[g0, g1] + lambda Phi[g0, g1] along g[q0, q1] D_q,
 gap, as of particles (contact/impulse.py): its work is the change of V + lambda Phi, exactly. With p for its force
 Newton's method solves p = F(g1) with ties and guides at once. The loop (8) then takes V to zero,
     lambda <- lambda + alpha (Phi0 + Phi1)/2,
-of walls and of links, which are relaxed for it (ties.py).
+of walls and of links, which are relaxed for it (constraints.py).
 Source: García Orden & Ortega 2007, eqs. (5), (7), (8).
 """
 
@@ -15,10 +15,9 @@ import numpy as np
 
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
-from ...kernel.vector import ZERO, square
-from . import hold, instant
-from .contacts import MOST_CONTACTS, NEAR, ROOM, direction, index_of, near, point_of, solve_dense, span
-from .contract import Contacts
+from ...kernel.vector import ZERO, column, square
+from . import impact_time
+from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, solve_dense
 
 
 class Soft(NamedTuple):
@@ -31,23 +30,23 @@ class Soft(NamedTuple):
     deepest: float  # gap [m] that stores the tolerance
 
 
-def _normal(chain, wall, r0, r1):
-    """The discrete gradient of the gap of a wall."""
-    return chain.of(wall, ZERO, _normal_of, r0, r1)
-
-
 def _normal_of(surface, r0, r1):
     rise, _curvature = surface.gap_slope(surface.inner(r0), surface.inner(r1))
     return rise * surface.inner_gradient(r0, r1)
 
 
+def _gap_of(surface, r):
+    return surface.gap_of(surface.inner(r))
+
+
+def _normal(chain, wall, r0, r1):
+    """The discrete gradient of the gap of a wall."""
+    return chain.of(wall, ZERO, _normal_of, r0, r1)
+
+
 def _gap(chain, wall, r):
     """The gap of a wall."""
     return chain.of(wall, 0.0, _gap_of, r)
-
-
-def _gap_of(surface, r):
-    return surface.gap_of(surface.inner(r))
 
 
 # From this correction on the equations may be worse by the factor, in units of round-off.
@@ -58,17 +57,6 @@ _ROUND_OFF = 8.0
 _SETTLED = 8.0
 
 
-def _lengths(ties, lanes, a, i):
-    """|y|^2 of a tie at both ends of the stage, less l^2"""
-    first, second = ties.ends[a, 0], ties.ends[a, 1]
-    before, after = 0.0, 0.0
-    for x in range(3):
-        y0, y1 = lanes.y0[a, x, i], lanes.r1[first, x, i] - lanes.r1[second, x, i]
-        before += y0 * y0
-        after += y1 * y1
-    return before - ties.rest[a], after - ties.rest[a]
-
-
 class SoftContacts(Contacts):
     """Contacts with walls that are springs."""
 
@@ -77,32 +65,40 @@ class SoftContacts(Contacts):
         gap, rule = _gap(self.chain, wall, y), self.rule
         return 0.0 if rule.loop and abs(gap) <= 2.0 * max(rule.walls.deepest, ROOM * rule.room) else gap
 
+    def _is_outside(self: Any, r, k, wall, i):
+        """Whether a point of a lane is outside a wall."""
+        return _gap(self.chain, float(wall), self.touching.place(r, k, i)) > 0.0
+
+    def _number(self: Any, i, k, wall):
+        """The number of a contact of a lane, -1 for none."""
+        index, name = -1, self.held.name[i]
+        for a in range(self.pace.held[i]):
+            if name[a, 0] == k and name[a, 1] == wall:
+                index = a
+        return index
+
     @outlined
     def begin(self: Any, i):
         # Those at their walls where steps are cut; else those that are outside, at the start or in the trial before.
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
-        touching, name, found = body[1], held.name[i], 0
-        again = not pace.fresh[i]
-        fresh = scratch((rule.most, 2), np.int64)
-        press = scratch(rule.most, np.float64)
-        if kind.is_cut:
+        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
+        name, found, again = held.name[i], 0, not pace.fresh[i]
+        fresh, press = scratch((rule.most, 2), np.int64), scratch(rule.most, np.float64)
+        if rule.walls.is_cut:
             if again and pace.solved[i]:
                 return
-            found = near(touching, chain, rule, (lanes.r, lanes.v), i, (fresh, held.frame[i]), False)
+            found = self.near(i, fresh, held.frame[i], False)
         else:
             for k in range(touching.plain.size):
-                first, last = span(touching, k)
+                first, last = touching.span(k)
                 for w in range(first, last):
-                    inside = not _gap(chain, float(w), point_of(touching, lanes.r, k, i)) > 0.0
+                    inside = not self._is_outside(lanes.r, k, w, i)
                     if inside and again:
-                        inside = index_of(held, i, pace.held[i], k, w) < 0
-                        inside = inside and not _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
+                        inside = self._number(i, k, w) < 0 and not self._is_outside(lanes.r1, k, w, i)
                     if not inside:
                         fresh[found, 0], fresh[found, 1] = k, w
                         found += 1
         for a in range(found):
-            known = index_of(held, i, pace.held[i], fresh[a, 0], fresh[a, 1])
+            known = self._number(i, fresh[a, 0], fresh[a, 1])
             press[a] = held.press[i, 3 * known] if known >= 0 and pace.solved[i] else 0.0
         pace.held[i] = found
         for a in range(found):
@@ -111,45 +107,40 @@ class SoftContacts(Contacts):
 
     @outlined
     def turn(self: Any, i, r1):
-        (tied, touching), chain, _rule, lanes, pace, held = self
-        half, ties = 0.5 * pace.h[i] * pace.h[i], tied.ends.shape[0]
+        touching, pace, held, frame = self.touching, self.pace, self.held, self.held.frame[i]
+        half, ties = 0.5 * pace.h[i] * pace.h[i], self.ties.ends.shape[0]
         for a in range(pace.held[i]):
             k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-            n = _normal(chain, wall, point_of(touching, lanes.ra, k, i), point_of(touching, r1, k, i))
+            n = _normal(self.chain, wall, touching.place(self.lanes.ra, k, i), touching.place(r1, k, i))
             # What its force moves the point by, as a change of D turns it.
-            turned = (
-                half * tied.couplings[ties + k, ties + k] * held.press[i, 3 * a] * (n - direction(held.frame[i], 3 * a))
-            )
-            pace.lag[i] += square(turned)
-            held.frame[i, a, 0, 0], held.frame[i, a, 0, 1], held.frame[i, a, 0, 2] = n.x, n.y, n.z
+            moved = half * self.ties.couplings[ties + k, ties + k] * held.press[i, 3 * a]
+            pace.lag[i] += square(moved * (n - direction(frame, a, 0)))
+            put_direction(frame, a, 0, n)
 
     @outlined
     def correct(self: Any, i, number):
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
-        touching = body[1]
-        law = kind.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
+        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
+        law = rule.walls.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
         found, m = pace.held[i], lanes.f.shape[0]
-        contacts = held.name[i], held.frame[i], held.press[i], 1, found
         along, across = scratch((found, m), np.float64), scratch((found, m), np.float64)
         system, change = scratch((found, found), np.float64), scratch(found, np.float64)
-        hold.eliminate(self, contacts, (along, across, system, change), i)
+        self.eliminate(1, (along, across, system, change), i)
         error = pace.residue[i]
         for a in range(found):
-            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-            g0 = self._start(wall, point_of(touching, lanes.ra, k, i))
-            g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
+            k, wall, multiplier = held.name[i, a, 0], float(held.name[i, a, 1]), held.multiplier[i, a]
+            g0 = self._start(wall, touching.place(lanes.ra, k, i))
+            g1 = _gap(self.chain, wall, touching.place(lanes.r1, k, i))
             # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are
             # not met: then it is what g1 = 0 asks for, as of a rigid wall.
             force = held.press[i, 3 * a] + g1 / system[a, a]
-            if g0 == 0.0 and 0.0 <= force <= held.multiplier[i, a]:
+            if g0 == 0.0 and 0.0 <= force <= multiplier:
                 error = max(error, abs(g1) / rule.room)
                 change[a] += g1
                 continue
             end = g1
-            if g0 == 0.0 and held.multiplier[i, a] > 0.0:
+            if g0 == 0.0 and multiplier > 0.0:
                 end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
-            force, stiffness = law.force(held.multiplier[i, a], g0, end)
+            force, stiffness = law.force(multiplier, g0, end)
             missing = force + stiffness * (g1 - end) - held.press[i, 3 * a]
             # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
             give = system[a, a] / (1.0 + stiffness * system[a, a])
@@ -178,27 +169,26 @@ class SoftContacts(Contacts):
 
     def begin_loop(self: Any):
         # The multipliers of links are from the steps before, those of walls from 0: above its limit a loop has no step.
-        (tied, _touching), _chain, rule, lanes, pace, held = self
+        ties, lanes, pace, held = self.ties, self.lanes, self.pace, self.held
         for i in range(pace.h.size):
             # A sweep shrinks errors by alpha h^2/m: what the cut of a step leaves would take thousands.
-            pace.ease[i] = (pace.h[i] / rule.dt) * (pace.h[i] / rule.dt)
-        for a in range(tied.springs - tied.relaxed, tied.springs):
+            pace.ease[i] = (pace.h[i] / self.rule.dt) * (pace.h[i] / self.rule.dt)
+        for a in range(ties.springs - ties.relaxed, ties.springs):
             for i in range(pace.h.size):
-                lanes.offset[a, i] = tied.give[a] * pace.ease[i] * lanes.multiplier[a, i]
+                lanes.offset[a, i] = ties.give[a] * pace.ease[i] * lanes.multiplier[a, i]
         for i in range(pace.h.size):
             pace.turns[i], pace.loops[i], pace.loose[i] = 0, not pace.done[i], False
             for a in range(held.multiplier.shape[1]):
                 held.multiplier[i, a] = 0.0
 
     def again(self: Any):
-        kind, pace = self.rule.walls, self.pace
+        soft, pace = self.rule.walls, self.pace
         live = 0
         for i in range(pace.h.size):
             if pace.loops[i] and pace.solved[i]:
                 pace.turns[i] += 1
-                stored = self._stored(i)
-                pace.loose[i] = not stored <= kind.tolerance
-                pace.loops[i] = pace.loose[i] and pace.turns[i] < kind.sweeps
+                pace.loose[i] = not self._stored(i) <= soft.tolerance
+                pace.loops[i] = pace.loose[i] and pace.turns[i] < soft.sweeps
             pace.loops[i] = pace.loops[i] and pace.solved[i]
             pace.done[i] = not pace.loops[i]
             live += pace.loops[i]
@@ -209,79 +199,76 @@ class SoftContacts(Contacts):
             pace.waits[i] = 1 if live > 0 and pace.done[i] else 0
         return live
 
+    def _lengths(self: Any, a, i):
+        """|y|^2 of a tie at both ends of the stage, less l^2"""
+        ties, lanes = self.ties, self.lanes
+        y1 = column(lanes.r1, 3 * ties.ends[a, 0], i) - column(lanes.r1, 3 * ties.ends[a, 1], i)
+        return square(column(lanes.y0, 3 * a, i)) - ties.rest[a], square(y1) - ties.rest[a]
+
     @outlined
     def _stored(self: Any, i):
         """V at the end of the step, of walls and links; a link stores alpha c^2/2 with c = (|y|^2 - l^2)/(2 l).
 
         What is round-off of a length stores nothing.
         """
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
-        ties, touching = body
+        ties, rule, law, held = self.ties, self.rule, self.rule.walls.law, self.held
         stored = 0.0
         for a in range(ties.springs - ties.relaxed, ties.springs):
-            _before, after = _lengths(ties, lanes, a, i)
+            _before, after = self._lengths(a, i)
             if abs(after) > _ROUND_OFF * rule.noise * ties.rest[a]:
-                stored += kind.law.alpha * after * after / (8.0 * ties.rest[a])
-        for a in range(pace.held[i]):
-            g1 = _gap(chain, float(held.name[i, a, 1]), point_of(touching, lanes.r1, held.name[i, a, 0], i))
-            stored += kind.law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
+                stored += law.alpha * after * after / (8.0 * ties.rest[a])
+        for a in range(self.pace.held[i]):
+            g1 = _gap(self.chain, float(held.name[i, a, 1]), self.touching.place(self.lanes.r1, held.name[i, a, 0], i))
+            stored += law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
         return stored
 
     @outlined
     def _update(self: Any, i):
         """lambda <- lambda + alpha (Phi0 + Phi1)/2 of walls and links"""
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
-        ties, touching = body
+        ties, touching, lanes, law, held = self.ties, self.touching, self.lanes, self.rule.walls.law, self.held
         for a in range(ties.springs - ties.relaxed, ties.springs):
-            before, after = _lengths(ties, lanes, a, i)
+            before, after = self._lengths(a, i)
             lanes.offset[a, i] += before + after
-        for a in range(pace.held[i]):
+        for a in range(self.pace.held[i]):
             k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-            g0 = self._start(wall, point_of(touching, lanes.ra, k, i))
-            g1 = _gap(chain, wall, point_of(touching, lanes.r1, k, i))
-            mean = 0.5 * (kind.law.constraint(g0) + kind.law.constraint(g1))
-            held.multiplier[i, a] += kind.law.alpha / pace.ease[i] * mean
+            g0 = self._start(wall, touching.place(lanes.ra, k, i))
+            g1 = _gap(self.chain, wall, touching.place(lanes.r1, k, i))
+            mean = 0.5 * (law.constraint(g0) + law.constraint(g1))
+            held.multiplier[i, a] += law.alpha / self.pace.ease[i] * mean
 
     # --- After a trial
 
     @outlined
     def judge(self: Any, i):
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
-        touching = body[1]
-        if kind.is_cut:
+        touching, rule, pace = self.touching, self.rule, self.pace
+        if rule.walls.is_cut:
             # The loop leaves a contact outside by what its tolerance stores.
-            return instant.look(touching, chain, rule, lanes, pace, i, 2.0 * max(kind.deepest, ROOM * rule.room))
+            return impact_time.look(self, i, 2.0 * max(rule.walls.deepest, ROOM * rule.room))
         pace.stuck[i] += 1
         if not pace.solved[i]:
-            return instant.halve(rule, pace, i)
+            return impact_time.halve(self, i)
         for k in range(touching.plain.size):
-            first, last = span(touching, k)
+            first, last = touching.span(k)
             for w in range(first, last):
-                outside = _gap(chain, float(w), point_of(touching, lanes.r1, k, i)) > 0.0
-                if outside and index_of(held, i, pace.held[i], k, w) < 0:
+                if self._is_outside(self.lanes.r1, k, w, i) and self._number(i, k, w) < 0:
                     pace.lasts[i] = True
-                    return instant.AGAIN
-        return instant.COMMIT
+                    return impact_time.AGAIN
+        return impact_time.COMMIT
 
     @outlined
     def end(self: Any, state, i):
         # Where steps are cut a contact lasts as long as it pushes, else as long as its point is outside.
-        body, chain, rule, lanes, pace, held = self
-        kind = rule.walls
+        lanes, pace, held = self.lanes, self.pace, self.held
         number, lasts = pace.body[i], False
         for a in range(pace.held[i]):
             k, wall = held.name[i, a, 0], held.name[i, a, 1]
             pushes = held.press[i, 3 * a] > 0.0
             state.impulse[wall, number] += held.impulse[i, a]
-            if kind.is_cut:
+            if self.rule.walls.is_cut:
                 lasts = lasts or pushes
             else:
-                lasts = lasts or _gap(chain, float(wall), point_of(body[1], lanes.r1, k, i)) > 0.0
-                new = not _gap(chain, float(wall), point_of(body[1], lanes.ra, k, i)) > 0.0
-                state.impacts[number] += 1 if pushes and new else 0
+                lasts = lasts or self._is_outside(lanes.r1, k, wall, i)
+                state.impacts[number] += 1 if pushes and not self._is_outside(lanes.ra, k, wall, i) else 0
         pace.lasts[i] = lasts
         if not lasts:
             pace.held[i] = 0
@@ -289,9 +276,7 @@ class SoftContacts(Contacts):
     @outlined
     def strike(self: Any, state, i):
         # The next step is that of the contact, from State I.
-        body, chain, rule, lanes, pace, _held = self
         name = scratch((MOST_CONTACTS, 2), np.int64)
         frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
-        found = near(body[1], chain, rule, (lanes.r, lanes.v), i, (name, frame), True)
-        state.impacts[pace.body[i]] += found
-        pace.lasts[i] = True
+        state.impacts[self.pace.body[i]] += self.near(i, name, frame, True)
+        self.pace.lasts[i] = True

@@ -12,7 +12,7 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
 from ..surfaces.period import is_beyond
-from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK, moves
+from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
 
 # A step of this part of a crossing, or of the size, is the shortest.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
@@ -20,12 +20,13 @@ SHORTEST, _NO_WAY = 1e-10, 1e-15
 SLOWEST = 1e-24
 
 
-def compose(kind, method, chain, gravity, lanes, live):
+def compose(slide, live):
     """One composed step of every live lane, from its r, v and a to its r1 and v1."""
-    friction, moving = method.laws.friction, method.laws.moving
+    chain, gravity, lanes = slide.chain, slide.gravity, slide.lanes
+    friction, moving = slide.method.laws.friction, slide.moving()
     rubs = friction is not None
     for i in range(live):
-        _start(method, chain, gravity, lanes, i)
+        _start(slide, i)
     for k in range(slides.PARTS):
         for i in range(live):
             lane = lanes.lane(i)
@@ -38,9 +39,9 @@ def compose(kind, method, chain, gravity, lanes, live):
             if rubs:
                 u = wall_velocity(moving, now, lane.first, r)
                 # The drive of a particle that is at rest on its first wall
-                drive = last - lane.h * now.acceleration(lane.first, r) if moves(method) else last
+                drive = last - lane.h * now.acceleration(lane.first, r) if slide.moves() else last
                 toward = slides.direction(friction, relative(u, v), drive)
-                slowed = slides.slow(friction, lane.held(kind), now, gravity, r, (v, toward, u), 0.5 * h)
+                slowed = slides.slow(friction, slide.held(lane), now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
                 lane.work += slowed.lost
                 lane.toward = toward
@@ -49,12 +50,12 @@ def compose(kind, method, chain, gravity, lanes, live):
         for _sweep in range(slides.SWEEPS):
             some = False
             for i in range(live):
-                some = _sweep_lane(kind, moving, chain, lanes, i, k) | some
+                some = _sweep_lane(slide, i, k) | some
             if not some:
                 break
         for i in range(live):
             lane = lanes.lane(i)
-            h, w, v0, r0, held = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, lane.held(kind)
+            h, w, v0, r0, held = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, slide.held(lane)
             left, after = _when(lane, k)
             step, end = chain.during(left, after), lane.end
             # The last sweep
@@ -75,30 +76,30 @@ def compose(kind, method, chain, gravity, lanes, live):
             lanes.event[i] |= select(lanes.unsolved[i], FAILED, 0)
 
 
-def _start(method, chain, gravity, lanes, i):
+def _start(slide, i):
     """How long the step of a lane is, by how much it may be off, and from where it goes."""
-    lane, tolerance = lanes.lane(i), method.sliding_tolerance
+    lane, method = slide.lanes.lane(i), slide.method
     v, a, r = lane.v, lane.a, lane.r
     h = select(lane.step < lane.left, lane.step, lane.left)
     h = select(lane.cut < h, lane.cut, h)
-    stop = _longest(method, chain.at(lane.left), lane.first, (r, v, a))
+    stop = _longest(slide, lane)
     h = select(stop < h, stop, h)
     # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
     speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
-    lane.h, lane.allowed = h, tolerance * speed * h
-    taken = accelerated(gravity, ZERO, 1.0) - a
+    lane.h, lane.allowed = h, method.sliding_tolerance * speed * h
+    taken = accelerated(slide.gravity, ZERO, 1.0) - a
     lane.still = slides.still(r, v, h * taken, lane.allowed)
     lane.r1, lane.v1, lane.change, lane.before = r, v, h * a, h * a
     lane.impulse, lane.impulse_second, lane.work, lane.given_by_second = 0.0, 0.0, 0.0, 0.0
-    lanes.event[i] = 0
+    slide.lanes.event[i] = 0
 
 
-def _longest(method, chain, wall, motion):
-    """A time within which a particle that slides with friction surely does not stop on its first wall."""
-    (r, v, a), friction = motion, method.laws.friction
-    if moves(method):
-        v, a = v - chain.velocity(wall, r), a - chain.acceleration(wall, r)
-    return slides.longest(friction, v, a)
+def _longest(slide, lane):
+    """A time within which a lane that slides with friction surely does not stop on its first wall."""
+    now, r, v, a = slide.chain.at(lane.left), lane.r, lane.v, lane.a
+    if slide.moves():
+        v, a = v - now.velocity(lane.first, r), a - now.acceleration(lane.first, r)
+    return slides.longest(slide.method.laws.friction, v, a)
 
 
 def _when(lane, k):
@@ -107,12 +108,11 @@ def _when(lane, k):
     return left - slides.before(k) * h, left - (slides.before(k) + slides.part(k)) * h
 
 
-def _sweep_lane(kind, moving, chain, lanes, i, k):
+def _sweep_lane(slide, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
-    lane, unsolved = lanes.lane(i), lanes.unsolved
-    r0, end, w = lane.r1, lane.end, lane.w
-    step = chain.during(*_when(lane, k))
-    swept = slides.sweep(moving, lane.held(kind), step, slides.part(k) * lane.h, (r0, end, w), lane.still)
+    lane, unsolved = slide.lanes.lane(i), slide.lanes.unsolved
+    end, step, h = lane.end, slide.chain.during(*_when(lane, k)), slides.part(k) * lane.h
+    swept = slides.sweep(slide.moving(), slide.held(lane), step, h, (lane.r1, end, lane.w), lane.still)
     on = unsolved[i]
     lane.end = either(on, swept.r, end)
     more = on & swept.moves
@@ -123,26 +123,26 @@ def _sweep_lane(kind, moving, chain, lanes, i, k):
 # --- Its end ---------------------------------------------------------------------------------------------
 
 
-def end_steps(kind, method, chain, gravity, lanes, live):
+def end_steps(slide, live):
     """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
     for i in range(live):
-        _end_step(kind, method, chain, gravity, lanes, i)
+        _end_step(slide, i)
 
 
-def _end_step(kind, method, chain, gravity, lanes, i):
-    lane, laws = lanes.lane(i), method.laws
-    moving, held = laws.moving, lane.held(kind)
+def _end_step(slide, i):
+    method, chain, gravity, lanes, lane = slide.method, slide.chain, slide.gravity, slide.lanes, slide.lanes.lane(i)
+    moving, held = slide.moving(), slide.held(lane)
     start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
     r1 = held.settle(now, lane.r1)
     v1 = held.split_at(now, hold.drift(moving, held, now, r1), r1, lane.v1).along
     rest = 2.0 * potential(gravity, r1) + keep * keep
-    twice = twice_after(method, lane.twice - lane.work, square(v1) + rest)
-    if not moves(method):
+    twice = twice_after(slide, lane.twice - lane.work, square(v1) + rest)
+    if not slide.moves():
         # Walls at rest leave the speed that the energy says.
         v1 = slides.restored(v1, twice - rest, scale2)
-    force = slides.force(laws, held, now, gravity, r1, v1)
+    force = slide.force(lane, now, r1, v1)
     ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), lane.allowed)
     path = crossing.Path(r0, v0, r1, v1, h)
     lifted = held.lets_go(force.n, force.m)
@@ -167,7 +167,7 @@ def _end_step(kind, method, chain, gravity, lanes, i):
     lane.r, lane.v, lane.a = either(fine, r1, r0), either(fine, v1, v0), either(fine, force.acceleration, a0)
     lane.press = select(fine, force.n, lane.press)
     lane.press_second = select(fine, force.m, lane.press_second)
-    if laws.friction is not None:
+    if method.laws.friction is not None:
         slip = relative(wall_velocity(moving, now, lane.first, r1), v1)
         lanes.event[i] |= select(fine & (square(slip) <= SLOWEST * scale2), STOPPED, 0)
     # Near an apex steps become shorter without end, in time or, of a slow particle, in length.
@@ -177,6 +177,6 @@ def _end_step(kind, method, chain, gravity, lanes, i):
     lanes.event[i] |= select(short, STUCK, 0)
 
 
-def twice_after(method, kept, now):
+def twice_after(slide, kept, now):
     """Twice the energy per mass after a step: that of before, or all there is where walls do work."""
-    return now if moves(method) else kept
+    return now if slide.moves() else kept

@@ -4,7 +4,7 @@ import math
 
 from ...kernel.jit import outlined
 from ...kernel.vector import dot
-from .contacts import NEAR, count_at, point_of, span, wall_at
+from .contacts import NEAR, count_at, wall_at
 
 # The action of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
@@ -19,32 +19,33 @@ _QUICK = 40
 _HALVED = 2.0**-20
 
 
-def halve(rule, pace, i):
+def halve(bodies, i):
     """A step whose ties have no solution is halved, but not for ever."""
+    pace = bodies.pace
     pace.trial[i] = 0.5 * pace.step[i]
     pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
-    return AGAIN if pace.step[i] > _HALVED * rule.dt else FAILED
+    return AGAIN if pace.step[i] > _HALVED * bodies.rule.dt else FAILED
 
 
 @outlined
-def look(touching, chain, rule, lanes, pace, i, larger):
+def look(bodies, i, larger):
     """Where to cut a step that ends outside; contacts that last may end outside by `larger`."""
+    touching, chain, rule, lanes, pace = bodies.touching, bodies.chain, bodies.rule, bodies.lanes, bodies.pace
     tau = pace.step[i]
     pace.stuck[i] += 1
     if not pace.solved[i]:
-        return halve(rule, pace, i)
+        return halve(bodies, i)
     # The forces of contacts that last leave a part of it.
     room = rule.room if pace.held[i] == 0 else larger
     worst, first, point, wall = -math.inf, tau, -1, -1
     for k in range(touching.plain.size):
-        c = point_of(touching, lanes.r1, k, i)
-        met = span(touching, k)
+        c, met = touching.place(lanes.r1, k, i), touching.span(k)
         for j in range(count_at(chain, met, c)):
             w = wall_at(chain, met, j, c)
             gap = chain.distance(float(w), c)
             worst = max(worst, gap)
             if not gap <= room:
-                rate = dot(chain.unit_normal(float(w), c), point_of(touching, lanes.v1, k, i))
+                rate = dot(chain.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
                 time = tau - gap / rate if rate > 0.0 else 0.0
                 if wall < 0 or time < first:
                     first, point, wall = time, k, w
@@ -57,7 +58,7 @@ def look(touching, chain, rule, lanes, pace, i, larger):
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
-        start = chain.distance(float(wall), point_of(touching, lanes.r, point, i))
+        start = chain.distance(float(wall), touching.place(lanes.r, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
     closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]
@@ -91,7 +92,7 @@ def _inside(rule, pace, i, gap):
 
 
 def _weight(gap, before):
-    """What an end that stays counts when the other moves again (Anderson and Bjorck)."""
+    """The weight of an end of the bracket that stays when the other moves again (Anderson and Bjorck)."""
     weight = 1.0 - gap / before
     return weight if weight > 0.0 else 0.5
 

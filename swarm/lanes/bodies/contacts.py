@@ -1,0 +1,247 @@
+"""The contacts of a body: which walls its points can meet, which are at one, and what their forces do to the ties.
+
+The contacts with rigid walls are in persistent_contact.py, those with springs in penalty_contact.py.
+"""
+
+import math
+
+import numpy as np
+
+from ...kernel.jit import outlined
+from ...kernel.vector import Vec, column, cross, dot, norm, put
+from .constraints import Constrained
+
+# A contact this many times round-off away from its wall is at it.
+NEAR = 64.0
+# Most contacts at one instant; more follow in the next blow at the same instant.
+MOST_CONTACTS = 16
+# How far outside a contact that lasts may end, in units of round-off.
+ROOM = 64.0
+
+
+class Contacts(Constrained):
+    """The contacts of a pass, by the kind of its walls."""
+
+    def begin(self, i):
+        """The contacts of a lane at the start of a trial, and how they press."""
+        raise NotImplementedError
+
+    def turn(self, i, r1):
+        """Directions of the contacts of a lane: the discrete gradient of each gap from the start of the stage to r1."""
+        raise NotImplementedError
+
+    def correct(self, i, number):
+        """Correct the forces of contacts, and for it f, the corrections of ties and guides; whether it is the last."""
+        raise NotImplementedError
+
+    def gap_gradient(self, wall, y):
+        """The gradient of the gap that the contacts solve for."""
+        raise NotImplementedError
+
+    def begin_loop(self):
+        """Begin Uzawa's loop of a stage in all lanes."""
+
+    def again(self):
+        """Update the multipliers of lanes whose loop goes on, and count these; the stage of the others is done."""
+        return 0
+
+    def judge(self, i):
+        """The action of a lane whose trial ends outside, has no solution, or looks for the time of an impact."""
+        raise NotImplementedError
+
+    def end(self, state, i):
+        """Book the impulses of the walls in a step; whether contacts last."""
+        raise NotImplementedError
+
+    def strike(self, state, i):
+        """An impact at this instant; contacts may last from there."""
+        raise NotImplementedError
+
+    # --- In a stage
+
+    def push(self, i):
+        """Add the forces of guides and contacts to the deceleration."""
+        touching, lanes, held = self.touching, self.lanes, self.held
+        points = lanes.force.shape[0] // 3
+        for g in range(touching.guides):
+            row = self.ties.ends.shape[0] + g
+            for q in range(points):
+                f = lanes.multiplier[row, i] * touching.reach[touching.points + g, q]
+                put(lanes.force, 3 * q, i, column(lanes.force, 3 * q, i) + f * column(lanes.d, 3 * row, i))
+        for a in range(self.pace.held[i]):
+            k = held.name[i, a, 0]
+            for d in range(3):
+                p = held.press[i, 3 * a + d]
+                if p != 0.0:
+                    for q in range(points):
+                        f = p * touching.reach[k, q] * direction(held.frame[i], a, d)
+                        put(lanes.force, 3 * q, i, column(lanes.force, 3 * q, i) + f)
+
+    def eliminate(self, wide, systems, i):
+        """Leave the contacts alone: schur, and gap without what the corrections of ties and guides do to it."""
+        along, across, schur, gap = systems
+        ties, lanes, name, frame = self.ties, self.lanes, self.held.name[i], self.held.frame[i]
+        m, rows, count = lanes.f.shape[0], schur.shape[0], ties.ends.shape[0]
+        half = 0.5 * self.pace.h[i] * self.pace.h[i]
+        for a in range(rows):
+            k, wall, d = name[a // wide, 0], name[a // wide, 1], direction(frame, a // wide, a % wide)
+            e = d
+            if a % wide == 0:
+                e = self.gap_gradient(float(wall), self.touching.place(lanes.r1, k, i))
+            for row in range(m):
+                c = half * ties.couplings[count + k, self.coupling(row)]
+                along[a, row] = c * dot(e, column(lanes.d, 3 * row, i))
+                across[a, row] = c * dot(self.slope(row, i), d)
+                gap[a] -= along[a, row] * lanes.f[row, i]
+            _substitute(ties.start, lanes.a, across, a, i)
+            for b in range(rows):
+                c = half * ties.couplings[count + k, count + name[b // wide, 0]]
+                schur[a, b] = c * dot(e, direction(frame, b // wide, b % wide))
+        for a in range(rows):
+            for b in range(rows):
+                for row in range(m):
+                    schur[a, b] -= along[a, row] * across[b, row]
+
+    def book(self, i):
+        """Book the impulses of the walls, and the work of friction, in the stage."""
+        touching, lanes, held = self.touching, self.lanes, self.held
+        for a in range(self.pace.held[i]):
+            k, press, frame = held.name[i, a, 0], held.press[i, 3 * a], held.frame[i]
+            held.stages[i, a] += 1 if press > 0.0 else 0
+            held.impulse[i, a] += self.pace.h[i] * press * norm(direction(frame, a, 0))
+            away = touching.place(lanes.r1, k, i) - touching.place(lanes.ra, k, i)
+            for d in range(1, 3):
+                held.lost[i] += held.press[i, 3 * a + d] * dot(direction(frame, a, d), away)
+
+    def is_mixed(self, i):
+        """Whether a contact pushed in some stages of a composed step only: then energy went with it."""
+        mixed = False
+        for a in range(self.pace.held[i]):
+            mixed = mixed or 0 < self.held.stages[i, a] < self.rule.stages.size
+        return mixed
+
+    def forget(self, i):
+        """Forget what was booked in a trial."""
+        held = self.held
+        held.lost[i] = 0.0
+        for a in range(held.name.shape[1]):
+            held.impulse[i, a], held.stages[i, a] = 0.0, 0
+
+    def near(self, i, name, frame, approaching):
+        """Find the contacts at their walls, or those that approach: how many there are.
+
+        Their names (point, wall), and a normal and two tangents of each.
+        """
+        touching, chain, found = self.touching, self.chain, 0
+        for k in range(touching.plain.size):
+            c, u = touching.place(self.lanes.r, k, i), touching.place(self.lanes.v, k, i)
+            met = touching.span(k)
+            for j in range(count_at(chain, met, c)):
+                w = wall_at(chain, met, j, c)
+                if found < MOST_CONTACTS and chain.distance(float(w), c) >= -NEAR * self.rule.room:
+                    n = chain.unit_normal(float(w), c)
+                    # What is left of an approach by round-off is none.
+                    if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
+                        name[found, 0], name[found, 1] = k, w
+                        flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
+                        t = cross(n, flat)
+                        put_frame(frame, found, n, t / norm(t))
+                        found += 1
+        return found
+
+
+# --- Walls that a point may meet -------------------------------------------------------------------------
+
+
+def count_at(chain, span, c):
+    """How many walls of a span a point may be at: of a field those of its cell."""
+    first, last = span
+    fields = chain.fields()
+    if len(fields) == 0 or first > 0:
+        return last - first
+    found = 0
+    for _number, field in reversed(fields):
+        found = int(field.members.count_in_cell(c)) + found
+    return found + last - int(chain.count_in_fields())
+
+
+def wall_at(chain, span, j, c):
+    """One of these walls."""
+    if len(chain.fields()) == 0 or span[0] > 0:
+        return span[0] + j
+    return _wall_of_cells(chain, j, c)
+
+
+@outlined
+def _wall_of_cells(chain, j, c):
+    """The same of a scene with fields."""
+    for number, field in chain.fields():
+        here = int(field.members.count_in_cell(c))
+        if j < here:
+            return int(number) + int(field.members.one_in_cell(j, c))
+        j = j - here
+    return int(chain.count_in_fields()) + j
+
+
+# --- Small arrays of one lane ----------------------------------------------------------------------------
+
+
+def direction(frame, a, d):
+    """Direction d of contact a: its normal, or one of two tangents."""
+    return Vec(frame[a, d, 0], frame[a, d, 1], frame[a, d, 2])
+
+
+def put_direction(frame, a, d, n):
+    """Store a direction of a contact."""
+    frame[a, d, 0], frame[a, d, 1], frame[a, d, 2] = n.x, n.y, n.z
+
+
+def put_frame(frame, a, n, t):
+    """Store the normal of a contact, and two tangents of which t is the first."""
+    put_direction(frame, a, 0, n)
+    put_direction(frame, a, 1, t)
+    put_direction(frame, a, 2, cross(n, t))
+
+
+def missing(system, j, wanted, x):
+    """wanted - (A x)_j"""
+    for b in range(x.size):
+        wanted -= system[j, b] * x[b]
+    return wanted
+
+
+def rubbing(system, j, errors, forces, most):
+    """The tangential forces of the contact in row j, at most so large together, after a step of Gauss and Seidel."""
+    stiff = max(system[j + 1, j + 1], system[j + 2, j + 2])
+    one, other = forces[0] + errors[0] / stiff, forces[1] + errors[1] / stiff
+    length = math.sqrt(one * one + other * other)
+    within = min(1.0, most / length) if length > 0.0 else 1.0
+    return within * one, within * other
+
+
+def solve_dense(a, f):
+    """f = a^-1 f of a system whose symmetric part, but for factors of rows, is positive."""
+    rows = f.shape[0]
+    for k in range(rows):
+        for row in range(k + 1, rows):
+            part = a[row, k] / a[k, k]
+            for other in range(k + 1, rows):
+                a[row, other] -= part * a[k, other]
+            f[row] -= part * f[k]
+    for row in range(rows - 1, -1, -1):
+        for other in range(row + 1, rows):
+            f[row] -= a[row, other] * f[other]
+        f[row] /= a[row, row]
+
+
+def _substitute(start, a, x, k, i):
+    """x[k] = A^-1 x[k] with the factored system of a lane."""
+    m = x.shape[1]
+    for row in range(m):
+        for j in range(start[row], row):
+            x[k, row] -= a[row, j, i] * x[k, j]
+    for row in range(m - 1, -1, -1):
+        for j in range(row + 1, m):
+            if start[j] <= row:
+                x[k, row] -= a[row, j, i] * x[k, j]
+        x[k, row] *= a[row, row, i]

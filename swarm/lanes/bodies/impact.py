@@ -1,0 +1,243 @@
+"""Blows: the impulses of the walls at one instant, which turn a body round."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...kernel.arrays import scratch
+from ...kernel.jit import Array, outlined
+from ...kernel.record import Record
+from ...kernel.vector import column, dot, put, square
+from .contacts import MOST_CONTACTS, direction, missing, rubbing
+
+# Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
+_BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
+# After so many short steps from impact to impact a wall that takes energy takes all of the approach.
+_CHATTER = 12
+# A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
+SHORT = 1.0 / 16.0
+# Units of round-off by which a body may miss its energy.
+_EPS = float(np.finfo(np.float64).eps)
+_ROUND_OFF = 64.0 * _EPS
+
+
+def chatters(touching, state, number):
+    """Whether bounces follow one another ever faster: then they end."""
+    return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
+
+
+@outlined
+def restore(bodies, state, i):
+    """Restore the energy of a body after a blow, where only round-off is missing: else it is an error to be seen.
+
+    Steps miss 1.5e-16 of it and blows 3e-16, at random: after 10^5 impacts 3e-12. All velocities are scaled, so that
+    links keep their lengths.
+    """
+    ties, r, v, number = bodies.ties, bodies.lanes.r, bodies.lanes.v, bodies.pace.body[i]
+    kinetic, fall, elastic = _kinetic(ties, v, i), 0.0, _stretched(ties, r, i)
+    for p in range(ties.mass.shape[0]):
+        mass = 0.0
+        for q in range(ties.mass.shape[0]):
+            mass += ties.mass[p, q]
+        for x in range(3):
+            fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
+    lost = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
+    if abs(lost) <= _ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
+        # To first order: a body that has come to rest has no velocity by which more could be restored.
+        factor = 0.5 * lost / kinetic
+        if factor * factor <= _EPS:
+            for row in range(v.shape[0]):
+                v[row, i] += factor * v[row, i]
+
+
+def _stretched(ties, r, i):
+    """The energy of springs."""
+    total = 0.0
+    for a in range(ties.links, ties.ends.shape[0]):
+        y = column(r, 3 * ties.ends[a, 0], i) - column(r, 3 * ties.ends[a, 1], i)
+        longer = math.sqrt(square(y)) - ties.rest[a]
+        total += 0.5 * ties.stiffness[a] * longer * longer
+    return total
+
+
+def _kinetic(ties, v, i):
+    total = 0.0
+    for p in range(ties.mass.shape[0]):
+        for q in range(ties.mass.shape[0]):
+            m = ties.mass[p, q]
+            if m != 0.0:
+                total += 0.5 * m * dot(column(v, 3 * p, i), column(v, 3 * q, i))
+    return total
+
+
+@outlined
+def strike(bodies, state, i):
+    """The blows at one instant, after which no contact at its wall approaches it; how many there are.
+
+    For a wall without friction it is v+ = v- - (1 + e) (n.v)/(n K n) K n, where K is the inverse mass that links and
+    guides leave: K = W - W J (J W J)^-1 J W with a row of J for each. It is the contact step of the scheme for h -> 0.
+    """
+    name = scratch((MOST_CONTACTS, 2), np.int64)
+    frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
+    for turn in range(_BLOWS):
+        found = bodies.near(i, name, frame, True)
+        if found == 0 or not _blow(bodies, state, name, frame, found, i):
+            return turn
+    return _BLOWS
+
+
+@outlined
+def _blow(bodies, state, name, frame, found, i):
+    """One blow at all these contacts; whether there is any."""
+    ties, touching, v, number = bodies.ties, bodies.touching, bodies.lanes.v, bodies.pace.body[i]
+    bounces = 0.0 if chatters(touching, state, number) else 1.0
+    m, wide = ties.links + touching.guides, touching.width(name, found)
+    rows = wide * found
+    blow = Blow(
+        bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
+        scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
+    )  # fmt: skip
+    rate, p = scratch(rows, np.float64), scratch(rows, np.float64)
+    blow.hold(i)
+    blow.respond()
+    for a in range(rows):
+        rate[a] = dot(blow.direction(a), touching.place(v, name[a // wide, 0], i))
+        # Without what links take of it: the velocity has a part across them, of the order of the scheme.
+        for row in range(m):
+            rate[a] -= blow.answer[a, row] * dot(column(blow.across, 0, row), blow.between(v, row, i))
+    blow.find(rate, p, bounces)
+    if max(p) == 0.0:
+        return False
+    is_led = max(ties.led) >= 0
+    before = _kinetic(ties, v, i) if is_led else 0.0
+    blow.give(p, i)
+    lost, elastic = 0.0, bounces == 1.0
+    for a in range(found):
+        w = name[a, 1]
+        elastic = elastic and touching.restitution[w] == 1.0 and touching.friction[w] == 0.0
+        state.impulse[bodies.chain.row(float(w)), number] += p[wide * a]
+        if p[wide * a] > 0.0:
+            state.impacts[number] += 1
+    if not elastic:
+        # p times the mean of the rates before and after
+        for a in range(rows):
+            lost += 0.5 * p[a] * (rate[a] + missing(blow.schur, a, rate[a], p))
+    state.dissipated[number] += lost
+    if is_led:
+        state.work[number] += (_kinetic(ties, v, i) - before) + lost
+    return True
+
+
+class Blow(Record):
+    """One blow: its contacts, the links and guides that it strains, and how velocities answer impulses."""
+
+    bodies: Any
+    name: Array
+    frame: Array
+    wide: int  # directions of each contact
+    across: Array  # (3, m) the vector of every link and guide
+    system: Array  # (m, m) the Cholesky factor of J W J
+    answer: Array  # (rows, m) x = (J W J)^-1 J W b d of each direction d
+    schur: Array  # (rows, rows) n K n
+
+    def direction(self, a):
+        """Direction of row a."""
+        return direction(self.frame, a // self.wide, a % self.wide)
+
+    def coupling(self, row):
+        """The row of a link or guide among all couplings."""
+        ties = self.bodies.ties
+        return row if row < ties.links else row - ties.links + ties.ends.shape[0] + self.bodies.touching.points
+
+    def contact(self, a):
+        """The row of the contact of a direction among all couplings."""
+        return self.bodies.ties.ends.shape[0] + self.name[a // self.wide, 0]
+
+    def between(self, r, row, i):
+        """The vector from one end of a link to the other, or the place of a guide's point."""
+        ties, touching = self.bodies.ties, self.bodies.touching
+        if row >= ties.links:
+            return touching.place(r, touching.points + row - ties.links, i)
+        return column(r, 3 * ties.ends[row, 0], i) - column(r, 3 * ties.ends[row, 1], i)
+
+    def hold(self, i):
+        """The vector of every link and guide, and the Cholesky factor of J W J."""
+        bodies, system = self.bodies, self.system
+        ties, touching = bodies.ties, bodies.touching
+        for a in range(system.shape[0]):
+            y = self.between(bodies.lanes.r, a, i)
+            if a >= ties.links:
+                y = bodies.chain.unit_normal(float(touching.walls + a - ties.links), y)
+            put(self.across, 0, a, y)
+            for b in range(a + 1):
+                s = ties.couplings[self.coupling(a), self.coupling(b)] * dot(y, column(self.across, 0, b))
+                for k in range(b):
+                    s -= system[a, k] * system[b, k]
+                system[a, b] = s / system[b, b] if b < a else math.sqrt(s)
+
+    def respond(self):
+        """How the velocities of contacts answer impulses at them."""
+        couplings, system, answer, schur = self.bodies.ties.couplings, self.system, self.answer, self.schur
+        rows, m = answer.shape
+        for a in range(rows):
+            d = self.direction(a)
+            for row in range(m):
+                s = couplings[self.contact(a), self.coupling(row)] * dot(column(self.across, 0, row), d)
+                for k in range(row):
+                    s -= system[row, k] * answer[a, k]
+                answer[a, row] = s / system[row, row]
+            for b in range(a + 1):
+                s = couplings[self.contact(a), self.contact(b)] * dot(d, self.direction(b))
+                for row in range(m):
+                    s -= answer[a, row] * answer[b, row]
+                schur[a, b] = schur[b, a] = s
+        for a in range(rows):
+            for row in range(m - 1, -1, -1):
+                for j in range(row + 1, m):
+                    answer[a, row] -= system[j, row] * answer[a, j]
+                answer[a, row] /= system[row, row]
+
+    def find(self, rate, p, bounces):
+        """Find the impulses by Gauss-Seidel.
+
+        w+ = -e w- where a wall pushes; friction within its cone, or the point sticks.
+        """
+        touching, schur, wide = self.bodies.touching, self.schur, self.wide
+        for _sweep in range(_SWEEPS):
+            moved, size = 0.0, 0.0
+            for a in range(p.size // wide):
+                j, wall = wide * a, self.name[a, 1]
+                wanted = missing(schur, j, (1.0 + bounces * touching.restitution[wall]) * rate[j], p)
+                new = max(0.0, p[j] + wanted / schur[j, j])
+                moved, size = max(moved, abs(new - p[j])), max(size, new)
+                p[j] = new
+                mu = touching.friction[wall]
+                if mu > 0.0:
+                    errors = missing(schur, j + 1, rate[j + 1], p), missing(schur, j + 2, rate[j + 2], p)
+                    one, other = rubbing(schur, j, errors, (p[j + 1], p[j + 2]), mu * new)
+                    moved = max(moved, abs(one - p[j + 1]), abs(other - p[j + 2]))
+                    p[j + 1], p[j + 2] = one, other
+            if moved <= _SMALL * size:
+                break
+
+    def give(self, p, i):
+        """v -= W sum p (b d - sum x J)"""
+        ties, touching, v = self.bodies.ties, self.bodies.touching, self.bodies.lanes.v
+        m, points = self.answer.shape[1], v.shape[0] // 3
+        push, against = scratch((3, points), np.float64), scratch(m, np.float64)
+        for a in range(p.size):
+            for q in range(points):
+                g = p[a] * touching.reach[self.name[a // self.wide, 0], q]
+                put(push, 0, q, column(push, 0, q) + g * self.direction(a))
+            for row in range(m):
+                against[row] += p[a] * self.answer[a, row]
+        for row in range(m):
+            for q in range(points):
+                if row < ties.links:
+                    w = ties.inverse_mass[q, ties.ends[row, 0]] - ties.inverse_mass[q, ties.ends[row, 1]]
+                else:
+                    w = touching.reach[touching.points + row - ties.links, q]
+                put(push, 0, q, column(push, 0, q) - against[row] * w * column(self.across, 0, row))
+        for q in range(points):
+            put(v, 3 * q, i, column(v, 3 * q, i) - column(push, 0, q))

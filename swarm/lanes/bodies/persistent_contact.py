@@ -1,0 +1,170 @@
+"""Contacts with rigid walls that last: one constraint more for each.
+
+A contact that lasts is g(q1) = g(q0) for as long as its multiplier pushes: no contact moves through its wall, so their
+forces do no work but that of friction. Newton's method solves ties and guides together; what is left of it for the
+contacts (Schur's complement) is solved by Gauss-Seidel, until gaps and signs are right.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
+from ...kernel.vector import dot, norm
+from . import impact, impact_time
+from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, missing, put_direction, put_frame, rubbing
+
+# From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
+# contacts than three hold a rigid body, their forces converge slowly.
+_PATIENT, _LARGER = 20, 1e3
+# Sweeps over the contacts in one correction.
+_SWEEPS = 60
+# The most that an error of friction moves a contact [m/s].
+_CREEP = 1e-7
+# After so many blows without a step the contacts last.
+_LASTS = 20
+
+
+class HardContacts(Contacts):
+    """Contacts with rigid walls, which strike, and last as long as they push."""
+
+    @outlined
+    def begin(self: Any, i):
+        # In a step they press as in the step before where they are the same.
+        pace, held = self.pace, self.held
+        if not (pace.fresh[i] or not pace.solved[i]):
+            return
+        name, frame, before, found = held.name[i], held.frame[i], pace.held[i], 0
+        fresh = scratch((MOST_CONTACTS, 2), np.int64)
+        turned = scratch((MOST_CONTACTS, 3, 3), np.float64)
+        if pace.lasts[i]:
+            found = self.near(i, fresh, turned, False)
+        # A trial without a solution leaves infinite forces.
+        same = found == before and pace.solved[i]
+        for a in range(found):
+            same = same and fresh[a, 0] == name[a, 0] and fresh[a, 1] == name[a, 1]
+        pace.held[i] = found
+        for a in range(3 * found):
+            # Steadily growing forces are guessed exactly.
+            p, last = held.press[i, a], held.before[i, a]
+            held.press[i, a] = 2.0 * p - last if same and last == last else p
+            held.before[i, a] = p if same else math.nan
+        if not same:
+            for a in range(found):
+                name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
+                for d in range(3):
+                    held.press[i, 3 * a + d] = 0.0
+                    put_direction(frame, a, d, direction(turned, a, d))
+
+    @outlined
+    def turn(self: Any, i, r1):
+        touching, held, frame = self.touching, self.held, self.held.frame[i]
+        for a in range(self.pace.held[i]):
+            k, wall = held.name[i, a, 0], held.name[i, a, 1]
+            y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
+            n = self.chain.step_normal(float(wall), y0, y1)
+            if touching.friction[wall] > 0.0:
+                t = direction(frame, a, 1)
+                t = t - dot(t, n) * n
+                put_frame(frame, a, n, t / norm(t))
+            else:
+                put_direction(frame, a, 0, n)
+
+    @outlined
+    def correct(self: Any, i, number):
+        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
+        found, m, wide = pace.held[i], lanes.f.shape[0], touching.width(held.name[i], pace.held[i])
+        rows = wide * found
+        along, across = scratch((rows, m), np.float64), scratch((rows, m), np.float64)
+        schur = scratch((rows, rows), np.float64)
+        gap, change = scratch(rows, np.float64), scratch(rows, np.float64)
+        error = pace.residue[i]
+        for a in range(found):
+            k, wall = held.name[i, a, 0], held.name[i, a, 1]
+            y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
+            for d in range(wide):
+                gap[wide * a + d] = dot(direction(held.frame[i], a, d), y1 - y0)
+            # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
+            away = self.chain.distance(float(wall), y0)
+            gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
+            off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
+            error = max(error, off / rule.room)
+        before = pace.unsettled[i] if number > 0 else 1.0
+        pace.unsettled[i] = error
+        late = number >= _PATIENT
+        # One correction more than errors of round-off ask for, since directions lag behind forces: to stop where the
+        # next would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
+        last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
+        self.eliminate(wide, (along, across, schur, gap), i)
+        creep = _sweep(touching, (held.name[i], held.press[i], found), wide, schur, gap, change)
+        for row in range(m):
+            for a in range(rows):
+                lanes.f[row, i] -= across[a, row] * change[a]
+        pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
+
+    def gap_gradient(self: Any, wall, y):
+        return self.chain.unit_normal(wall, y)
+
+    @outlined
+    def judge(self: Any, i):
+        return impact_time.look(self, i, 2.0 * ROOM * self.rule.room)
+
+    @outlined
+    def end(self: Any, state, i):
+        # Contacts last as long as one of them pushes.
+        pace, held = self.pace, self.held
+        number, pushes = pace.body[i], False
+        for a in range(pace.held[i]):
+            pushes = pushes or held.press[i, 3 * a] > 0.0
+            state.impulse[self.chain.row(float(held.name[i, a, 1])), number] += held.impulse[i, a]
+        state.dissipated[number] += held.lost[i]
+        state.sliding[number] += pace.step[i]
+        if not pushes:
+            pace.lasts[i] = False
+            pace.held[i] = 0
+
+    @outlined
+    def strike(self: Any, state, i):
+        ties, pace = self.ties, self.pace
+        number, at_once = pace.body[i], pace.action[i] == impact_time.STRIKE_NOW
+        short = at_once or pace.step[i] < impact.SHORT * self.rule.dt
+        state.short[number] = state.short[number] + 1 if short else 0
+        blows = impact.strike(self, state, i)
+        # The energy of a strain takes as many products as the square of its edges.
+        if blows > 0 and max(ties.led) < 0 and ties.compliance.shape[0] == 0:
+            impact.restore(self, state, i)
+        stays = impact.chatters(self.touching, state, number) or pace.stuck[i] > _LASTS
+        pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
+
+
+def _sweep(touching, contacts, wide, schur, gap, change):
+    """Gauss-Seidel: no contact ends outside, none pulls, and one with friction stays or slides within its cone.
+
+    How far friction moves a contact by its change is returned: which way a point creeps is less exact, since what it
+    loses is booked whatever it is.
+    """
+    name, press, found = contacts
+    creep = 0.0
+    for _turn in range(_SWEEPS):
+        largest, size = 0.0, 0.0
+        for a in range(found):
+            j, mu = wide * a, touching.friction[name[a, 1]]
+            new = max(0.0, press[3 * a] + missing(schur, j, gap[j], change) / schur[j, j])
+            largest, size = max(largest, abs(new - press[3 * a])), max(size, new)
+            change[j] += new - press[3 * a]
+            press[3 * a] = new
+            if mu > 0.0:
+                errors = missing(schur, j + 1, gap[j + 1], change), missing(schur, j + 2, gap[j + 2], change)
+                one, other = rubbing(schur, j, errors, (press[3 * a + 1], press[3 * a + 2]), mu * new)
+                largest = max(largest, abs(one - press[3 * a + 1]), abs(other - press[3 * a + 2]))
+                change[j + 1] += one - press[3 * a + 1]
+                change[j + 2] += other - press[3 * a + 2]
+                press[3 * a + 1], press[3 * a + 2] = one, other
+        if largest <= 1e-16 * size:
+            break
+    for a in range(found):
+        for d in range(1, wide):
+            creep = max(creep, abs(change[wide * a + d]) * schur[wide * a, wide * a])
+    return creep
