@@ -76,6 +76,7 @@ CACHE = {
     "core.codegen.JITCPUCodegen.set_env": "self env_name env",
     "core.compiler.CompileResult._find_referenced_environments": "self",
     "core.errors.NumbaError": None,
+    "core.errors.TypingError": None,
     "core.errors.UnsupportedBytecodeError": None,
     "core.event": None,
     "core.serialize.NumbaPickler": None,

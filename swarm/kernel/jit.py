@@ -78,7 +78,7 @@ def _kernel(function: F, compiler: Any) -> F:
     traced = FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )
-    prepare(traced, _INLINE, outlined=False)
+    prepare(traced, _INLINE, outlined=False, is_kernel=True)
     compiled: F = cache.kept(function, {**_KERNEL, "pipeline_class": compiler}, cache.calling(traced))
     return compiled
 

@@ -410,15 +410,14 @@ def halved(x): return {halved}
 KERNEL = """
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import dot
-from swarm.surfaces import contract
 
 @kernel
 def total(surface, r, v):
     sum = 0.0
     for i in range(5):
-        t, found = contract.first_hit(surface, r, v)
+        t, found = surface.first_hit(r, v)
         r = r + t * v
-        n = contract.unit_normal(surface, r)
+        n = surface.unit_normal(r)
         v = v - (2.0 * dot(v, n)) * n
         sum += t
     return sum

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import types
+from numba.core.errors import NumbaError, TypingError
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import Signature, infer, infer_global, make_overload_template
 from numba.extending import lower_builtin
@@ -43,6 +44,7 @@ class Helper:
         self._keywords = [one.name for one in kinds if one.kind is inspect.Parameter.KEYWORD_ONLY]
         self._parts: dict[Any, Part | None] = {}
         self._whole: dict[Any, Part | None] = {}
+        self.errors: dict[Any, Exception] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
         """What a call of it gives, in a trace."""
@@ -74,6 +76,7 @@ class Helper:
                     part.kind = values.kind_of(part.result)
                     self._whole[kinds] = part
                 except Exception as error:  # What Python says where a proxy is not what a function expects.
+                    self.errors[kinds] = error
                     self._leave(error)
         return self._whole[kinds]
 
@@ -141,8 +144,8 @@ def leaving(options: Any) -> Callable[[Any, Exception], None]:
 _LEFT: set[Any] = set()
 
 
-def prepare(function: Any, options: Any, outlined: bool, body: Any = None) -> None:
-    """Let traces and Numba call a helper, or `body` in its place."""
+def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_kernel: bool = False) -> None:
+    """Let traces and Numba call a helper, or `body` in its place. Of a kernel Numba compiles no function by itself."""
     if is_disabled():
         return
     helper = Helper(function, body or function, outlined)
@@ -156,7 +159,16 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None) -> No
                 part = helper.whole(self.context, kinds)
                 if part is not None:
                     return Signature(part.kind, kinds, recvr=None)
+                if is_kernel:
+                    return self._whole_kernel(args, kws, helper.errors.get(kinds))
             return super().generic(args, kws)
+
+        def _whole_kernel(self, args: Any, kws: Any, error: Any) -> Any:
+            try:
+                return super().generic(args, kws)
+            except NumbaError as also:
+                # What it calls is no function of Numba's: why it cannot be traced says more.
+                raise TypingError(str(error and error.__cause__ or error or also)) from also
 
         def get_impl_key(self, sig: Any) -> Any:
             return super().get_impl_key(sig) if helper.known(sig.args) is None else helper
