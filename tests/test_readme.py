@@ -13,6 +13,7 @@ import pytest
 from test_cli import command
 
 from swarm import scene_file
+from swarm.run import tiers
 from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
@@ -134,7 +135,9 @@ def settings():
 
 
 @pytest.mark.physics
-def test_the_commands_run_in_their_order(tmp_path):
+def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
+    # As users have it: scenes of 2000 particles and more, all of which are compiled in the end.
+    monkeypatch.setattr(tiers, "_PATIENCE", 1.0)
     for name in ("scenes", "sweeps"):
         shutil.copytree(ROOT / "examples" / name, tmp_path / "examples" / name)
     (tmp_path / "scene.toml").write_text(SCENE)
