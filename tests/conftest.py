@@ -230,6 +230,13 @@ def gap(surface, point):
     return float(call(contract.gap_of, surface, call(contract.inner, surface, point)))
 
 
+def gaps_along(still, poses, places):
+    """Gaps to walls that move together, each place (3, N) at the time of its pose: those at rest, in their frame."""
+    middle, shifts = poses[0].center[:, None], np.transpose([one.shift for one in poses])
+    turns = np.array([one.turn for one in poses])
+    return still.gaps(middle + np.einsum("kji,jk->ik", turns, places - shifts - middle))
+
+
 def scene_of(*names, **keywords):
     """A scene of surfaces from the table."""
     return swarm.Scene([surface_of(name) for name in names], **keywords)

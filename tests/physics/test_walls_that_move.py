@@ -6,6 +6,7 @@ import re
 import mpmath
 import numpy as np
 import pytest
+from conftest import gaps_along
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -127,17 +128,14 @@ def first_hit_by_scan(scene, rest, r, v, pull, start, times, poses):
     """The first time at which a gap rises through 0, from many samples; infinite if there is none.
 
     Args:
-        rest: the scene whose walls do not move: gaps at all times are those of one array of points in its frame.
+        rest: the scene whose walls do not move.
         poses: those of the wall at these times after `start`.
     """
 
     def place(t):
         return r[:, None] + v[:, None] * t + 0.5 * t * t * np.array(pull)[:, None]
 
-    middle, shifts = poses[0].center[:, None], np.transpose([one.shift for one in poses])
-    turns = np.array([one.turn for one in poses])
-    given = middle + np.einsum("kji,jk->ik", turns, place(times) - shifts - middle)
-    inside = rest.gaps(given).max(axis=0) <= 0.0
+    inside = gaps_along(rest, poses, place(times)).max(axis=0) <= 0.0
     rises = np.flatnonzero(inside[:-1] & ~inside[1:])
     if not rises.size:
         return math.inf
