@@ -2,8 +2,10 @@
 
 import contextlib
 import functools
+import os
 import resource
 import signal
+import sys
 import types
 
 import numba
@@ -22,6 +24,10 @@ from swarm.run import ledger, tiers
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.walls import Walls
 
+# Tests start Python a hundred times. Each start reads the bytecode that an earlier one kept, which saves 0.2 s of it.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 settings.register_profile(
     "swarm",
     derandomize=True,
@@ -39,6 +45,12 @@ tiers._PATIENCE = 10.0
 LEDGER = {name: getattr(ledger, name) for name in ("spent", "is_remembered")}
 ledger.spent, ledger.is_remembered = lambda kinds: 0.0, lambda kinds: False
 EPSILON = float(np.finfo(np.float64).eps)
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Files of the long ring take seconds to import: not where `-m` is as in pyproject.toml and no file is named."""
+    is_long = collection_path.name == "long" and config.option.markexpr == "not long"
+    return True if is_long and not any("long" in argument for argument in config.args) else None
 
 
 def rarely(*values):
@@ -219,6 +231,13 @@ def wall_point(surface, point):
 def gap(surface, point):
     """The signed gap at a point."""
     return float(call(surface.gap_of, call(surface.inner, point)))
+
+
+def gaps_along(still, poses, places):
+    """Gaps to walls that move together, each place (3, N) at the time of its pose: those at rest, in their frame."""
+    middle, shifts = poses[0].center[:, None], np.transpose([one.shift for one in poses])
+    turns = np.array([one.turn for one in poses])
+    return still.gaps(middle + np.einsum("kji,jk->ik", turns, places - shifts - middle))
 
 
 def scene_of(*names, **keywords):

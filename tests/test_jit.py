@@ -442,6 +442,7 @@ def digests(tmp_path_factory):
 def copied(tmp_path, monkeypatch, digests):
     """A copy of the package, and the cache folder that its `cache` names."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(digests))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # it knows an edit by the second
     shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
 
     parent = types.ModuleType("copied")

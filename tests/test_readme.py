@@ -13,6 +13,7 @@ import pytest
 from test_cli import command
 
 from swarm import scene_file
+from swarm.run import tiers
 from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
@@ -142,7 +143,9 @@ def settings():
 
 
 @pytest.mark.physics
-def test_the_commands_run_in_their_order(tmp_path):
+def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
+    # As users have it: scenes of 2000 particles and more, all of which are compiled in the end.
+    monkeypatch.setattr(tiers, "_PATIENCE", 1.0)
     copy_examples(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')

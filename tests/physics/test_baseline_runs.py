@@ -47,7 +47,7 @@ RULES = {swarm.Verlet: verlet, swarm.Midpoint: midpoint, swarm.Trapezoidal: trap
 def test_every_step_is_the_rule(cls, gravity):
     scene = swarm.Scene([swarm.Sphere(RADIUS)], gravity)
     dt, alpha, mass, steps = 0.01, 5e3, 2.0, 600
-    particles = swarm.fill(scene, 250, speed=0.5, mass=mass, seed=4)
+    particles = swarm.fill(scene, 100, speed=0.5, mass=mass, seed=4)
     result = swarm.simulate(scene, particles, cls(dt, alpha), until=steps * dt, every=100 * dt, compile="never")
     pull = np.zeros((3, 1)) if gravity is None else np.array(gravity)[:, None]
     ends = []

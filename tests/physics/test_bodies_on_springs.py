@@ -32,8 +32,9 @@ def some(kind, surfaces, n=20, gravity=None):
 @pytest.mark.parametrize("method", SPRINGS)
 @pytest.mark.parametrize("kind", BODIES)
 def test_springs_keep_energy_and_links(kind, method, surfaces, gravity):
+    # 24 cases of few kinds: seconds each in plain Python.
     scene, start = some(kind, surfaces, gravity=gravity)
-    seen = swarm.simulate(scene, start, SPRINGS[method], until=10.0, every=0.5).observables
+    seen = swarm.simulate(scene, start, SPRINGS[method], until=10.0, every=0.5, compile="always").observables
     assert seen["impacts"][-1] > 20 * 5
     # V feels the last bit of a place: alpha g of it, in each of so many steps.
     assert seen["energy_error"].max() < (1e-9 if method == "stiff" else 2e-11)

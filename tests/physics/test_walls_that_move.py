@@ -1,12 +1,12 @@
 """Walls that move: the same physics in every frame, hits that none skips, work that is booked, contacts that last."""
 
-import itertools
 import math
 import re
 
 import mpmath
 import numpy as np
 import pytest
+from conftest import gaps_along
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -123,27 +123,34 @@ def test_a_motion_that_moves_nothing_is_rest(name, gravity, motion):
 # --- Hits: none is skipped, to round-off of the time -----------------------------------------------------
 
 
-def first_hit_by_scan(scene, r, v, pull, start, end, samples=4000):
-    """The first time at which a gap rises through 0, from many samples; infinite if there is none."""
+def first_hit_by_scan(scene, rest, r, v, pull, start, times, poses):
+    """The first time at which a gap rises through 0, from many samples; infinite if there is none.
 
-    def gap(t):
-        place = (r + v * t + 0.5 * t * t * np.array(pull))[:, None]
-        return scene.gaps(place, start + t).max()
+    Args:
+        rest: the scene whose walls do not move.
+        poses: those of the wall at these times after `start`.
+    """
 
-    for low, high in itertools.pairwise((t, gap(t)) for t in np.linspace(0.0, end, samples)):
-        if low[1] <= 0.0 < high[1]:
-            return brentq(gap, low[0], high[0], xtol=1e-15, rtol=9e-16)
-    return math.inf
+    def place(t):
+        return r[:, None] + v[:, None] * t + 0.5 * t * t * np.array(pull)[:, None]
+
+    inside = gaps_along(rest, poses, place(times)).max(axis=0) <= 0.0
+    rises = np.flatnonzero(inside[:-1] & ~inside[1:])
+    if not rises.size:
+        return math.inf
+    low, high = times[rises[0]], times[rises[0] + 1]
+    return brentq(lambda t: scene.gaps(place(t), start + t).max(), low, high, xtol=1e-15, rtol=9e-16)
 
 
 @pytest.mark.parametrize("pull", [(0.0, 0.0, 0.0), (0.3, 0.0, -2.0)], ids=["straight", "falling"])
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", [*CAVITIES, *SOLIDS])
 def test_the_first_hit_is_found(name, motion, pull):
-    made = (CAVITIES | SOLIDS)[name](MOTIONS[motion])
-    scene, rng, found = swarm.Scene([made]), np.random.default_rng(5), 0
-    start, span = 0.6, 2.5
-    chain = scene.chain(start + span)
+    made, still = ((CAVITIES | SOLIDS)[name](one) for one in (MOTIONS[motion], None))
+    scene, rest = swarm.Scene([made]), swarm.Scene([still])
+    rng, found, start, span = np.random.default_rng(5), 0, 0.6, 2.5
+    chain, times = scene.chain(start + span), np.linspace(0.0, span, 500)
+    poses = [pose(MOTIONS[motion], start + t) for t in times.tolist()]
     for _ in range(60):
         r, v = rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
         if name in SOLIDS:
@@ -153,7 +160,7 @@ def test_the_first_hit_is_found(name, motion, pull):
         gravity = swarm.Scene([made], pull).pull()
         with np.errstate(all="ignore"):
             hit = safe.first_hit(chain, gravity, vec(r), vec(v), span)
-        wanted = first_hit_by_scan(scene, r, v, pull, start, span, 500)
+        wanted = first_hit_by_scan(scene, rest, r, v, pull, start, times, poses)
         if not hit.time < span:
             # Not within the span, or still under way: never past the hit.
             assert hit.time <= wanted or wanted == math.inf

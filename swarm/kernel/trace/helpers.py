@@ -168,7 +168,7 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_ke
                 return super().generic(args, kws)
             except NumbaError as also:
                 # What it calls is no function of Numba's: why it cannot be traced says more.
-                raise TypingError(str(error and error.__cause__ or error or also)) from also
+                raise TypingError(str((error and error.__cause__) or error or also)) from also
 
         def get_impl_key(self, sig: Any) -> Any:
             return super().get_impl_key(sig) if helper.known(sig.args) is None else helper
