@@ -21,7 +21,7 @@ from conftest import (
     vectors,
     wall_point,
 )
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import swarm
@@ -178,12 +178,19 @@ def pushed_step(name, point, free, strength, scale):
     return surface, point, 0.5 * scale * free, 0.2 * strength * scale / slope
 
 
+def converges(name, end):
+    """A push that is found by iteration is NaN where it is not found, which methods say is unsolved."""
+    if name in ITERATED:
+        assume(np.isfinite(end).all())
+
+
 @every_wall
 @given(**pushes)
 def test_push_solves_its_equation(name, point, free, strength, scale):
     """r1 = r0 + p - kappa D(r0, r1)."""
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
     end = np.array(call(surface.push, point, free, kappa))
+    converges(name, end)
     discrete = np.array(call(surface.inner_gradient, point, end))
     assert end == pytest.approx(point + free - kappa * discrete, abs=16 * EPSILON * scale)
 
@@ -195,6 +202,7 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
     rise, slope = call(surface.rise, point, free, kappa)
     end = np.array(call(surface.push, point, free, kappa))
+    converges(name, end)
     steep = np.linalg.norm(call(surface.inner_gradient, end, end))
     q0, q1 = call(surface.inner, point), call(surface.inner, end)
     assert rise == pytest.approx(q1 - q0, abs=32 * EPSILON * (abs(q0) + abs(q1) + steep * scale))
