@@ -2,8 +2,8 @@
 
 1. A record derived from `Smooth` is what kernels take in place of the surface: numbers, and methods of them. Its field
    `side` is +1 for a cavity. swarm/surfaces/contract.py describes all methods that there are. Five serve every method
-   of simulation: `phi`, `gradient`, `hessian`, `bend` and `farthest_push`. The first hit is then found by safe steps.
-   What is missing is an error in one sentence.
+   of simulation: `phi`, `gradient`, `hessian`, `hessian_bounds` and `farthest_push`. The first hit is then found by
+   safe steps. What is missing is an error in one sentence.
 2. A dataclass derived from `Surface` is what scenes take: it makes the numbers and says how large the surface is.
 
 The same methods run in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. Where
@@ -43,7 +43,7 @@ class SuperellipsoidNumbers(Smooth):
         h = 0.5 * self.n * (self.n - 1.0) * self.powers(r, 2.0)
         return Symmetric(h.x, h.y, h.z, 0.0, 0.0, 0.0)
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         """The second derivatives are largest at the farthest corner of a box around r of the semi-axes."""
         h = self.hessian(absolute(r) + self.a)
         return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(self.a.x, self.a.y, self.a.z)

@@ -154,7 +154,7 @@ def _at_the_wall(scene: Scene, start: Start) -> Start:
     hit = flights.first_hit(chain, None, start.r, start.v)
     if not np.isfinite(hit.time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
-    return Start(chain.settle(hit.wall, start.r + hit.time * start.v), start.v)
+    return Start(chain.project(hit.wall, start.r + hit.time * start.v), start.v)
 
 
 def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
@@ -192,7 +192,7 @@ def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactH
     kappa = reflection.chord(chain, wall, r0, rows.step.p)
     r1 = chain.push(wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
-    reactions[int(wall), :3] = kappa * np.array(chain.inner_gradient(wall, r0, r1))
+    reactions[int(wall), :3] = kappa * np.array(chain.discrete_gradient(wall, r0, r1))
     # The limit of Uzawa's loop with exponent 1.
     multiplier[int(wall)] = chain.of(wall, 0.0, uzawa.multiplier_of, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
     rows.add(multiplier, np.zeros(count), reactions, 0.0)

@@ -225,7 +225,7 @@ def wall_point(surface, point):
         point = point - step
         if (abs(step) <= EPSILON * abs(point).max()).all():
             break
-    return np.array(call(surface.settle, point))
+    return np.array(call(surface.project, point))
 
 
 def gap(surface, point):

@@ -78,7 +78,7 @@ def test_the_same_cell_has_the_same_key():
         ("other: float = 3.0", "another: float = 3.0"),
         ("other: float = 3.0", "other: float = 4.0"),
         ("    radius: float", "    size: float"),
-        ("def inner(self, r)", "def settle(self, r)"),
+        ("def inner(self, r)", "def project(self, r)"),
         (
             "    def inner(self, r):\n        return 1.0\n\nclass Mine(Parent):",
             "class Mine(Parent):\n    def inner(self, r):\n        return 1.0\n",

@@ -57,10 +57,10 @@ def every_function_of_a_surface(surface, r, v, pull, kappa):
         surface.chord_normal(r, 0.1 * v, kappa),
         (q0, q1, surface.gap_of(q0), surface.level_of(q1)),
         surface.gap_slope(q0, q1),
-        surface.inner_gradient(r, v),
+        surface.discrete_gradient(r, v),
         surface.push(r, v, kappa),
         surface.rise(r, v, kappa),
-        surface.settle(r),
+        surface.project(r),
     )
 
 

@@ -80,7 +80,7 @@ def add_impulses(reactions, h, impulse, lane):
 
 @outlined
 def add_works(moving, chain, factor, reactions, impulse, lane):
-    """Add the work per mass of each wall in a step, `factor` times reaction.way, to its row of `impulse`: their sum.
+    """Add the work per mass of each wall, `factor` reaction.displacement, to its row of `impulse`; the sum.
 
     The rows of work are behind those of impulses; where no wall moves there are none.
     """
@@ -88,7 +88,7 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
     if moving is None:
         return found
     for k, wall in reversed(tuple(enumerate(chain.walls))):
-        work = factor * dot(_reaction_of(reactions, k), wall.way())
+        work = factor * dot(_reaction_of(reactions, k), wall.displacement())
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
     return found

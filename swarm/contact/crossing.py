@@ -97,7 +97,7 @@ def _may_meet(surface, end, path, near):
 def _level(surface, r, v):
     """The level of a wall, its rate of change, and the length of its gradient."""
     n = surface.unit_normal(r)
-    scale = abs(dot(n, surface.slope(r)))
+    scale = abs(dot(n, surface.inner_gradient(r)))
     speed = dot(n, v - surface.velocity(r))
     return surface.level_of(surface.inner(r)), scale * speed, scale
 

@@ -44,13 +44,13 @@ def composite(law, surface, r0, r1):
     q0, q1 = surface.inner(r0), surface.inner(r1)
     slope, _curvature = law.constraint_slope(surface.gap_of(q0), surface.gap_of(q1))
     rise, _curvature = surface.gap_slope(q0, q1)
-    return slope * rise * surface.inner_gradient(r0, r1)
+    return slope * rise * surface.discrete_gradient(r0, r1)
 
 
 @outlined
 def constraint_gradient(law, surface, r):
     """grad Phi(r) = Phi'(g) g'(q) grad q."""
-    return _constraint_slope(law, surface, surface.inner(r)) * surface.inner_gradient(r, r)
+    return _constraint_slope(law, surface, surface.inner(r)) * surface.discrete_gradient(r, r)
 
 
 def _constraint_slope(law, surface, q):
@@ -103,7 +103,7 @@ class Composite(NamedTuple):
         equation = impulse.equation(law, multiplier, surface, step)
         kappa, solved = equation.careful()
         r1 = surface.push(step.r, step.p, kappa)
-        return Reaction(kappa * surface.inner_gradient(step.r, r1), law.constraint(equation.end(kappa).gap), solved)
+        return Reaction(kappa * surface.discrete_gradient(step.r, r1), law.constraint(equation.end(kappa).gap), solved)
 
 
 class MeanValue(NamedTuple):
@@ -163,7 +163,7 @@ class _MeanValueStep(Record):
     def gradient_at(self, beta, kappa):
         """r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
         r = self.surface.resolve(self.step.r + beta * self.step.p, beta * kappa)
-        return r, self.surface.inner_gradient(r, r)
+        return r, self.surface.discrete_gradient(r, r)
 
     def force(self, first, last):
         """alpha Phi_mean + lambda, from half of Phi at each end."""

@@ -4,7 +4,7 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, dot, norm
 
 # The force needs these of every wall.
-NEEDS = ("inner", "gap_of", "gap_slope", "inner_gradient")
+NEEDS = ("inner", "gap_of", "gap_slope", "discrete_gradient")
 
 
 def strength(law, surface, q):
@@ -27,7 +27,7 @@ def force(chain, law, r):
 def _added(others, surface, law, r):
     """A force with that of one more wall."""
     f = strength(law, surface, surface.inner(r))
-    d = surface.inner_gradient(r, r)
+    d = surface.discrete_gradient(r, r)
     # A select and no product: off the wall grad q may be infinite.
     return select(f != 0.0, others - f * d, others)
 
@@ -38,28 +38,28 @@ def add_impulses(chain, law, factor, r, impulse, lane):
     for k, wall in enumerate(chain.walls):
         f = strength(law, wall, wall.inner(r))
         if f != 0.0:
-            impulse[k, lane] += factor * abs(f) * norm(wall.inner_gradient(r, r))
+            impulse[k, lane] += factor * abs(f) * norm(wall.discrete_gradient(r, r))
 
 
 def work(moving, chain, now, law, r):
-    """The sum of force.way of all walls: `chain` has them over the step, `now` when the particle is at r."""
+    """The sum of force.displacement of all walls: `chain` has them over the step, `now` when the particle is at r."""
     found = 0.0
     if moving is None:
         return found
     for over, wall in reversed(tuple(zip(chain.walls, now.walls, strict=True))):
-        found = dot(_added(ZERO, wall, law, r), over.way()) + found
+        found = dot(_added(ZERO, wall, law, r), over.displacement()) + found
     return found
 
 
 @outlined
 def add_works(moving, chain, now, law, factor, r, impulse, lane):
-    """Add `factor` times force.way of each wall to its row of work in `impulse`: their sum, as `work`."""
+    """Add `factor` times force.displacement of each wall to its row of work in `impulse`: their sum, as `work`."""
     found = 0.0
     if moving is None:
         return found
     count = chain.length()
     for k, (over, wall) in reversed(tuple(enumerate(zip(chain.walls, now.walls, strict=True)))):
-        here = factor * dot(_added(ZERO, wall, law, r), over.way())
+        here = factor * dot(_added(ZERO, wall, law, r), over.displacement())
         impulse[count + k, lane] += here
         found = here + found
     return found

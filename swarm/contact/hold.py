@@ -38,10 +38,10 @@ class Holding(Record):
             found = found | (wall == one)
         return found
 
-    def settle(self: Any, chain, r):
+    def project(self: Any, chain, r):
         """A point within round-off of the walls, moved onto them."""
         for one in reversed(self):
-            r = chain.settle(one, r)
+            r = chain.project(one, r)
         return r
 
     def split(self: Any, chain, drift, r0, r1, w):
@@ -76,7 +76,7 @@ class One(Holding):
 
     def along(self, chain, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
-        g = chain.inner_gradient(self.first, r0, r1)
+        g = chain.discrete_gradient(self.first, r0, r1)
         return w - (_towards(drift, w, g) / square(g)) * g
 
     def inward(self, n, m):

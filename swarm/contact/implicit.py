@@ -39,7 +39,7 @@ def _guess(surface, law, r, c):
     slope, _curvature = surface.gap_slope(q, q)
     # g(s) = g - kappa g'(q) |grad q|^2 and V' = k g(s): kappa (1 + c k g'^2 |grad q|^2) = c k g' g
     stiff = c * law.stiffness(g) * slope
-    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(surface.inner_gradient(r, r)))
+    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(surface.discrete_gradient(r, r)))
 
 
 def _improve(surface, law, r, c, kappa):

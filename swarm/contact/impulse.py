@@ -31,7 +31,7 @@ _EPSILON = 2.220446049250313e-16
 _ON_SURFACE = 8.0 * _EPSILON
 # The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
-    "inner", "gap_of", "gap_slope", "gradient", "inner_gradient", "push",
+    "inner", "gap_of", "gap_slope", "gradient", "discrete_gradient", "push",
     "rise", "farthest_push",
 )  # fmt: skip
 

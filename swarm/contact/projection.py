@@ -154,7 +154,7 @@ def put_normals(chain, touch, which, r0, r1):
 def _normal(chain, wall, r0, r1):
     """The unit vector along the discrete gradient of a wall, out of the admissible side."""
     n = chain.unit_normal(wall, r0)
-    d = chain.inner_gradient(wall, r0, r1)
+    d = chain.discrete_gradient(wall, r0, r1)
     length = norm(d)
     if dot(d, n) < 0.0:
         length = -length

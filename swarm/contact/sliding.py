@@ -43,8 +43,8 @@ _FAST = 1e-12
 _BEFORE_STOP = 0.999
 # Sliding needs these of every wall.
 NEEDS = (
-    "unit_normal", "step_normal", "outward_acceleration", "settle", "distance",
-    "first_hit", "inner", "inner_gradient", "level_of",
+    "unit_normal", "step_normal", "outward_acceleration", "project", "distance",
+    "first_hit", "inner", "discrete_gradient", "level_of",
 )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ _SWEEPS = 60
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
 # These need of every wall; exact reflections need no more.
-NEEDS = ("first_hit", "unit_normal", "inner_gradient", "distance", "settle")
+NEEDS = ("first_hit", "unit_normal", "discrete_gradient", "distance", "project")
 
 
 class Contacts(Record):
@@ -187,7 +187,7 @@ def _settled(chain, wall, touch, r):
     for i in range(touch.touched.size):
         holds = touch.number[i] == wall and touch.held[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
-            r = chain.settle(touch.number[i], r)
+            r = chain.project(touch.number[i], r)
     return r
 
 
@@ -208,7 +208,7 @@ def inside(chain, r):
         i = np.argmax(outside)
         if outside[i] <= _EPSILON * total(absolute(r)):
             break
-        r = chain.settle(number[i], r)
+        r = chain.project(number[i], r)
     return r
 
 

@@ -152,7 +152,7 @@ def carry(method, chain, gravity, state, i, p):
     held = _find(laws, now, gravity, r, near, least)
     start, h, phase, used, tries = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0, 0
     while left > 0.0 and tries <= _MOST_TRIES:
-        h = min(h, left, now.shortest_pace())
+        h = min(h, left, now.shortest_time_scale())
         middle, _there = _settled(chain.at(left - 0.5 * h), held, r + (0.5 * h) * start.u)
         r1, there = _settled(chain.at(left - h), held, r + h * start.u)
         half = _corner(laws, chain.at(left - 0.5 * h), gravity, held, middle, 0.0)

@@ -78,7 +78,7 @@ def decide(slide, i):
         # At once, or so soon that the time left does not change.
         if lane.left - met.time * h == lane.left:
             slide.state.contacts.met[lanes.particle[i]] = met.wall
-            lane.r = chain.at(lane.left).settle(met.wall, r)
+            lane.r = chain.at(lane.left).project(met.wall, r)
             return EVENT
         cut = min(cut, met.time)
     if event & (LEAVES | PASSES):

@@ -135,7 +135,7 @@ def _end_step(slide, i):
     start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
-    r1 = held.settle(now, lane.r1)
+    r1 = held.project(now, lane.r1)
     v1 = held.split_at(now, hold.drift(moving, held, now, r1), r1, lane.v1).along
     rest = 2.0 * potential(gravity, r1) + keep * keep
     twice = twice_after(slide, lane.twice - lane.work, square(v1) + rest)

@@ -39,7 +39,7 @@ def stay(slide, i):
     moves_on = square(lane.v - u) > slowest or _rubs(slide, now, lane, slowest)
     if moves_on or not _rests(slide, now, lane, lane.r):
         return slide.phase()
-    pace, low, high, met, paces = now.shortest_pace(), 0.0, 0.0, -1.0, 0.0
+    pace, low, high, met, paces = now.shortest_time_scale(), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
     while low < left and met < 0.0 and paces < _MOST_PACES:
         step = min(pace, left - low)
@@ -82,7 +82,7 @@ def stay(slide, i):
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:
         contacts.met[lanes.particle[i]] = met
-        lane.r = then.settle(met, r1)
+        lane.r = then.project(met, r1)
         return EVENT
     force = slide.force(lane, then, r1, v1)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m

@@ -114,8 +114,8 @@ def check_bends(scene: Scene) -> None:
     for i, surface in enumerate(scene.surfaces):
         if safe.lacks_bend(surface):
             raise SceneError(
-                f"surfaces[{i}] ({type(surface).__name__}) must give contract.bend to move as {surface.motion} does: "
-                "hits of such walls are found by safe steps; register it, or use a Translation alone"
+                f"surfaces[{i}] ({type(surface).__name__}) must give hessian_bounds() to move as {surface.motion} "
+                "does: hits of such walls are found by safe steps; give it, or use a Translation alone"
             )
 
 

@@ -197,7 +197,7 @@ class Steps(contract.MethodNumbers):
 
     def work_along(self: Any, over, wall, force):
         """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
-        return 0.0 if self.moving is None else dot(force, over.way(wall))
+        return 0.0 if self.moving is None else dot(force, over.displacement(wall))
 
     def flight(self: Any, chain, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""

@@ -105,7 +105,7 @@ class PenaltyNumbers(fixed_step.Numbers):
         touching = wall >= 0.0
         r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
         # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
-        g = over.inner_gradient(wall, step.r, r1)
+        g = over.discrete_gradient(wall, step.r, r1)
         f = select(touching, 2.0 / h * kappa, 0.0)
         v1 = accelerated(gravity, lane.v, h) - f * g
         work = self.work_along(over, wall, -f / h * g)

@@ -124,7 +124,7 @@ class Numbers(fixed_step.Steps):
         over, after = self.over(chain, lane.left), self.after(chain, lane.left)
         h, p = cut.h, displacement(gravity, lane.v, cut.h)
         r1 = over.push(wall, lane.r, p, kappa)
-        g = over.inner_gradient(wall, lane.r, r1)
+        g = over.discrete_gradient(wall, lane.r, r1)
         f = 2.0 / h * kappa
         work = self.work_along(over, wall, -f / h * g)
         v1 = accelerated(gravity, lane.v, h) - f * g
@@ -274,4 +274,4 @@ class CutSteps(Numbers):
         # A hit in the last instant of a frame is met again in the next one.
         met = met & (hit.wall >= 0.0) & (left > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-        return contract.Flight(select(met, chain.settle(hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+        return contract.Flight(select(met, chain.project(hit.wall, r), r), lane.v, left, select(met, wall, -1.0))

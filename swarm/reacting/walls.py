@@ -34,7 +34,7 @@ class Reacting(Record):
         surface = freedom.posed(self.body, walls, flight.time)
         # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next
         # time.
-        r = surface.settle(flight.r)
+        r = surface.project(flight.r)
         n, arm = surface.unit_normal(r), freedom.arm(r)
         # J = (1 + e) n.(v - u)/(n^2/m + 1/M_n)
         speed = dot(n, surface.velocity(r))

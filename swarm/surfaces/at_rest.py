@@ -27,7 +27,7 @@ class AtRest(Record):
         """Where what is at a point of the wall at the start of a step is at its end."""
         return r
 
-    def way(self):
+    def displacement(self):
         """The displacement of the wall in a step."""
         return ZERO
 
@@ -43,7 +43,7 @@ class AtRest(Record):
         """The surface at rest in its frame, and the start and the free displacement of a step there."""
         return self, r, p
 
-    def pace(self):
+    def time_scale(self):
         """A time in which the motion of the wall changes little [s]; infinite where it does not change."""
         return math.inf
 
@@ -73,7 +73,7 @@ class AtRest(Record):
 
     @property
     def needs_bend(self):
-        """Whether that step follows from `bend`."""
+        """Whether that step follows from `hessian_bounds`."""
         return not (self.gives("level_along") or self.gives("moving_step"))
 
     def bounds_along(self, seen, within):

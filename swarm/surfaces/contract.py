@@ -28,15 +28,15 @@ class Smooth(AtRest):
         first_hit (and falling_hit under gravity)  in closed form,
         course   the level along a fall as a quartic; falling_hit and safe_time follow by its first root, course.py,
         near     a polynomial above the level from a place on; the hits follow by steps, approach.py,
-        bend     how strongly q bends at most; the hits follow by steps under a parabola, march.py;
+        hessian_bounds  how strongly q bends at most; the hits follow by steps under a parabola, march.py;
     for methods with steps in contact also `farthest_push`, and one that makes the step:
         push, rise and resolve  in closed form,
         hessian                 by Newton's method, newton.py;
     for motion other than uniform one from which safe steps in the frame of the wall follow, rising.py:
         level_along  the level with a bound of its third derivative; the best,
-        bend.
+        hessian_bounds.
     Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
-    whose inner function is not phi overrides `inner`, `slope`, `gap_of`, `level_of` and `gap_slope` together.
+    whose inner function is not phi overrides `inner`, `inner_gradient`, `gap_of`, `level_of` and `gap_slope` together.
     What is no method is a constant for the compiler.
     """
 
@@ -59,7 +59,7 @@ class Smooth(AtRest):
         """H = grad grad q/2, a `Symmetric`: of steps in contact that have no closed form."""
         raise NotImplementedError
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
 
         The distance may only be infinite where there is no gravity.
@@ -76,7 +76,7 @@ class Smooth(AtRest):
         """The inner function q(r)."""
         return self.phi(r)
 
-    def slope(self, r):
+    def inner_gradient(self, r):
         """grad q"""
         return self.gradient(r)
 
@@ -112,7 +112,7 @@ class Smooth(AtRest):
         n = self.gradient(r)
         return n * (self.side / norm(n))
 
-    def settle(self, r):
+    def project(self, r):
         """A point within round-off of the surface, moved onto it: one Newton step along the gradient."""
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
@@ -146,7 +146,7 @@ class Smooth(AtRest):
             return safe_rise_time(self.course(r, v, pull))
         if self.gives("near"):
             return approach.safe_time(self, r, v, pull)
-        return march.safe_time(self, r, v, pull) if self.gives("bend") else 0.0
+        return march.safe_time(self, r, v, pull) if self.gives("hessian_bounds") else 0.0
 
     def straight_hit(self, end, r0, r1):
         """`first_hit` of a straight way from r0 at one instant to r1 at another, where the surface is `end`."""
@@ -205,17 +205,17 @@ class Smooth(AtRest):
     def outward_acceleration(self, r, v, pull):
         """The acceleration of a free flight along the wall out of it [m/s^2]: above 0 the wall holds the particle."""
         # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|
-        n, h = self.slope(r), self.hessian(r)
+        n, h = self.inner_gradient(r), self.hessian(r)
         bent = h.xx * v.x * v.x + h.yy * v.y * v.y + h.zz * v.z * v.z
         bent += 2.0 * (h.xy * v.x * v.y + h.yz * v.y * v.z + h.zx * v.z * v.x)
         return (2.0 * bent + dot(n, pull)) * (self.side / norm(n))
 
     # --- Contact: a step r1 = r0 + p - kappa D(r0, r1) with the free displacement p = h v0 + h^2 G/2 ---
 
-    def inner_gradient(self, r0, r1):
+    def discrete_gradient(self, r0, r1):
         """Discrete gradient of q: D.(r1 - r0) = q1 - q0. Gonzalez's; grad q(m) of the midpoint m for a quadric."""
         # grad q(m) + (q1 - q0 - grad q(m).d)/|d|^2 d
-        g = self.slope(0.5 * (r0 + r1))
+        g = self.inner_gradient(0.5 * (r0 + r1))
         d = r1 - r0
         d2 = square(d)
         rest = self.difference(r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z
@@ -223,7 +223,7 @@ class Smooth(AtRest):
 
     def step_normal(self, r0, r1):
         """The unit vector along that discrete gradient, out of the admissible side."""
-        n = self.inner_gradient(r0, r1)
+        n = self.discrete_gradient(r0, r1)
         return n * (self.side / norm(n))
 
     def push(self, r0, p, kappa):
@@ -252,5 +252,5 @@ class Smooth(AtRest):
 
     def chord_normal(self, r, p, kappa):
         """Unit normal of that step, parallel to D(r0, r1), out of the admissible side; `unit_normal` for p = 0."""
-        n = self.inner_gradient(r, self.push(r, p, kappa))
+        n = self.discrete_gradient(r, self.push(r, p, kappa))
         return n * (self.side / norm(n))

@@ -157,7 +157,7 @@ class Drive(Record):
     fastest: float  # bound of |d'| [m/s]
     hardest: float  # bound of |d''| [m/s^2]
     jerk: float  # bound of |d'''| [m/s^3]
-    pace: float  # a time in which it changes little [s]
+    time_scale: float  # a time in which it changes little [s]
     late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
     jerks: Vec  # bounds of the components of d''' [m/s^3]
 
@@ -195,7 +195,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
     velocity, track, turn, spin, center = np.zeros(3), None, None, None, ZERO
     swings: tuple[Swing, ...] = ()
     fastest = hardest = jerk = 0.0
-    pace, jerks = math.inf, np.zeros(3)
+    time_scale, jerks = math.inf, np.zeros(3)
     for one in parts:
         if isinstance(one, motions.Translation):
             velocity = velocity + np.array(one.velocity)
@@ -205,7 +205,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
             swing = Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)
             swings = (*swings, swing)
-            amplitude, pace = math.hypot(*one.amplitude), min(pace, _SLOW / led.rate)
+            amplitude, time_scale = math.hypot(*one.amplitude), min(time_scale, _SLOW / led.rate)
             fastest += amplitude * led.rate
             hardest += amplitude * led.rate**2
             jerk += amplitude * led.rate**3
@@ -215,7 +215,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
             # Within a piece the velocity is largest at an end or where the second derivative is 0.
             h = np.diff(one.times)
-            pace = min(pace, _SLOW * float(h.min()))
+            time_scale = min(time_scale, _SLOW * float(h.min()))
             ends = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
             bends = 2.0 * cubics[2], 2.0 * cubics[2] + 6.0 * h * cubics[3]
             jerk += float(6.0 * np.sqrt((cubics[3] ** 2).sum(axis=0)).max())
@@ -224,7 +224,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             fastest += float(max(np.sqrt((end**2).sum(axis=0)).max() for end in ends)) + float(h.max()) * hardest
         else:
             axis = motions.unit_axis(one)
-            pace = min(pace, _SLOW / abs(one.rate)) if one.rate else pace
+            time_scale = min(time_scale, _SLOW / abs(one.rate)) if one.rate else time_scale
             center, spin = _vector(one.center), _vector(one.rate * axis)
             if not surface.is_unturned_by(tuple(axis.tolist()), one.center):
                 rows = motions.pose(one, moment).turn
@@ -232,7 +232,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
                 turn = Turn(x, y, z, _vector(axis), one.rate)
     shift = motions.pose(surface.motion, moment).shift
     fastest += math.hypot(*velocity)
-    bounds = fastest, hardest, jerk, pace, fastest * moment, _vector(jerks)
+    bounds = fastest, hardest, jerk, time_scale, fastest * moment, _vector(jerks)
     return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
 
 

@@ -1,4 +1,4 @@
-"""The first hit of a flight by safe steps, and a time during which it surely hits nothing, from `bend`.
+"""The first hit of a flight by safe steps, and a time during which it surely hits nothing, from `hessian_bounds`.
 
 A safe step ends where a parabola above the level rises through 0, so no root is skipped.
 """
@@ -81,11 +81,11 @@ def _safe_step(surface, r, v, pull, slack):
 
     With a slack the level counts as so much below 0.
     """
-    n = surface.slope(r)
+    n = surface.inner_gradient(r)
     side, level = surface.side, surface.level_of(surface.inner(r))
     level = select(slack > 0.0, min(level, -slack), level)
     half = 0.5 * side * dot(n, v)
-    most, magnitude, reach = surface.bend(r)
+    most, magnitude, reach = surface.hessian_bounds(r)
     speed2 = square(v)
     speed, g = math.sqrt(speed2), norm(pull)
     # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q turns by 2 H s at most

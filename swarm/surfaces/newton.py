@@ -20,10 +20,10 @@ def rise(surface, r0, p, kappa):
     """q1 - q0 of the step, and its derivative by kappa."""
     d = _moved(surface, r0, p, kappa)
     r1 = r0 + d
-    g = surface.inner_gradient(r0, r1)
+    g = surface.discrete_gradient(r0, r1)
     # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
     f = _unpushed(surface, r0 + 0.5 * d, kappa, g)
-    return dot(g, d), -dot(f, surface.slope(r1))
+    return dot(g, d), -dot(f, surface.inner_gradient(r1))
 
 
 @outlined
@@ -32,7 +32,7 @@ def _moved(surface, r0, p, kappa):
     d = _unpushed(surface, r0, kappa, p)
     size, previous = largest(p), math.inf
     for _i in range(_ITERATIONS):
-        g = surface.inner_gradient(r0, r0 + d)
+        g = surface.discrete_gradient(r0, r0 + d)
         f = _unpushed(surface, r0 + 0.5 * d, kappa, d - p + kappa * g)
         d, change = d - f, largest(f)
         if _converged(change, previous, max(size, abs(kappa) * largest(g))):
@@ -46,7 +46,7 @@ def resolve(surface, r, strength):
     """The point s with s + strength grad q(s) = r; NaN where it does not converge."""
     s, size, previous = r, largest(r), math.inf
     for _i in range(_ITERATIONS):
-        g = surface.slope(s)
+        g = surface.inner_gradient(s)
         f = _unpushed(surface, s, 2.0 * strength, s - r + strength * g)
         s, change = s - f, largest(f)
         if _converged(change, previous, max(size, abs(strength) * largest(g))):

@@ -94,8 +94,8 @@ class Posed(Framed):
         own_v, own_pull = self.own_velocity(r, v), self.own_pull(r, v, pull)
         return self.body.outward_acceleration(self.own_place(r), own_v, own_pull)
 
-    def pace(self):
-        return self.drive.pace
+    def time_scale(self):
+        return self.drive.time_scale
 
     # --- Flight, but for what safe.py adds ---
 
@@ -116,7 +116,7 @@ class Posed(Framed):
 
     # --- Over the step ---
 
-    def way(self):
+    def displacement(self):
         return self.end.shift - self.pose.shift
 
     def end_inner(self, r):
@@ -153,7 +153,7 @@ class Posed(Framed):
         return s + absolute(self.pose.shift) + Vec(late, late, late)
 
     def framed(self, r, p):
-        return self.body, self.own_place(r), p - self.way()
+        return self.body, self.own_place(r), p - self.displacement()
 
     def push(self, r0, p, kappa):
         body, own, free = self.framed(r0, p)
@@ -174,8 +174,8 @@ class Posed(Framed):
         body, own, free = self.framed(r, p)
         return body.chord_improve(own, free, kappa)
 
-    def inner_gradient(self, r0, r1):
-        return self._halfway(self.body.inner_gradient(self.own_place(r0), self.own_end(r1)))
+    def discrete_gradient(self, r0, r1):
+        return self._halfway(self.body.discrete_gradient(self.own_place(r0), self.own_end(r1)))
 
     def step_normal(self, r0, r1):
         n = self._halfway(self.body.step_normal(self.own_place(r0), self.own_end(r1)))

@@ -19,7 +19,7 @@ from .shapes.solid import SolidNumbers
 from .surface import Surface
 
 # Their definitions hold for the inner function q = phi only: a surface with another q gives these too.
-_OF_PHI = ("gap_of", "gap_slope", "slope")
+_OF_PHI = ("gap_of", "gap_slope", "inner_gradient")
 # What a solid of several parts asks of each.
 _OF_PARTS = ("phi", "gradient", "distance", "gap_scale", "unit_normal", "first_hit")
 _DESCRIPTION = ("size", "bounds", "extent")
@@ -84,8 +84,10 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
     if name in _OF_PHI and wall.gives("inner"):
         yield f"{_named(name)} for its `inner`"
         return
-    if name in ("first_hit", "falling_hit") and not (wall.gives("near") or wall.gives("bend") or _falls(wall, name)):
-        yield f"{_named(name)} (or bend(), from which it follows by safe steps)"
+    if name in ("first_hit", "falling_hit") and not (
+        wall.gives("near") or wall.gives("hessian_bounds") or _falls(wall, name)
+    ):
+        yield f"{_named(name)} (or hessian_bounds(), from which it follows by safe steps)"
         return
     for used in _names_in(_definition(wall, name)):
         if used == "NotImplementedError":

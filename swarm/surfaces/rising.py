@@ -95,9 +95,9 @@ def level_step(body, seen, level, longest):
 
 def bent_step(body, seen, longest):
     """The `Step` of a wall that bounds its bend."""
-    n, level = body.slope(seen.r), body.level_of(body.inner(seen.r))
+    n, level = body.inner_gradient(seen.r), body.level_of(body.inner(seen.r))
     half = 0.5 * body.side * dot(n, seen.v)
-    most, magnitude, reach = body.bend(seen.r)
+    most, magnitude, reach = body.hessian_bounds(seen.r)
     bent = Bent(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
     return Step(level, half, bent.longest(longest))
 

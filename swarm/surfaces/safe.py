@@ -157,7 +157,7 @@ def _is_unknown(wall: Any) -> bool:
         return _is_unknown(wall.like)
     if isinstance(wall, Rotated):
         return _is_unknown(wall.body)
-    return wall.needs_bend and not wall.gives("bend")
+    return wall.needs_bend and not wall.gives("hessian_bounds")
 
 
 # --- Free time -------------------------------------------------------------------------------------------

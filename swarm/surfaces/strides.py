@@ -62,7 +62,7 @@ def _pace(chain):
     """The shortest pace of all walls that move."""
     shortest = math.inf
     for wall in reversed(chain.walls):
-        mine = wall.drive.pace if isinstance(wall, Moving) else math.inf
+        mine = wall.drive.time_scale if isinstance(wall, Moving) else math.inf
         shortest = select(mine < shortest, mine, shortest)
     return shortest
 

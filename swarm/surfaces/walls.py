@@ -118,12 +118,12 @@ class Walls(Record):
 
     # --- Of all ---
 
-    def shortest_pace(self):
+    def shortest_time_scale(self):
         """The shortest pace of all walls."""
         shortest = math.inf
         for wall in reversed(self.walls):
             one = wall.members if isinstance(wall, Field) else wall
-            shortest = min(one.pace(), shortest)
+            shortest = min(one.time_scale(), shortest)
         return shortest
 
     def chord_sweeps(self):
@@ -163,8 +163,8 @@ class Walls(Record):
 
 # What is asked of one wall by its number, and any value of the type of the answer.
 _ASKED = {
-    **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "way"), ZERO),
-    **dict.fromkeys(("unit_normal", "settle", "push", "inner_gradient", "step_normal", "chord_normal"), ZERO),
+    **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "displacement"), ZERO),
+    **dict.fromkeys(("unit_normal", "project", "push", "discrete_gradient", "step_normal", "chord_normal"), ZERO),
     **dict.fromkeys(("distance", "outward_acceleration", "chord_guess", "chord_improve"), 0.0),
     "flat": False,
 }

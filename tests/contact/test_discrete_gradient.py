@@ -68,7 +68,7 @@ def steepest(law, surface, *points):
 def gap_gradient(surface, point):
     """The gradient of the gap."""
     q = call(surface.inner, point)
-    return call(surface.gap_slope, q, q)[0] * vector(surface.inner_gradient, point, point)
+    return call(surface.gap_slope, q, q)[0] * vector(surface.discrete_gradient, point, point)
 
 
 def size(vector):
@@ -266,7 +266,7 @@ def test_equal_levels_take_the_one_sided_limit(name, point, depth, direction):
         for shift in (0.0, 1e-12, 1e-8, -1e-8, 1e-4, -1e-4):
             end = r1 + shift * outward
             d = vector(forms.composite, law, surface, r0, end)
-            level = vector(surface.inner_gradient, r0, end)
+            level = vector(surface.discrete_gradient, r0, end)
             # Phi'' Delta g relative to Phi' is (a - 1)/2 Delta g/g.
             slack = 1e-11 + 100.0 * abs(shift) * exponent_of(law) / gap(surface, r0)
             assert size(d - slope * level) <= slack * size(slope * level) + 1e-15, law
@@ -284,7 +284,7 @@ def test_on_the_surface_at_both_ends(law):
         r0, r1 = np.array(r0), np.array(r1)
         q0 = call(surface.inner, r0)
         slope = call(surface.gap_slope, q0, q0)[0] * (1.0 if exponent_of(law) == 1.0 else 0.0)
-        expected = slope * vector(surface.inner_gradient, r0, r1)
+        expected = slope * vector(surface.discrete_gradient, r0, r1)
         assert vector(forms.composite, law, surface, r0, r1) == pytest.approx(expected, rel=8 * EPSILON, abs=0.0)
 
 
@@ -299,7 +299,7 @@ def test_one_point_inside_and_one_outside(name, point, direction, inside, outsid
     rise = call(surface.inner, r1) - call(surface.inner, r0)
     for law in LAWS.values():
         d = vector(forms.composite, law, surface, r0, r1)
-        expected = constraint(law, surface, r1) / rise * vector(surface.inner_gradient, r0, r1)
+        expected = constraint(law, surface, r1) / rise * vector(surface.discrete_gradient, r0, r1)
         assert d == pytest.approx(expected, rel=1e-12, abs=1e-12 * size(expected))
         assert vector(forms.composite, law, surface, r1, r0) == pytest.approx(d, rel=1e-12, abs=1e-12 * size(d))
 

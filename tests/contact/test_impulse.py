@@ -54,7 +54,7 @@ class Contact:
             self.start = wall - depth * normal
 
     def inner_slope(self, point):
-        return call(self.surface.inner_gradient, point, point)
+        return call(self.surface.discrete_gradient, point, point)
 
     def gap(self, point):
         return side_of(self.surface) * self.surface.phi(vec(point))
@@ -68,7 +68,7 @@ class Contact:
         """r1 = r0 + p - kappa D(r0, r1), from D alone: it is affine in r1, D0 + B r1."""
         start = exactly(self.start)
         corners = [Vec(*(mp.mpf(i == k) for i in range(3))) for k in range(-1, 3)]
-        zero, *along = (self.surface.inner_gradient(start, corner) for corner in corners)
+        zero, *along = (self.surface.discrete_gradient(start, corner) for corner in corners)
         matrix = mp.matrix(3, 3)
         for i, k in itertools.product(range(3), range(3)):
             matrix[i, k] = (i == k) + kappa * (along[k][i] - zero[i])

@@ -244,7 +244,7 @@ def test_the_reflection_multiplier_is_the_fixed_point():
         kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, step_of(start, free, c))
         assert kappa == pytest.approx(chord_of(surface, start, free), rel=1e-6)
         loop = Loop([Described(surface)], start, free, c=c).run()
-        gradient = call(surface.inner_gradient, start, loop.end)
+        gradient = call(surface.discrete_gradient, start, loop.end)
         q = call(surface.inner, start)
         slope = call(surface.gap_slope, q, q)[0]
         assert multiplier * c * abs(slope) * np.linalg.norm(gradient) == pytest.approx(

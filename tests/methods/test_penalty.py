@@ -112,7 +112,7 @@ def test_a_step_is_the_papers(name, point, velocity, pull):
     gravity = np.zeros(3) if pull is None else np.array(scene.gravity)
     q0, q1 = (call(numbers.inner, r) for r in (start, after.position))
     rise = np.subtract(*(call(contact_energy, method.law(), scene.chain(), 1.0, r) for r in (after.position, start)))
-    discrete = np.array(call(numbers.inner_gradient, start, after.position))
+    discrete = np.array(call(numbers.discrete_gradient, start, after.position))
     force = -rise / (q1 - q0) * discrete
     given_ = mass * (after.velocity - velocity - h * gravity)
     assert given_ == pytest.approx(h * force, abs=1e-8 * np.linalg.norm(given_))

@@ -112,7 +112,7 @@ def test_at_rest_on_the_wall_gravity_decides(name):
     """It presses: a hit now, up to the fall through round-off. It pulls off the wall: no hit."""
     surface, position, _ = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), 0.0, 0.6, 1.0, 1.0)
     normal, at_rest = np.array(call(surface.unit_normal, position)), np.zeros(3)
-    position = np.array(call(surface.settle, position))
+    position = np.array(call(surface.project, position))
     time, found = call(surface.falling_hit, position, at_rest, normal)
     assert found
     assert time <= 1e-7

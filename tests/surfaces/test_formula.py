@@ -316,7 +316,7 @@ def test_a_smooth_root_or_quotient_keeps_particles_in(text, keywords):
             if not found:
                 point = along[:, -1]
                 continue
-            point = call(numbers.settle, along[:, -1])
+            point = call(numbers.project, along[:, -1])
             normal = np.array(call(numbers.unit_normal, np.array(point)))
             point, velocity = np.array(point), velocity - 2.0 * (normal @ velocity) * normal
 

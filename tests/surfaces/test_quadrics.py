@@ -157,7 +157,7 @@ def test_resolve_solves_its_equation(name, point, scale, strength):
     unit = scale if name.startswith(("cylinder", "pipe", "bowl")) else unit
     strength, point = side * strength * unit, scale * point
     solved = np.array(call(wall.resolve, point, strength))
-    slope = np.array(call(wall.inner_gradient, solved, solved))
+    slope = np.array(call(wall.discrete_gradient, solved, solved))
     assert solved + strength * slope == pytest.approx(point, abs=64 * EPSILON * scale)
 
 
@@ -179,7 +179,7 @@ def test_the_apex_of_a_cone_has_no_normal_and_no_nan():
     for answer in (
         call(nappes.unit_normal, apex),
         call(nappes.distance, apex),
-        np.array(call(nappes.settle, apex)) - apex,
+        np.array(call(nappes.project, apex)) - apex,
     ):
         assert np.all(np.array(answer) == 0.0)
     for velocity in (np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])):

@@ -91,7 +91,7 @@ DEFINITIONS = {
     "gradient": lambda self, r: 2.0 * r,
     "first_hit": _first_hit,
     "hessian": lambda self, r: Symmetric(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
-    "bend": lambda self, r: (1.0, 1.0, 1.0),
+    "hessian_bounds": lambda self, r: (1.0, 1.0, 1.0),
     "farthest_push": lambda self: self.side * np.inf,
     "is_quartic": True,
     "inner": lambda self, r: square(r),
@@ -137,7 +137,7 @@ def test_every_shipped_surface_gives_what_every_method_needs(shipped, name, grav
 def test_no_falling_hit_is_refused_under_gravity():
     told = refused(ball_like(*LEVEL, "first_hit")(), swarm.Impact(), PULL)
     assert "falling_hit()" in told
-    assert "bend()" in told
+    assert "hessian_bounds()" in told
     assert "under gravity" in told
 
 
@@ -153,7 +153,7 @@ def test_without_a_safe_time_every_step_is_taken():
     assert call(wall.safe_time, np.zeros(3), np.ones(3), np.array(PULL)) == 0.0
 
 
-@pytest.mark.parametrize("given", ["bend", "course"], ids=["bend", "course"])
+@pytest.mark.parametrize("given", ["hessian_bounds", "course"], ids=["hessian_bounds", "course"])
 def test_flights_follow_from_what_is_given(given):
     """The fall of a unit sphere from its bend or its course is that of the shipped one."""
     mine, shipped = ball_like(*LEVEL, given)().numbers(), swarm.Sphere(1.0).numbers()
@@ -180,14 +180,14 @@ def sum_of_hits(surface, position, velocity, pull):
 
 
 def test_what_is_given_is_not_replaced():
-    numbers = type(ball_like(*LEVEL, "first_hit", "bend")().numbers())
+    numbers = type(ball_like(*LEVEL, "first_hit", "hessian_bounds")().numbers())
     assert numbers.first_hit is _first_hit
     assert numbers.gives("first_hit")
     assert not numbers.gives("falling_hit")
 
 
 def test_a_quartic_without_its_polynomial_is_refused():
-    surface = ball_like(*LEVEL, "first_hit", "bend", "is_quartic")()
+    surface = ball_like(*LEVEL, "first_hit", "hessian_bounds", "is_quartic")()
     assert "course()" in refused(surface, swarm.Impact(), PULL)
 
 
@@ -205,7 +205,7 @@ def test_the_sign_of_the_gap_is_asked_for():
 
 # --- One sentence ----------------------------------------------------------------------------------------
 
-COMPLETE = (*LEVEL, "first_hit", "bend", "hessian", "farthest_push")
+COMPLETE = (*LEVEL, "first_hit", "hessian_bounds", "hessian", "farthest_push")
 NEED_HESSIAN = [name for name in METHODS if name != "verlet"]  # Impact slides by it
 
 

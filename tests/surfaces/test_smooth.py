@@ -191,7 +191,7 @@ def test_the_discrete_gradient_is_exact_across_the_end_of_the_cylinder():
     for step in (1e-12, 1e-6, 1e-2):
         first = np.array([0.3, 0.4, 0.5 - 0.5 * step])
         second = first + step * np.array([0.1, -0.2, 1.0])
-        discrete = np.array(call(capsule.inner_gradient, first, second))
+        discrete = np.array(call(capsule.discrete_gradient, first, second))
         rise = call(capsule.difference, first, second)
         assert discrete @ (second - first) == pytest.approx(rise, abs=4 * EPSILON * step)
         assert discrete == pytest.approx([0.6, 0.8, 0.0], abs=2.0 * step + 1e-15)

@@ -232,16 +232,16 @@ def test_contact_functions_next_to_a_face(name):
         if free @ np.array(call(solid.unit_normal, start)) < 0.0:
             free = -free
         end = start + free
-        discrete = np.array(call(solid.inner_gradient, start, end))
+        discrete = np.array(call(solid.discrete_gradient, start, end))
         assert discrete @ free == pytest.approx(call(solid.phi, end) - call(solid.phi, start), abs=1e-15)
         if sorted(call(part.distance, start) for part in parts)[1] < 0.1:
             continue  # a step across an edge has a D that jumps
         kappa = -0.01
         pushed = np.array(call(solid.push, start, free, kappa))
-        discrete = np.array(call(solid.inner_gradient, start, pushed))
+        discrete = np.array(call(solid.discrete_gradient, start, pushed))
         assert pushed == pytest.approx(start + free - kappa * discrete, abs=1e-15)
         rise, slope = call(solid.rise, start, free, kappa)
         assert rise == pytest.approx(call(solid.phi, pushed) - call(solid.phi, start), abs=1e-15)
         assert slope < 0.0
         near = start + 1e-8 * random_turn(rng)
-        assert abs(call(solid.phi, np.array(call(solid.settle, near)))) <= 1e-14
+        assert abs(call(solid.phi, np.array(call(solid.project, near)))) <= 1e-14

@@ -118,7 +118,7 @@ def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * point)
     near = wall + off * scale * np.array(call(surface.unit_normal, wall))
-    settled = np.array(call(surface.settle, near))
+    settled = np.array(call(surface.project, near))
     slope = np.linalg.norm(call(surface.gradient, wall))
     assert abs(gap(surface, settled)) <= slope * scale * (20 * EPSILON + 10 * off**2)
     assert np.linalg.norm(settled - near) <= 1.001 * abs(off) * scale + 20 * EPSILON * scale
@@ -132,11 +132,11 @@ def test_settle_moves_a_near_point_onto_the_surface(name, point, scale, off):
 def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
     """D.(r1 - r0) = q1 - q0."""
     surface, first, second = numbers_of(name, scale), scale * first, scale * second
-    discrete = call(surface.inner_gradient, first, second)
+    discrete = call(surface.discrete_gradient, first, second)
     with mp.workdps(50):
         start, end, exact = (np.array([mp.mpf(float(part)) for part in row]) for row in (first, second, discrete))
         rise = surface.inner(vec(end)) - surface.inner(vec(start))
-        slope = np.linalg.norm(call(surface.inner_gradient, first, first)) + np.linalg.norm(discrete)
+        slope = np.linalg.norm(call(surface.discrete_gradient, first, first)) + np.linalg.norm(discrete)
         assert abs(exact @ (end - start) - rise) <= 16 * EPSILON * slope * scale
 
 
@@ -162,7 +162,7 @@ def test_chain_rule_of_gap_and_inner(name, point, scale, near):
     q = call(surface.inner, point)
     slope, _ = call(surface.gap_slope, q, q * (1.0 + near))
     gradient = side_of(surface) * np.array(call(surface.gradient, point))
-    chained = slope * np.array(call(surface.inner_gradient, point, point))
+    chained = slope * np.array(call(surface.discrete_gradient, point, point))
     assert chained == pytest.approx(gradient, abs=(abs(near) + 16 * EPSILON) * np.linalg.norm(gradient))
 
 
@@ -174,7 +174,7 @@ def pushed_step(name, point, free, strength, scale):
     # What is found by iteration is found in the direction in which the surface pushes.
     strength = strength if name not in ITERATED else math.copysign(strength, numbers_of(name).farthest_push())
     surface, point = numbers_of(name, scale), scale * point
-    slope = np.linalg.norm(call(surface.inner_gradient, point, point))
+    slope = np.linalg.norm(call(surface.discrete_gradient, point, point))
     return surface, point, 0.5 * scale * free, 0.2 * strength * scale / slope
 
 
@@ -191,7 +191,7 @@ def test_push_solves_its_equation(name, point, free, strength, scale):
     surface, point, free, kappa = pushed_step(name, point, free, strength, scale)
     end = np.array(call(surface.push, point, free, kappa))
     converges(name, end)
-    discrete = np.array(call(surface.inner_gradient, point, end))
+    discrete = np.array(call(surface.discrete_gradient, point, end))
     assert end == pytest.approx(point + free - kappa * discrete, abs=16 * EPSILON * scale)
 
 
@@ -203,10 +203,10 @@ def test_rise_is_the_inner_function_of_push(name, point, free, strength, scale):
     rise, slope = call(surface.rise, point, free, kappa)
     end = np.array(call(surface.push, point, free, kappa))
     converges(name, end)
-    steep = np.linalg.norm(call(surface.inner_gradient, end, end))
+    steep = np.linalg.norm(call(surface.discrete_gradient, end, end))
     q0, q1 = call(surface.inner, point), call(surface.inner, end)
     assert rise == pytest.approx(q1 - q0, abs=32 * EPSILON * (abs(q0) + abs(q1) + steep * scale))
-    discrete = np.array(call(surface.inner_gradient, point, end))
+    discrete = np.array(call(surface.discrete_gradient, point, end))
     terms = abs(discrete) @ abs(free) + abs(kappa) * discrete @ discrete
     # The end has the round-off of its coordinates, by which D tilts.
     tilted = 64 * EPSILON * scale * np.abs(discrete).max() if name in QUADRIC_WALLS else 0.0

@@ -97,9 +97,9 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
             ("chord_guess", (point, 0.1 * free)),
             ("chord_improve", (point, 0.1 * free, kappa)),
             ("chord_normal", (point, 0.1 * free, kappa)),
-            ("settle", (point,)),
+            ("project", (point,)),
             ("push", (point, free, kappa)),
-            ("inner_gradient", (point, free)),
+            ("discrete_gradient", (point, free)),
         ]:
             assert call(getattr(whole, name), index, *arguments) == call(getattr(numbers, name), *arguments), name
 

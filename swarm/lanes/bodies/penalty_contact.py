@@ -32,7 +32,7 @@ class Soft(NamedTuple):
 
 def _normal_of(surface, r0, r1):
     rise, _curvature = surface.gap_slope(surface.inner(r0), surface.inner(r1))
-    return rise * surface.inner_gradient(r0, r1)
+    return rise * surface.discrete_gradient(r0, r1)
 
 
 def _gap_of(surface, r):

@@ -102,7 +102,7 @@ class CellNumbers(contract.Smooth):
         _value, n = self.spline.value_and_slope(r)
         return total(times(absolute(n), self.spline.coordinates(r)))
 
-    def settle(self, r):
+    def project(self, r):
         value, n = self.spline.value_and_slope(r)
         return r - (value / dot(n, n)) * n
 
@@ -175,7 +175,7 @@ class CellNumbers(contract.Smooth):
         return self._until_out(cell.low, 0.0, r, v, pull)
 
     @outlined
-    def bend(self, r):
+    def hessian_bounds(self, r):
         """Bounds of the eigenvalues of side H: see `Smooth.bend`."""
         cell, width = self._cell_of(r), self.spline.width
         if cell.clear >= 0.0 or not cell.inside:

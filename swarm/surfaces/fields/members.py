@@ -38,7 +38,7 @@ class Members(Record):
     # What a wall at rest says, as in contract.py.
     flat = False
 
-    def pace(self):
+    def time_scale(self):
         """A time in which their motion changes little [s]."""
         return math.inf
 

@@ -105,7 +105,7 @@ class OwnNumbers(contract.Smooth):
         least = self.bends.least
         return self.side * (-1.0 / least if least < 0.0 else math.inf)
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
         most, magnitude = self.bends.most, max(abs(self.bends.least), abs(self.bends.most))
         if self.closed == 0.0:

@@ -82,7 +82,7 @@ class CapsuleNumbers(Distance):
     def inner(self, r):
         return square(self.from_segment(r))
 
-    def slope(self, r):
+    def inner_gradient(self, r):
         return 2.0 * self.from_segment(r)
 
     def hessian(self, r):
@@ -128,6 +128,6 @@ class CapsuleNumbers(Distance):
             Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
         )  # fmt: skip
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         # 0 <= H <= I everywhere; the distance only bounds the speed of a fall.
         return (select(self.side > 0.0, 1.0, 0.0), 1.0, self.radius)

@@ -15,7 +15,7 @@ _MIDDLE = 1e-100
 class Distance(contract.Smooth):
     """A shape whose inner function q is a squared distance: phi = sqrt(q) - radius.
 
-    It has the fields `radius` and `radius2`, its square, and gives `inner`, and `slope` or its own `gradient`.
+    It has the fields `radius` and `radius2`, its square, and gives `inner`, and `inner_gradient` or its own `gradient`.
     """
 
     def phi(self, r):
@@ -36,7 +36,7 @@ class Distance(contract.Smooth):
 
     def gradient(self, r):
         # Where q = 0 the distance has no gradient, and the answer is 0.
-        return self.slope(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), _TINY))
+        return self.inner_gradient(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), _TINY))
 
     def gap_slope(self, q0, q1):
         # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall

@@ -82,7 +82,7 @@ class PlaneNumbers(ExactChord):
     def gap_slope(self, q0, q1):
         return (1.0, 0.0)
 
-    def settle(self, r):
+    def project(self, r):
         return r - (self.inner(r) - self.offset) * self.normal
 
     def outward_acceleration(self, r, v, pull):
@@ -110,10 +110,10 @@ class PlaneNumbers(ExactChord):
         time, _found = self.falling_hit(r, v, pull)
         return select(self.inner(r) > self.offset, 0.0, time)
 
-    def inner_gradient(self, r0, r1):
+    def discrete_gradient(self, r0, r1):
         return self.normal
 
-    step_normal = inner_gradient
+    step_normal = discrete_gradient
 
     def push(self, r0, p, kappa):
         return r0 + (p - kappa * self.normal)

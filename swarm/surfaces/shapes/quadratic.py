@@ -114,7 +114,7 @@ class QuadricNumbers(contract.Smooth):
     def unit_normal(self, r):
         return self.unit_along(self.gradient(r))
 
-    def settle(self, r):
+    def project(self, r):
         g = self.gradient(r)
         g2 = square(g)
         return r - (self.phi(r) / select(g2 > _TINY, g2, 1.0)) * g
@@ -144,12 +144,12 @@ class QuadricNumbers(contract.Smooth):
     def gap_slope(self, q0, q1):
         return (self.side, 0.0)
 
-    def inner_gradient(self, r0, r1):
+    def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return self.tilted(times(self.a, r0 + r1 - 2.0 * self.center), 1.0)
 
     def step_normal(self, r0, r1):
-        return self.unit_along(self.inner_gradient(r0, r1))
+        return self.unit_along(self.discrete_gradient(r0, r1))
 
     def push(self, r0, p, kappa):
         a, d, f = self.a, r0 - self.center, self.tilted(p, -kappa)
@@ -181,12 +181,12 @@ class QuadricNumbers(contract.Smooth):
     # --- Of walls that move other than uniformly ---
 
     def level_along(self, seen):
-        n, most, side = self.slope(seen.r), absolute(self.a), self.side
+        n, most, side = self.inner_gradient(seen.r), absolute(self.a), self.side
         bend = form(self.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
         level = self.level_of(self.inner(seen.r))
         return Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(most.x, most.y, most.z))
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         a, side = self.a, self.side
         return max(side * a.x, side * a.y, side * a.z), largest(a), math.inf
 

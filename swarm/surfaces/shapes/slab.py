@@ -161,13 +161,13 @@ class SlabNumbers(Distance, ExactChord):
         d = self.off(r)
         return d * d
 
-    def slope(self, r):
+    def inner_gradient(self, r):
         return self.scaled(2.0 * self.off(r))
 
     def unit_normal(self, r):
         return self.scaled(math.copysign(1.0, self.side * self.off(r)))
 
-    def settle(self, r):
+    def project(self, r):
         d = self.off(r)
         return r - self.scaled(d - math.copysign(self.radius, d))
 
@@ -206,7 +206,7 @@ class SlabNumbers(Distance, ExactChord):
         time, _found = self.falling_hit(r, v, pull)
         return select(self.distance(r) > 0.0, 0.0, time)
 
-    def inner_gradient(self, r0, r1):
+    def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return self.scaled(self.off(r0) + self.off(r1))
 
@@ -240,7 +240,7 @@ class SlabNumbers(Distance, ExactChord):
 
     # --- Of walls that move other than uniformly ---
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         # H = n n^T
         return (select(self.side > 0.0, 1.0, 0.0), 1.0, math.inf)
 

@@ -76,7 +76,7 @@ class SphereNumbers(Distance, ExactChord):
     def inner(self, r):
         return square(r - self.center)
 
-    def slope(self, r):
+    def inner_gradient(self, r):
         return 2.0 * (r - self.center)
 
     def unit_normal(self, r):
@@ -86,7 +86,7 @@ class SphereNumbers(Distance, ExactChord):
         # |grad g| = 1
         return total(absolute(r))
 
-    def settle(self, r):
+    def project(self, r):
         d = r - self.center
         # 1/(2 R^2)
         k = 0.5 * self.curvature * self.curvature
@@ -112,7 +112,7 @@ class SphereNumbers(Distance, ExactChord):
         c, window = level_and_window(c, self.radius2, size, a, gg)
         return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
 
-    def inner_gradient(self, r0, r1):
+    def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return r0 + r1 - 2.0 * self.center
 
@@ -150,7 +150,7 @@ class SphereNumbers(Distance, ExactChord):
 
     # --- Of walls that move other than uniformly ---
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         # H = 1
         return (self.side, 1.0, math.inf)
 

@@ -86,7 +86,7 @@ class TorusNumbers(Distance):
         across, dz = self._from_axis(r) - self.major, r.z - self.center.z
         return across * across + dz * dz
 
-    def slope(self, r):
+    def inner_gradient(self, r):
         d, f = r - self.center, 2.0 - 2.0 * self.major / self._from_axis(r)
         return Vec(f * d.x, f * d.y, 2.0 * d.z)
 
@@ -108,7 +108,7 @@ class TorusNumbers(Distance):
     def near(self, gravity, r, v):
         return self._near(r, v) if gravity is None else self._near_of_fall(as_vector(gravity), r, v)
 
-    def bend(self, r):
+    def hessian_bounds(self, r):
         # Half way to the axis at most, where 1 - R/rho is largest.
         rho = self._from_axis(r)
         along = 2.0 * self.major / rho
