@@ -182,7 +182,7 @@ class Pace(NamedTuple):
 
 
 # The type of each array of `Pace`.
-PACES = tuple(kind.__args__[1].__args__[0] for kind in Pace.__annotations__.values())
+PACES = tuple({Floats: np.float64, Flags: np.bool_, Counts: np.int64}[kind] for kind in Pace.__annotations__.values())
 
 
 class Held(NamedTuple):
