@@ -15,9 +15,10 @@ all of its users, would have to be written so, and plain Python would pay for th
     notes       what is noted
     part        a helper as a function of its own in a kernel
     ways        one value of a variable where several ways meet
-    frame       branches, loops and returns of one call
+    decisions   branches and returns of one call
+    frame       its loops
     source      the syntax tree of a function
-    twins       the same function, whose control flow and calls go through a frame
+    expressions, twins   the same function, whose calls and control flow go through a frame
     selection   `select`
     calls       what a call means: an operation, or a function that is traced in its turn
     emit        the notes as instructions

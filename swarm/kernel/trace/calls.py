@@ -13,9 +13,10 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 
 from .frame import Frame, Range
+from .notes import taken
 from .selection import select, traced_select
 from .twins import twin_of
-from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted, notes
+from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
 from .ways import unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
@@ -128,7 +129,7 @@ leave: Callable[[Any, Exception], None] = _refused
 
 def _foreign(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """A call of a function of the user's, which may do what cannot be traced."""
-    now = notes()
+    now = taken()
     mark = len(now)
     try:
         return traced(function, given, named)

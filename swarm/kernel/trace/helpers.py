@@ -18,7 +18,7 @@ from ..cache import is_disabled
 from . import calls, values
 from .calls import traced
 from .emit import emit
-from .notes import Argument
+from .notes import Argument, context, noting, taken
 from .part import Part, key_of
 
 _LOG = logging.getLogger("swarm.trace")
@@ -63,7 +63,7 @@ class Helper:
             self._whole[kinds] = None
             part = Part(self.name, inlined=True)
             part.arguments = [Argument(kind, k) for k, kind in enumerate(kinds)]
-            with values.noting(part.notes, context):
+            with noting(part.notes, context):
                 given = tuple(values.opened(one.kind, one) for one in part.arguments)
                 try:
                     if self._outlined:
@@ -90,7 +90,7 @@ class Helper:
         if key not in self._parts:
             self._parts[key] = None
             part = Part(self.name, inlined=False)
-            with values.noting(part.notes):
+            with noting(part.notes):
                 try:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
@@ -99,7 +99,7 @@ class Helper:
         return self._parts[key]
 
     def _inlined(self, given: Any) -> Any:
-        notes = values.notes()
+        notes = taken()
         mark = len(notes)
         try:
             return self._run(given)
@@ -136,7 +136,7 @@ def leaving(options: Any) -> Callable[[Any, Exception], None]:
             _LEFT.add(function)
             made: Any = make_overload_template(function, lambda *kinds: function, options, False, "never")
             infer_global(function, types.Function(made))
-            values.context().refresh()
+            context().refresh()
 
     return leave
 

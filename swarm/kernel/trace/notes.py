@@ -1,6 +1,11 @@
 """What is noted of a helper: operations, and the ways through it."""
 
+import contextlib
+import threading
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 
 class Call:
@@ -97,3 +102,37 @@ class PartCall:
 
     def __init__(self, part: Any, given: list[Any]) -> None:
         self.part, self.given = part, given
+
+
+# --- By whom ---------------------------------------------------------------------------------------------
+
+_now = threading.local()
+
+
+@contextlib.contextmanager
+def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
+    """Let a thread note what it traces; without a context that of the trace around it."""
+    before = getattr(_now, "notes", None), getattr(_now, "context", None)
+    _now.notes, _now.context = notes, context or before[1]
+    try:
+        # Of numbers that are known: kernels do not warn.
+        with np.errstate(all="ignore"):
+            yield
+    finally:
+        _now.notes, _now.context = before
+
+
+def context() -> Any:
+    """Numba's context of types in the trace of this thread."""
+    return _now.context
+
+
+def taken() -> list[Any]:
+    """The notes of the part that is being traced."""
+    return _now.notes  # type: ignore[no-any-return]
+
+
+def add(note: Any) -> Any:
+    """Add a note."""
+    _now.notes.append(note)
+    return note

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from .notes import Argument, PartCall
-from .values import TraceError, Value, add, is_defined, kind_of, leaves, made_of, opened
+from .notes import Argument, PartCall, add
+from .values import TraceError, Value, is_defined, kind_of, leaves, made_of, opened
 
 _part_numbers = itertools.count()
 

@@ -12,7 +12,6 @@ The twin has the globals and the cells of the function, so that names mean what 
 """
 
 import ast
-import copy
 import functools
 import itertools
 import types
@@ -21,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from .expressions import Expressions, load, of_frame, without_arguments
 from .frame import Frame
 from .source import FRAME, compiled, definition, node_of
 from .values import UNDEFINED, TraceError
@@ -104,18 +104,6 @@ def _names(target: Any) -> Iterator[str]:
             yield from _names(part)
 
 
-def _load(name: str) -> ast.Name:
-    return ast.Name(name, ast.Load())
-
-
-def _of_frame(name: str, *given: ast.expr) -> ast.Call:
-    return ast.Call(ast.Attribute(_load(FRAME), name, ast.Load()), list(given), [])
-
-
-def _without_arguments(body: Any) -> ast.Lambda:
-    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), body)
-
-
 _STATEMENTS = (
     ast.AnnAssign, ast.Assert, ast.Assign, ast.AugAssign, ast.Break, ast.Continue, ast.Expr, ast.For, ast.FunctionDef,
     ast.If, ast.Pass, ast.Raise, ast.Return, ast.While,
@@ -126,7 +114,7 @@ _REFUSED = (
 )  # fmt: skip
 
 
-class _Writer(ast.NodeTransformer):
+class _Writer(Expressions, ast.NodeTransformer):
     """Writes the twin of one function."""
 
     def __init__(self, node: Any, code: types.CodeType) -> None:
@@ -141,7 +129,7 @@ class _Writer(ast.NodeTransformer):
         names = {one.arg for one in [*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs]}
         names |= {one.arg for one in (parameters.vararg, parameters.kwarg) if one is not None}
         undefined = [
-            ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(_load(FRAME), "UNDEFINED", ast.Load()))
+            ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(load(FRAME), "UNDEFINED", ast.Load()))
             for name in _assigned(node.body) if name not in names
         ]  # fmt: skip
         arguments = ast.arguments(
@@ -174,14 +162,14 @@ class _Writer(ast.NodeTransformer):
             if isinstance(statement, (ast.Return, ast.Break, ast.Continue)):
                 return made
         if last:
-            made.append(ast.Expr(_of_frame("give", ast.Constant(None))))
+            made.append(ast.Expr(of_frame("give", ast.Constant(None))))
         return made
 
     def _as_function(self, name: str, statements: Any, *arguments: str) -> ast.FunctionDef:
         """A block of statements as a function."""
         names = [one for one in _assigned(statements) if one in self._locals]
         body = self._block(statements)
-        body.append(ast.Return(ast.Attribute(_load(FRAME), "NEXT", ast.Load())))
+        body.append(ast.Return(ast.Attribute(load(FRAME), "NEXT", ast.Load())))
         if names:
             body.insert(0, ast.Nonlocal(names))
         given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
@@ -189,12 +177,12 @@ class _Writer(ast.NodeTransformer):
 
     def _variables(self, number: int, names: list[str]) -> list[Any]:
         """The functions that get and put variables."""
-        values = ast.Tuple([_load(name) for name in names], ast.Load())
+        values = ast.Tuple([load(name) for name in names], ast.Load())
         get = self._plain(f".get{number}", [ast.Return(values)])
         body: list[Any] = [ast.Pass()]
         if names:
             target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
-            body = [ast.Nonlocal(names), ast.Assign([target], _load(".values"))]
+            body = [ast.Nonlocal(names), ast.Assign([target], load(".values"))]
         return [get, self._plain(f".put{number}", body, ".values")]
 
     def _plain(self, name: str, body: list[Any], *arguments: str) -> ast.FunctionDef:
@@ -203,12 +191,12 @@ class _Writer(ast.NodeTransformer):
 
     def _goes_on(self, call: ast.expr) -> ast.If:
         """What follows is reached only where the call says so."""
-        test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(_load(FRAME), "NEXT", ast.Load())])
+        test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(load(FRAME), "NEXT", ast.Load())])
         return ast.If(test, [ast.Return(ast.Constant(False))], [])
 
     def visit_Return(self, node: ast.Return) -> Any:
         value = ast.Constant(None) if node.value is None else self.visit(node.value)
-        return ast.Return(_of_frame("give", value))
+        return ast.Return(of_frame("give", value))
 
     def visit_If(self, node: ast.If) -> Any:
         number = next(self._numbers)
@@ -216,7 +204,7 @@ class _Writer(ast.NodeTransformer):
         test = self.visit(node.test)
         first, second = self._as_function(f".then{number}", node.body), self._as_function(f".else{number}", node.orelse)
         names_of = [f"{one}{number}" for one in (".then", ".else", ".get", ".put")]
-        call = _of_frame("branch", test, *map(_load, names_of))
+        call = of_frame("branch", test, *map(load, names_of))
         return [first, second, *self._variables(number, names), self._goes_on(call)]
 
     def visit_While(self, node: ast.While) -> Any:
@@ -224,8 +212,8 @@ class _Writer(ast.NodeTransformer):
             raise self._refused(node, "an `else` of a loop")
         number = next(self._numbers)
         names = [one for one in _assigned(node.body) if one in self._locals]
-        test, body = _without_arguments(self.visit(node.test)), self._as_function(f".body{number}", node.body)
-        call = _of_frame("repeat", test, *(_load(f"{one}{number}") for one in (".body", ".get", ".put")))
+        test, body = without_arguments(self.visit(node.test)), self._as_function(f".body{number}", node.body)
+        call = of_frame("repeat", test, *(load(f"{one}{number}") for one in (".body", ".get", ".put")))
         return [body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_For(self, node: ast.For) -> Any:
@@ -234,19 +222,17 @@ class _Writer(ast.NodeTransformer):
         number = next(self._numbers)
         names = [one for one in _assigned([node]) if one in self._locals]
         taken = [one for one in _names(node.target) if one in self._locals]
-        take = self._plain(
-            f".take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], _load(".value"))], ".value"
-        )
+        take = self._plain(f".take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], load(".value"))], ".value")
         body = self._as_function(f".body{number}", node.body)
         names_of = [f"{one}{number}" for one in (".take", ".body", ".get", ".put")]
-        call = _of_frame("each", self.visit(node.iter), *map(_load, names_of))
+        call = of_frame("each", self.visit(node.iter), *map(load, names_of))
         return [take, body, *self._variables(number, names), self._goes_on(call)]
 
     def visit_Break(self, node: ast.Break) -> Any:
-        return ast.Return(_of_frame("leave"))
+        return ast.Return(of_frame("leave"))
 
     def visit_Continue(self, node: ast.Continue) -> Any:
-        return ast.Return(_of_frame("again"))
+        return ast.Return(of_frame("again"))
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> Any:
         if node.value is None:
@@ -254,67 +240,4 @@ class _Writer(ast.NodeTransformer):
         return ast.Assign([self.visit(node.target)], self.visit(node.value))
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
-        return node
-
-    # --- Expressions ---
-
-    def visit_Call(self, node: ast.Call) -> Any:
-        given = [self.visit(one) for one in node.args]
-        named = [ast.keyword(one.arg, self.visit(one.value)) for one in node.keywords]
-        if isinstance(node.func, ast.Name) and node.func.id == "super" and not given:
-            # Python finds both by itself, but not in the blocks of a twin.
-            given = [_load("__class__"), _load(self._code.co_varnames[0])]
-        made = _of_frame("call", self.visit(node.func), *given)
-        made.keywords = named
-        return ast.copy_location(made, node)
-
-    def visit_IfExp(self, node: ast.IfExp) -> Any:
-        ways = (_without_arguments(self.visit(one)) for one in (node.body, node.orelse))
-        return ast.copy_location(_of_frame("choose", self.visit(node.test), *ways), node)
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> Any:
-        first, *rest = node.values
-        other = rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(node.op, rest), node)
-        name = "both" if isinstance(node.op, ast.And) else "either"
-        return ast.copy_location(_of_frame(name, self.visit(first), _without_arguments(self.visit(other))), node)
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
-        if not isinstance(node.op, ast.Not):
-            return self.generic_visit(node)
-        return ast.copy_location(_of_frame("negate", self.visit(node.operand)), node)
-
-    def visit_Compare(self, node: ast.Compare) -> Any:
-        if len(node.ops) == 1:
-            made, (asked,) = self.generic_visit(node), node.ops
-            if isinstance(asked, (ast.In, ast.NotIn)):
-                found = _of_frame("contains", node.comparators[0], node.left)
-            elif isinstance(asked, (ast.Is, ast.IsNot)):
-                found = _of_frame("same", node.left, node.comparators[0])
-            else:
-                return made
-            found = _of_frame("negate", found) if isinstance(asked, (ast.NotIn, ast.IsNot)) else found
-            return ast.copy_location(found, node)
-        terms = [node.left, *node.comparators]
-        # Of a term that stands in two comparisons each has its own.
-        pairs = zip(terms, node.ops, map(copy.deepcopy, terms[1:]), strict=False)
-        return self.visit(
-            ast.copy_location(ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in pairs]), node)
-        )
-
-    def visit_Subscript(self, node: ast.Subscript) -> Any:
-        if not isinstance(node.ctx, ast.Load):
-            return self.generic_visit(node)
-        return ast.copy_location(_of_frame("item", self.visit(node.value), self._place(node.slice)), node)
-
-    def _place(self, node: Any) -> Any:
-        if isinstance(node, ast.Tuple):
-            return ast.Tuple([self._place(one) for one in node.elts], ast.Load())
-        if isinstance(node, ast.Slice):
-            parts = [
-                ast.Constant(None) if one is None else self.visit(one) for one in (node.lower, node.upper, node.step)
-            ]
-            return ast.Call(_load("slice"), parts, [])
-        return self.visit(node)
-
-    def visit_Lambda(self, node: ast.Lambda) -> Any:
         return node

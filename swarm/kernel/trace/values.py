@@ -1,10 +1,8 @@
 """Proxies of what a kernel has: an operation on them is noted, and Numba says of what type its result is."""
 
-import contextlib
 import functools
 import operator
-import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,9 +11,7 @@ from numba.core.datamodel.registry import default_manager
 from numba.core.errors import NumbaError
 from numba.core.typing.templates import Signature
 
-from .notes import Attribute, Call, Element
-
-_now = threading.local()
+from .notes import Attribute, Call, Element, add, context
 
 
 class TraceError(Exception):
@@ -236,35 +232,6 @@ def opened(kind: Any, note: Any, path: tuple[int, ...] = ()) -> Any:
 
 
 # --- Noting ----------------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
-    """Let a thread note what it traces; without a context that of the trace around it."""
-    before = getattr(_now, "notes", None), getattr(_now, "context", None)
-    _now.notes, _now.context = notes, context or before[1]
-    try:
-        # Of numbers that are known: kernels do not warn.
-        with np.errstate(all="ignore"):
-            yield
-    finally:
-        _now.notes, _now.context = before
-
-
-def context() -> Any:
-    """Numba's context of types in the trace of this thread."""
-    return _now.context
-
-
-def notes() -> list[Any]:
-    """The notes of the part that is being traced."""
-    return _now.notes  # type: ignore[no-any-return]
-
-
-def add(note: Any) -> Any:
-    """Add a note."""
-    _now.notes.append(note)
-    return note
 
 
 _signatures: dict[Any, tuple[Any, Any]] = {}

@@ -6,8 +6,8 @@ from typing import Any
 
 from numba import types
 
-from .notes import Assign, Load, Slot
-from .values import UNDEFINED, TraceError, Value, add, context, is_number, kind_of, made_of, opened
+from .notes import Assign, Load, Slot, add, context
+from .values import UNDEFINED, TraceError, Value, is_number, kind_of, made_of, opened
 
 
 def _is_same(a: Any, b: Any) -> bool:
