@@ -208,4 +208,6 @@ class Drifting(Posed):
     gravity_in = vector_in
     is_quartic = property(lambda self: self.body.is_quartic)
     may_be_far = property(lambda self: self.body.may_be_far)
-    safe_time = Framed.safe_time
+    # As at a wall at rest, where a wall that moves otherwise takes safe steps.
+    first_hit, falling_hit, safe_time = Framed.first_hit, Framed.falling_hit, Framed.safe_time
+    field_hit, until_next_cell = Framed.field_hit, Framed.until_next_cell  # type: ignore[attr-defined]

@@ -8,6 +8,7 @@ from conftest import SURFACES, call, directions, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 
+import swarm
 from swarm.kernel.gravity import Gravity
 from swarm.surfaces import flights
 from swarm.surfaces.walls import Walls, all_walls
@@ -115,3 +116,16 @@ def test_who_is_outside_and_who_is_touched(names, point, free):
     touched = [now or is_out(numbers, point + free) for now, numbers in zip(out, single, strict=True)]
     first = touched.index(True) if any(touched) else -1
     assert call(Walls.touched, whole, point, free) == (first, sum(touched))
+
+
+@pytest.mark.parametrize("pull", [None, (0.3, -0.2, -1.0)], ids=["straight", "falling"])
+@given(point=vectors, velocity=directions)
+def test_a_wall_in_uniform_translation_is_asked_in_its_frame(pull, point, velocity):
+    """Its hits are those of the wall at rest, bit for bit, and not found by safe steps."""
+    moved = swarm.Sphere(1.0, motion=swarm.Translation((0.2, -0.1, 0.3)))
+    (wall,) = swarm.Scene([moved], pull).chain(1.0).at(0.25).walls
+    shift, speed = np.array(wall.pose.shift), np.array(wall.pose.velocity)
+    (body,) = swarm.Sphere(1.0).walls()
+    ask, more = ("first_hit", ()) if pull is None else ("falling_hit", (np.array(pull),))
+    here = call(getattr(wall, ask), point, velocity, *more)
+    assert here == call(getattr(body, ask), point - shift, velocity - speed, *more)
