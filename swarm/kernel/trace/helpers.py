@@ -77,7 +77,7 @@ class Helper:
                     self._whole[kinds] = part
                 except Exception as error:  # What Python says where a proxy is not what a function expects.
                     self.errors[kinds] = error
-                    self._leave(error)
+                    _tell(self._function, error)
         return self._whole[kinds]
 
     def known(self, kinds: tuple[Any, ...]) -> Part | None:
@@ -95,7 +95,7 @@ class Helper:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
                 except Exception as error:  # What Python says where a proxy is not what a function expects.
-                    self._leave(error)
+                    _tell(self._function, error)
         return self._parts[key]
 
     def _inlined(self, given: Any) -> Any:
@@ -105,16 +105,13 @@ class Helper:
             return self._run(given)
         except Exception as error:  # What Python says where a proxy is not what a function expects.
             del notes[mark:]
-            self._leave(error)
+            _tell(self._function, error)
             return values.noted(self._function, *given)
 
     def _run(self, given: Any) -> Any:
         first = len(given) - len(self._keywords)
         named = dict(zip(self._keywords, given[first:], strict=True))
         return traced(self._body, given[:first], named)
-
-    def _leave(self, error: Exception) -> None:
-        _tell(self._function, error)
 
 
 def _tell(function: Any, error: Exception) -> None:

@@ -184,6 +184,3 @@ class SphereCavity(SphereNumbers):
 def ball(center, radius):
     """The numbers of a solid sphere."""
     return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
-
-
-# --- Contact ---------------------------------------------------------------------------------------------
