@@ -1,1 +1,1 @@
-"""What the methods share at a contact, and only that."""
+"""The mathematics of a contact that methods share, and only that."""

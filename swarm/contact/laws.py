@@ -42,7 +42,7 @@ NONE = Laws(None, None, None, None)
 
 
 class Span(Record):
-    """What holds for so many walls in a row."""
+    """One value of a law for so many walls in a row."""
 
     value: Any
     walls: float

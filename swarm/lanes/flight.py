@@ -28,7 +28,7 @@ def go(method, chain, gravity, lanes, live):
 
 
 def _search(met, chain, gravity, lanes, live):
-    """What of the first hits is found in loops of their own."""
+    """First hits with fields and by safe steps, each in a loop of its own."""
     if met is None:
         return
     if _has_fields(met):

@@ -24,7 +24,7 @@ NEVER = Hit(math.inf, 0.0)
 
 
 def of_flights(falls):
-    """What the free flights of a method ask of every wall, with gravity or without."""
+    """The methods of a wall that free flights ask for, with gravity or without."""
     return ("falling_hit" if falls else "first_hit",)
 
 

@@ -65,7 +65,7 @@ def _taken(volumes: Sequence[Surface]) -> tuple[Any, ...]:
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
-    """What is open in a surface: what its openings say and, where the scene repeats, the images of that.
+    """The open parts of a surface: those its openings say and, where the scene repeats, the images of that.
 
     Raises:
         SceneError: an opening has no phi, or no point of the wall in it, or it does not go with the period.
