@@ -61,7 +61,7 @@ def _mesh(quick: bool) -> list[Row]:
         ring.export(Path(folder) / "ring.stl")
         began = time.perf_counter()
         surface = swarm.from_mesh(Path(folder) / "ring.stl", 2.8 / SAMPLES)
-        swarm.Scene([surface]).chain()
+        swarm.Scene([surface]).walls()
         seconds = time.perf_counter() - began
     shape = " x ".join(map(str, surface.values.shape))
     return [

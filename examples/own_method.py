@@ -37,13 +37,13 @@ class MirrorNumbers(contract.MethodNumbers):
     def own(self, first, second, third):
         return self
 
-    def land(self, chain, gravity, lane, hit):
+    def land(self, walls, gravity, lane, hit):
         t = select(hit.time < lane.left, hit.time, lane.left)
         r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
         return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
 
-    def contact(self, chain, gravity, lane, wall, solution):
-        n = chain.unit_normal(wall, lane.r)
+    def contact(self, walls, gravity, lane, wall, solution):
+        n = walls.unit_normal(wall, lane.r)
         b = dot(lane.v, n)
         # v1 = v0 - 2 (v0.n) n where v0.n > 0
         impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)

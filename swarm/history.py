@@ -150,21 +150,21 @@ class _Rows:
 
 def _at_the_wall(scene: Scene, start: Start) -> Start:
     """Position and velocity at the next impact."""
-    chain = scene.chain()
-    hit = flights.first_hit(chain, None, start.r, start.v)
+    walls = scene.walls()
+    hit = flights.first_hit(walls, None, start.r, start.v)
     if not np.isfinite(hit.time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
-    return Start(chain.project(hit.wall, start.r + hit.time * start.v), start.v)
+    return Start(walls.project(hit.wall, start.r + hit.time * start.v), start.v)
 
 
 def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
-    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
+    numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
     rows = _Rows(scene, start, mass, method.dt)
     multipliers, reactions = np.zeros(count), np.zeros((count, 4))
     before = uzawa.Before(np.zeros(count), np.zeros(count))
-    uzawa.start(numbers, numbers.law, chain, rows.step, multipliers)
+    uzawa.start(numbers, numbers.law, walls, rows.step, multipliers)
     for sweep in range(method.max_sweeps):
-        end = uzawa.sweep_all(numbers, numbers.law, chain, rows.step, multipliers, before, sweep, reactions)
+        end = uzawa.sweep_all(numbers, numbers.law, walls, rows.step, multipliers, before, sweep, reactions)
         _require(end.solved, sweep)
         rows.add(before.multipliers.copy(), before.misses.copy(), reactions, float(end.stored))
         if end.stored <= method.tolerance:
@@ -173,11 +173,11 @@ def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian)
 
 
 def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> ContactHistory:
-    numbers, chain, count = method.numbers(scene), scene.chain(), len(scene.owners())
+    numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
     rows, reactions = _Rows(scene, start, mass, method.dt), np.zeros((count, 4))
-    _require(corner.hold(numbers.form, numbers.law, None, chain, rows.step, reactions).solved, 0)
+    _require(corner.hold(numbers.form, numbers.law, None, walls, rows.step, reactions).solved, 0)
     first, last = np.zeros(count), reactions[:, 3]
-    corner.constraints(chain, numbers.law, start.r, first)
+    corner.constraints(walls, numbers.law, start.r, first)
     stored = 0.5 * method.penalty * float(last @ last)
     rows.add(np.zeros(count), 0.5 * method.penalty * (first + last), reactions, stored)
     return rows.history(True)
@@ -186,15 +186,15 @@ def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> Contac
 def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactHistory:
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
-    chain, count = scene.chain(), len(scene.owners())
+    walls, count = scene.walls(), len(scene.owners())
     rows, r0 = _Rows(scene, start, mass, method.contact_step), start.r
-    wall = flights.first_hit(chain, None, r0, start.v).wall
-    kappa = reflection.chord(chain, wall, r0, rows.step.p)
-    r1 = chain.push(wall, r0, rows.step.p, kappa)
+    wall = flights.first_hit(walls, None, r0, start.v).wall
+    kappa = reflection.chord(walls, wall, r0, rows.step.p)
+    r1 = walls.push(wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)
-    reactions[int(wall), :3] = kappa * np.array(chain.discrete_gradient(wall, r0, r1))
+    reactions[int(wall), :3] = kappa * np.array(walls.discrete_gradient(wall, r0, r1))
     # The limit of Uzawa's loop with exponent 1.
-    multiplier[int(wall)] = chain.of(wall, 0.0, uzawa.multiplier_of, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
+    multiplier[int(wall)] = walls.of(wall, 0.0, uzawa.multiplier_of, regularisation(1.0, 1.0), r0, rows.step.c, kappa)
     rows.add(multiplier, np.zeros(count), reactions, 0.0)
     return rows.history(True)
 

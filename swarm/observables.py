@@ -25,10 +25,10 @@ _COLUMNS = 64
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
 
-def penetration(chain, r):
+def penetration(walls, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
     deepest = 0.0
-    for wall in reversed(chain.walls):
+    for wall in reversed(walls.each):
         distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
         deepest = select(distance > deepest, distance, deepest)
     return deepest
@@ -54,8 +54,8 @@ class Energies(NamedTuple):
         return self.kinetic + self.fall + self.stored
 
 
-def _energies(law, chain, gravity, m, r, v):
-    return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, chain, 1.0 / m, r))
+def _energies(law, walls, gravity, m, r, v):
+    return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, walls, 1.0 / m, r))
 
 
 def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
@@ -65,10 +65,10 @@ def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: F
     """
     stored = np.zeros(len(mass))
     if law is not None:
-        chain = scene.chain().at(0.0)
+        walls = scene.walls().at(0.0)
         # Few particles are in a wall, and its law takes one number.
         for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
-            stored[i] = contact_energy(law, chain, 1.0 / mass[i], column(position, 0, i))
+            stored[i] = contact_energy(law, walls, 1.0 / mass[i], column(position, 0, i))
     return Energies(0.5 * square(vec(velocity)), potential(scene.pull(), vec(position)), stored)
 
 
@@ -95,7 +95,7 @@ def start_energies(scene: Scene, law: Any, state: State) -> None:
 
 
 @kernel
-def observe(law, chain, gravity, state, drawn, size, partial):
+def observe(law, walls, gravity, state, drawn, size, partial):
     """Partial sums and maxima of each chunk into partial[chunk, ROWS].
 
     Of the particles k size to (k + 1) size for every k `drawn`; `size` is a number of whole chunks.
@@ -111,10 +111,10 @@ def observe(law, chain, gravity, state, drawn, size, partial):
                 for j in range(min(_COLUMNS, end - left)):
                     i = left + j
                     m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
-                    e = _energies(law, chain.at(0.0), gravity, m, r, v)
+                    e = _energies(law, walls.at(0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(chain.at(0.0), r))
+                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(walls.at(0.0), r))
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * _whole_fall(state.period, state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
@@ -140,7 +140,7 @@ def observe(law, chain, gravity, state, drawn, size, partial):
 
 
 @kernel
-def count_escaped(chain, gravity, far, faces, state):
+def count_escaped(walls, gravity, far, faces, state):
     """The number of particles that leave an open scene and do not come back, not through an opening of a wall.
 
     Those farther from the origin than `far`; those in a straight flight that hits no wall; and those beyond one of the
@@ -154,17 +154,17 @@ def count_escaped(chain, gravity, far, faces, state):
         for k in range(faces.shape[0]):
             n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
-        leaves = out or _escapes(state.period, gravity, chain, r, v)
+        leaves = out or _escapes(state.period, gravity, walls, r, v)
         count += leaves and not has_escaped(state.escape_time, i)
     return count
 
 
-def _escapes(period, gravity, chain, r, v):
+def _escapes(period, gravity, walls, r, v):
     """Whether a flight hits no wall. Under gravity only the distance decides."""
     # With a period, one that hits no wall of its cell may hit those of others.
     if period is not None or gravity is not None:
         return False
-    return (flights.first_hit(chain.at(0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
+    return (flights.first_hit(walls.at(0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
 def drift(seen: dict[str, Any]) -> float:

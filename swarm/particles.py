@@ -97,14 +97,14 @@ class Multipliers(NamedTuple):
         contacts: (N,) contact steps.
         unconverged: (N,) contact steps whose loop did not reach the tolerance.
         stored_energy: (N,) the largest V that a loop left [J].
-        left: (N,) the rest of the frame, in the method's unit, where a loop failed.
+        remaining: (N,) the rest of the frame, in the method's unit, where a loop failed.
     """
 
     sweeps: NDArray[np.int64]
     contacts: NDArray[np.int64]
     unconverged: NDArray[np.int64]
     stored_energy: Floats
-    left: Floats
+    remaining: Floats
 
 
 class Contacts(NamedTuple):
@@ -116,7 +116,7 @@ class Contacts(NamedTuple):
         met: (N,) the wall at which it is to be decided what becomes of it.
         step: (N,) its next sliding step [s]; 0 where the walls decide.
         keep: (N,) the speed across its walls that it has again when it leaves them [m/s].
-        left: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
+        remaining: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
         events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
         short_steps: (N,) of this frame, where several walls hold it or a cusp.
         load: (walls, N) what each wall carries of it at rest, per mass [m/s^2].
@@ -128,7 +128,7 @@ class Contacts(NamedTuple):
     met: Floats
     step: Floats
     keep: Floats
-    left: Floats
+    remaining: Floats
     events: Floats
     short_steps: Floats
     load: Floats

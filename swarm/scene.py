@@ -165,7 +165,7 @@ class Scene(Volume):
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
         return Scene(surfaces, self.gravity, self.period)
 
-    def chain(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
+    def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
         """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
 
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
@@ -174,11 +174,11 @@ class Scene(Volume):
             fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
             return carried(fields, others, moment)
         if own is None:
-            return self._chain
+            return self._walls
         return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
 
     def walls_of_rows(self) -> NDArray[np.int64]:
-        """How many walls of the chain each row of `owners` stands for: the members of a field, else one."""
+        """How many walls of the scene each row of `owners` stands for: the members of a field, else one."""
         fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
         return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
@@ -195,7 +195,7 @@ class Scene(Volume):
         return None if self.gravity is None else Gravity(*self.gravity)
 
     def laws(self) -> Laws | None:
-        """The laws of every wall of the chain as kernels take them, None where no surface has one."""
+        """The laws of every wall of the scene as kernels take them, None where no surface has one."""
         laws = Laws(
             self._of_walls([surface.restitution for surface in self.surfaces], 1.0),
             self._of_walls([surface.friction for surface in self.surfaces], 0.0),
@@ -205,7 +205,7 @@ class Scene(Volume):
         return None if laws == (None, None, None, None) else laws
 
     def openings(self) -> tuple[Opening, ...] | None:
-        """The openings of every wall of the chain as kernels take them, None where there are none."""
+        """The openings of every wall of the scene as kernels take them, None where there are none."""
         return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self.owners_of_pieces])
 
     def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
@@ -216,11 +216,11 @@ class Scene(Volume):
         return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
 
     def owners(self) -> list[int]:
-        """The surface that each row of the chain belongs to, one for a field."""
+        """The surface that each row of the scene belongs to, one for a field."""
         return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
 
     def members(self) -> NDArray[np.int64]:
-        """Of each wall of the chain its surface, and its number in the field that this is or -1: (2, walls)."""
+        """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
         return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
 
     @cached_property
@@ -232,8 +232,8 @@ class Scene(Volume):
         return any(surface.reacts() for surface in self.surfaces)
 
     @cached_property
-    def _chain(self) -> Walls:
-        """The chain for particles where nothing moves."""
+    def _walls(self) -> Walls:
+        """The walls for particles where nothing moves."""
 
         def taken(members: Members) -> Members:
             return in_straight_flights(members, self.period is not None) if self.gravity is None else members
@@ -241,8 +241,8 @@ class Scene(Volume):
         return walls_in(self.order, self._pieces, self._groups, (), taken)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Whoever has a copy makes a chain of its own: `apart` of other walls, a worker of what is compiled there.
-        return {name: value for name, value in self.__dict__.items() if name != "_chain"}
+        # Whoever has a copy makes walls of its own: `apart` of other walls, a worker of what is compiled there.
+        return {name: value for name, value in self.__dict__.items() if name != "_walls"}
 
     @cached_property
     def _pieces(self) -> tuple[Surface, ...]:
@@ -256,7 +256,7 @@ class Scene(Volume):
 
     @cached_property
     def order(self) -> Order:
-        """Surfaces and images in the order of the chain."""
+        """Surfaces and images in the order of the scene."""
         return order_of(self._pieces)
 
     @cached_property

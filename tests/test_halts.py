@@ -29,7 +29,7 @@ TWO = swarm.Particles([[0.0, 0.2], [0.0, 0.0], [1.0, 0.0]], [[1.0, 1.0], [0.0, 0
 NOWHERE = "no time passes; .*it is an error of swarm: please report it with the scene"
 
 
-def in_turn(method, chain, gravity, share, i):
+def in_turn(method, walls, gravity, share, i):
     """From one kernel to the next, and no time passes."""
     following = EVENT if share.phase[i] == CAREFUL else CAREFUL
     share.phase[i] = following
@@ -81,7 +81,7 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
 
     def creep(call, live):
         passes.append(1)
-        call.lanes.lane(0).left -= 1e-15
+        call.lanes.lane(0).remaining -= 1e-15
         call.lanes.event[0] = 0
 
     monkeypatch.setattr(slide, "compose", creep)

@@ -132,7 +132,7 @@ def test_surfaces_are_the_same_compiled(name):
 
 @compiled_only
 def test_chains_are_the_same_compiled():
-    assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").chain(), *NUMBERS)
+    assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").walls(), *NUMBERS)
 
 
 @compiled_only
@@ -358,7 +358,7 @@ def limit_of_a_script():
 def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
     """24 walls nest 1500 frames of the compiler; a script has 1000."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    walls = swarm.Scene(in_all_directions(MOST_WALLS)).chain()
+    walls = swarm.Scene(in_all_directions(MOST_WALLS)).walls()
     assert not _jit.kernel(takes_steps)(walls, Vec(0.0, 0.0, 0.0))
 
 

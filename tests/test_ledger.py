@@ -46,10 +46,10 @@ def _named(monkeypatch):
 
 @pytest.mark.usefixtures("_named")
 def test_the_time_of_all_runs_of_a_kind_counts():
-    for left in (8.0, 5.0, 2.0):
+    for remaining in (8.0, 5.0, 2.0):
         tier = tier_of("fly", "observe")
         assert tier.is_plain
-        assert tier.left == left
+        assert tier.remaining == remaining
         tier.spend(3.0)
     assert not tier_of("fly", "observe").is_plain
 
@@ -58,12 +58,12 @@ def test_the_time_of_all_runs_of_a_kind_counts():
 def test_other_kinds_have_time_of_their_own():
     tier_of("fly", "observe").spend(7.0)
     # What both need is missing for longer: it is compiled with what is used as long.
-    assert tier_of("other", "observe").left == 8.0
-    assert tier_of("fly").left == 1.0
+    assert tier_of("other", "observe").remaining == 8.0
+    assert tier_of("fly").remaining == 1.0
     # A run that meets another kind has no more time than it had.
     tier = tier_of("fly")
     tier.choose([("fly", ()), ("slide", ())])
-    assert tier.left == 1.0
+    assert tier.remaining == 1.0
 
 
 @pytest.mark.usefixtures("_named")
@@ -95,7 +95,7 @@ def test_the_next_process_compiles_at_once_what_was_worth_it(monkeypatch):
     assert not tier.is_plain
     monkeypatch.setattr(ledger, "_spent", {})
     assert not tier_of("fly", "observe").is_plain
-    assert tier_of("fly", "other").left == 8.0
+    assert tier_of("fly", "other").remaining == 8.0
 
 
 @pytest.mark.usefixtures("_named")
@@ -103,7 +103,7 @@ def test_the_next_process_compiles_at_once_what_was_worth_it(monkeypatch):
 def test_what_was_not_worth_it_is_not_remembered(choice):
     """Bodies, and functions whose last bit may differ, are compiled at once, whatever they cost."""
     tier = tier_of("fly", choice=choice)
-    tier.left = 0.0
+    tier.remaining = 0.0
     tier.choose([("fly", ())])
     assert not tier.is_plain
     assert not ledger.is_remembered(["fly"])

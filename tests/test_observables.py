@@ -35,7 +35,7 @@ def observe(law, scene, state, blocks=1):
     partial = np.zeros((-(-n // observables.CHUNK), observables.ROWS))
     size = len(partial) * observables.CHUNK if blocks == 1 else observables.CHUNK
     for k in reversed(range(1 if blocks == 1 else len(partial))):
-        observables.observe(law, scene.chain(), scene.pull(), state, np.array([k]), size, partial)
+        observables.observe(law, scene.walls(), scene.pull(), state, np.array([k]), size, partial)
     return observables.summary(partial, state, list(range(len(state.impulse))), True)
 
 
@@ -77,7 +77,7 @@ def test_energy_error_is_that_of_the_worst_particle(seen):
     faster[:, worst] *= 2.0
     after = observe(law, scene, state._replace(velocity=faster))
     m, kinetic = state.mass[worst], 0.5 * state.mass[worst] * (state.velocity[:, worst] ** 2).sum()
-    stored = call(observables.contact_energy, law, scene.chain(), 1.0, state.position[:, worst])
+    stored = call(observables.contact_energy, law, scene.walls(), 1.0, state.position[:, worst])
     scale = kinetic + stored + m * scene.finite_size() * np.abs(scene.gravity).sum()
     assert after["energy_error"] == pytest.approx(3.0 * kinetic / scale, rel=1e-12)
 
@@ -145,6 +145,6 @@ def test_penetration_is_the_depth_next_to_the_wall(name):
     surface = numbers_of(name)
     wall = wall_point(surface, np.array([0.3, 0.5, -0.4]))
     normal = np.array(call(surface.unit_normal, wall))
-    chain = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).chain()
-    assert call(observables.penetration, chain, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
-    assert call(observables.penetration, chain, wall - 1e-6 * normal) == 0.0
+    walls = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).walls()
+    assert call(observables.penetration, walls, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
+    assert call(observables.penetration, walls, wall - 1e-6 * normal) == 0.0

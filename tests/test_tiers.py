@@ -49,8 +49,8 @@ def assert_same_bits(monkeypatch, scene, method):
         run = Run(scene, start.copy(), method, 1, None, "auto")
         run.halt(passes)
         if not run.advance(span, 1.0):
-            run._tier.left = 0.0
-        assert end_of(run, span if run._tier.left == 0.0 else 0.0)[0] == plain[0]
+            run._tier.remaining = 0.0
+        assert end_of(run, span if run._tier.remaining == 0.0 else 0.0)[0] == plain[0]
 
 
 @pytest.mark.physics
@@ -104,7 +104,7 @@ def test_bodies_that_are_compiled_later_have_as_many_lanes(monkeypatch):
     compiled, later = made
     assert (compiled._tier.is_plain, later._tier.is_plain) == (False, True)
     assert compiled._rule.lanes > later._rule.lanes == 1
-    later._tier.left = 0.0
+    later._tier.remaining = 0.0
     later._choose_tier()
     assert later._rule.lanes == compiled._rule.lanes
 
@@ -112,8 +112,8 @@ def test_bodies_that_are_compiled_later_have_as_many_lanes(monkeypatch):
 @compiled_only
 def test_many_particles_are_compiled_at_once(monkeypatch):
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
-    for n, left in ((tiers._FEW, tiers._PATIENCE), (tiers._FEW + 1, 0.0)):
-        assert tiers.Tier("auto", (), n).left == left
+    for n, remaining in ((tiers._FEW, tiers._PATIENCE), (tiers._FEW + 1, 0.0)):
+        assert tiers.Tier("auto", (), n).remaining == remaining
 
 
 class Radius(NamedTuple):
@@ -145,7 +145,7 @@ def slope(p, x, y, z):
 def test_functions_of_a_library_are_called_in_one_tier_only(surface, method, same):
     """Their last bit may differ, and the result must not depend on the time at which a run changes its tier."""
     scene = swarm.Scene([surface])
-    assert tiers._same_bits((method.numbers(scene), method.law(), scene.chain())) == same
+    assert tiers._same_bits((method.numbers(scene), method.law(), scene.walls())) == same
 
 
 FOUND = """
@@ -187,14 +187,14 @@ def test_while_another_process_compiles_a_run_goes_on_in_plain_python(monkeypatc
     for waits in (True, False):
         monkeypatch.setattr(cache, "is_being_compiled", lambda *call, waits=waits: waits)
         tier = tiers.Tier("auto", (), 3)
-        tier.left = -1.0
+        tier.remaining = -1.0
         assert tier.choose([(None, ())]) is not waits
         assert tier.is_plain is waits
-        assert (tier.left > 0.0) is waits
+        assert (tier.remaining > 0.0) is waits
     # Not for ever, and never where plain Python has other bits or does too little.
     monkeypatch.setattr(cache, "is_being_compiled", lambda *call: True)
     tier = tiers.Tier("auto", (), 3)
-    tier.left, tier._latest = -1.0, 0.0
+    tier.remaining, tier._latest = -1.0, 0.0
     assert tier.choose([(None, ())])
     many = tiers.Tier("auto", (), 1_000_000)
     many.choose([(None, ())])

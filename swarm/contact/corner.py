@@ -23,7 +23,7 @@ class End(Record):
 
 
 @outlined
-def hold(form, law, multipliers, chain, step, reactions):
+def hold(form, law, multipliers, walls, step, reactions):
     """The end of one step against all walls.
 
     `multipliers` has one entry a wall, or is None; `reactions` (walls, 4) becomes c D (alpha Phi_mean + lambda), Phi1.
@@ -32,7 +32,7 @@ def hold(form, law, multipliers, chain, step, reactions):
     r = step.r
     for i in range(_SWEEPS):
         before = r
-        solved = _sweep(chain, form, law, multipliers, step, reactions)
+        solved = _sweep(walls, form, law, multipliers, step, reactions)
         r = step.r + (step.p - total(reactions))
         size, moved = max(largest(r), largest(step.p)), largest(r - before)
         if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * _EPSILON * size)):
@@ -57,16 +57,21 @@ def total(reactions):
 
 
 @outlined
-def _sweep(chain, form, law, multipliers, step, reactions):
+def _sweep(walls, form, law, multipliers, step, reactions):
     """Solve every wall once; whether all were solved."""
     solved = True
-    for k, wall in enumerate(chain.walls):
+    for k, wall in enumerate(walls.each):
         reactions[k] = 0.0
         remaining = Step(step.r, step.p - total(reactions), step.c)
         multiplier = None if multipliers is None else multipliers[k]
         found = reaction(form, law, multiplier, wall, remaining)
-        held = found.vector
-        reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = held.x, held.y, held.z, found.constraint
+        active = found.vector
+        reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = (
+            active.x,
+            active.y,
+            active.z,
+            found.constraint,
+        )
         solved = solved & found.solved
     return solved
 
@@ -79,7 +84,7 @@ def add_impulses(reactions, h, impulse, lane):
 
 
 @outlined
-def add_works(moving, chain, factor, reactions, impulse, lane):
+def add_works(moving, walls, factor, reactions, impulse, lane):
     """Add the work per mass of each wall, `factor` reaction.displacement, to its row of `impulse`; the sum.
 
     The rows of work are behind those of impulses; where no wall moves there are none.
@@ -87,7 +92,7 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
     found = 0.0
     if moving is None:
         return found
-    for k, wall in reversed(tuple(enumerate(chain.walls))):
+    for k, wall in reversed(tuple(enumerate(walls.each))):
         work = factor * dot(_reaction_of(reactions, k), wall.displacement())
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
@@ -95,8 +100,8 @@ def add_works(moving, chain, factor, reactions, impulse, lane):
 
 
 @outlined
-def constraints(chain, law, r, into):
+def constraints(walls, law, r, into):
     """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
-    for k, wall in enumerate(chain.walls):
+    for k, wall in enumerate(walls.each):
         start = contact_impulse.start_of(0.0, wall, r)
         into[k] = law.constraint(start.gap)

@@ -30,23 +30,23 @@ class Path(Record):
     h: Any
 
 
-def meets(chain, ends, held, path, near):
+def meets(walls, ends, active, path, near):
     """Whether a step may go deeper than `near` into a wall that does not hold the particle.
 
     `ends` are the walls at its end, which are others where they move.
     """
     found = False
-    for (number, wall), end in zip(chain.numbered(), ends.walls, strict=True):
+    for (number, wall), end in zip(walls.numbered(), ends.walls, strict=True):
         if isinstance(wall, Field):
-            here = _meets_one(wall.members, end.members, number, held, path, near)
+            here = _meets_one(wall.members, end.members, number, active, path, near)
         else:
-            here = _may_meet(wall, end, path, near) & (not held.has(number))
+            here = _may_meet(wall, end, path, near) & (not active.has(number))
         found = found | here
     return found
 
 
 @outlined
-def _meets_one(field, ends, number, held, path, near):
+def _meets_one(field, ends, number, active, path, near):
     """`meets` of the bodies of a field that has so many walls before it."""
     grid = members_of(field).grid
     # A step without a solution has no end.
@@ -58,7 +58,7 @@ def _meets_one(field, ends, number, held, path, near):
         for entry in range(grid.first[cell], grid.first[cell + 1]):
             m = float(grid.entries[entry])
             body, end = field.wall(m), ends.wall(m)
-            if (not held.has(number + m)) and _may_meet(body, end, path, near):
+            if (not active.has(number + m)) and _may_meet(body, end, path, near):
                 return True
     return False
 
@@ -120,15 +120,15 @@ class Arrival(Record):
     wall: float
 
 
-def arrival(chain, held, path, near, left):
+def arrival(walls, active, path, near, remaining):
     """The first wall that a step goes into, with so much of the frame left at its start [s]."""
-    if isinstance(chain, Carried):
-        return _arrival_later(chain, held, path, near, left)
+    if isinstance(walls, Carried):
+        return _arrival_later(walls, active, path, near, remaining)
     found = Arrival(math.inf, -1.0)
-    for number, wall in reversed(chain.numbered()):
+    for number, wall in reversed(walls.numbered()):
         if isinstance(wall, Field):
-            found = _first_of(wall.members, number, held, path, near, found)
-        elif not held.has(number):
+            found = _first_of(wall.members, number, active, path, near, found)
+        elif not active.has(number):
             time = _deep_after(_Still(wall), path, near)
             if time <= found.time:
                 found = Arrival(time, number)
@@ -136,7 +136,7 @@ def arrival(chain, held, path, near, left):
 
 
 @outlined
-def _first_of(members, number, held, path, near, later):
+def _first_of(members, number, active, path, near, later):
     """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
     grid, found = members.grid, later
     block = block_of_path(grid, path, near)
@@ -144,29 +144,29 @@ def _first_of(members, number, held, path, near, later):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
             m = grid.entries[entry]
-            if not held.has(number + m):
+            if not active.has(number + m):
                 time = _deep_after(_Still(member(members, index(m))), path, near)
                 if time < found.time or (time == found.time and number + m < found.wall):
                     found = Arrival(time, number + m)
     return found
 
 
-def _arrival_later(chain, held, path, near, left):
+def _arrival_later(walls, active, path, near, remaining):
     """`arrival` where some walls move."""
-    later, before = Arrival(math.inf, -1.0), chain.count_in_fields()
-    for i in range(chain.others().length()):
-        later = _sooner_at(chain, before + i, held, path, near, left, later)
-    if not chain.fields():
+    later, before = Arrival(math.inf, -1.0), walls.count_in_fields()
+    for i in range(walls.others().length()):
+        later = _sooner_at(walls, before + i, active, path, near, remaining, later)
+    if not walls.fields():
         return later
-    starts, ends = chain.at(left).fields(), chain.at(left - path.h).fields()
+    starts, ends = walls.at(remaining).fields(), walls.at(remaining - path.h).fields()
     for (number, field), (_number, end) in reversed(tuple(zip(starts, ends, strict=True))):
-        found = _arrival_among(field.members, end.members, chain, number, held, path, near, left)
+        found = _arrival_among(field.members, end.members, walls, number, active, path, near, remaining)
         later = found if found.time < later.time else later
     return later
 
 
 @outlined
-def _arrival_among(field, ends, chain, number, held, path, near, left):
+def _arrival_among(field, ends, walls, number, active, path, near, remaining):
     """`arrival` at the bodies of a field, which is `ends` at the end of the step."""
     found = Arrival(math.inf, -1.0)
     grid = members_of(field).grid
@@ -174,15 +174,15 @@ def _arrival_among(field, ends, chain, number, held, path, near, left):
     for k in range(size_of(block)):
         cell = index(in_block(grid, block, k))
         for entry in range(grid.first[cell], grid.first[cell + 1]):
-            found = _sooner_at(chain, number + grid.entries[entry], held, path, near, left, found)
+            found = _sooner_at(walls, number + grid.entries[entry], active, path, near, remaining, found)
     return found
 
 
-def _sooner_at(chain, wall, held, path, near, left, found):
+def _sooner_at(walls, wall, active, path, near, remaining, found):
     """The sooner one of an arrival and that at this wall."""
-    if held.has(wall):
+    if active.has(wall):
         return found
-    time = _deep_after(_Moving(chain, wall, left), path, near)
+    time = _deep_after(_Moving(walls, wall, remaining), path, near)
     if time < found.time:
         return Arrival(time, wall)
     return found
@@ -208,15 +208,15 @@ class _Still(Record):
 class _Moving(Record):
     """A wall that may move, by its number, with so much of the frame left at the start of the step [s]."""
 
-    chain: Any
+    walls: Any
     wall: float
-    left: float
+    remaining: float
 
     def depth(self, r, time):
-        return self.chain.at(self.left - time).distance(self.wall, r)
+        return self.walls.at(self.remaining - time).distance(self.wall, r)
 
     def pace_into(self, path):
-        start = self.chain.at(self.left)
+        start = self.walls.at(self.remaining)
         towards = path.v0 - start.velocity(self.wall, path.r0)
         return dot(start.unit_normal(self.wall, path.r0), towards)
 

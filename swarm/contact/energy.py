@@ -26,23 +26,23 @@ class Ends(Record):
     h: float
 
 
-def contact_energy(law, chain, over_mass, r):
+def contact_energy(law, walls, over_mass, r):
     """Energy per mass that one particle stores in the walls, by 1/mass; rigid walls (None) store none."""
     if law is None:
         return 0.0
     stored = 0.0
-    for wall in reversed(chain.walls):
+    for wall in reversed(walls.each):
         stored = law.stored_energy(wall.gap_of(wall.inner(r))) + stored
     return stored * over_mass
 
 
-def energy_uncertainty(chain, law, over_mass, r, s):
+def energy_uncertainty(walls, law, over_mass, r, s):
     """The change of the stored energy per mass when each coordinate of r moves by that of s, to first order.
 
     With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
     """
     found = 0.0
-    for surface in reversed(chain.walls):
+    for surface in reversed(walls.each):
         g = surface.gap_of(surface.inner(r))
         # 2 V/g, which is the force up to the factor (a + 1)/2
         force = law.stiffness(g) * select(g > 0.0, g, 0.0) * over_mass
@@ -50,13 +50,13 @@ def energy_uncertainty(chain, law, over_mass, r, s):
     return found
 
 
-def restored(law, chain, after, gravity, budget, ends):
+def restored(law, walls, after, gravity, budget, ends):
     """Factor of v after a contact step that restores the energy of the particle, and whether only round-off is missing.
 
     Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
     energy, and over many contacts the errors add up (measured: 2e-10 after 10 000 steps at dt sqrt(alpha/m) = 100).
     Where more than round-off is missing the factor is 1: that is an equation that was not solved, or a tolerance.
-    `chain` has the walls over the step, `after` those at its end.
+    `walls` has the walls over the step, `after` those at its end.
     """
     r0, r1, v, h = ends
     speed2 = square(v)
@@ -64,7 +64,7 @@ def restored(law, chain, after, gravity, budget, ends):
     missing = 2.0 * (budget.energy - potential(gravity, r1) - stored) - speed2
     # The magnitudes that set the round-off of the coordinates.
     s = absolute(r0) + absolute(r1) + h * absolute(v)
-    uncertainty = energy_uncertainty(chain, law, budget.over_mass, r0, s)
+    uncertainty = energy_uncertainty(walls, law, budget.over_mass, r0, s)
     uncertainty += energy_uncertainty(after, law, budget.over_mass, r1, s)
     uncertainty += speed2 + abs(budget.energy) + weight(gravity, s) + budget.force * total(s)
     balanced = abs(missing) <= _ROUND_OFF * uncertainty

@@ -37,7 +37,7 @@ class Particle(Record):
 
     r: Vec
     v: Vec
-    left: float
+    remaining: float
     twice: float
     scale2: float
 
@@ -83,49 +83,51 @@ def _loses(rules, wall):
 
 
 @outlined
-def _normal(chain, wall, r):
-    return chain.unit_normal(wall, r)
+def _normal(walls, wall, r):
+    return walls.unit_normal(wall, r)
 
 
 @outlined
-def _press(chain, wall, r, v, pull):
-    return chain.outward_acceleration(wall, r, v, pull)
+def _press(walls, wall, r, v, pull):
+    return walls.outward_acceleration(wall, r, v, pull)
 
 
 @outlined
-def _bounce(rules, chain, gravity, wall, p):
-    return exact(rules.laws, chain, gravity, wall, p.r, p.v, _energy(p.twice))
+def _bounce(rules, walls, gravity, wall, p):
+    return exact(rules.laws, walls, gravity, wall, p.r, p.v, _energy(p.twice))
 
 
 # --- From flight -----------------------------------------------------------------------------------------
 
 
 @outlined
-def enter(rules, chain, gravity, wall, p):
+def enter(rules, walls, gravity, wall, p):
     """`Next` of a particle that leaves this wall so slowly that it is back at once."""
-    n, u = _normal(chain, wall, p.r), wall_velocity(rules.laws.moving, chain, wall, p.r)
+    n, u = _normal(walls, wall, p.r), wall_velocity(rules.laws.moving, walls, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
     if dot(relative(u, v), n) > 0.0:
-        bounce = _bounce(rules, chain, gravity, wall, p)
+        bounce = _bounce(rules, walls, gravity, wall, p)
         v, twice, impulse = bounce.v, bounce.twice_energy, bounce.impulse
     away = -dot(relative(u, v), n)
     along = v + away * n
     flies = Next(FLYING, v, 0.0, twice, wall, impulse=impulse)
     pull, speed2 = accelerated(gravity, ZERO, 1.0), own_speed2(p)
-    press = _press(chain, wall, p.r, along, pull)
+    press = _press(walls, wall, p.r, along, pull)
     if not press > weightless(rules, gravity, p) or rules.laws.thermal_of(wall).is_hot():
         return flies
     hop = 2.0 * max(away, 0.0) / press
     short = hop < rules.shortest_flight if rules.shortest_flight > 0.0 else away <= GRAZING * math.sqrt(speed2)
     if not short:
         return flies
-    following = flights.first_hit(chain, gravity, p.r, v)
+    following = flights.first_hit(walls, gravity, p.r, v)
     if 0.0 <= following.wall != wall and following.time < hop:
         at = accelerated(gravity, v, following.time)
-        other = wall_velocity(rules.laws.moving, chain, following.wall, p.r)
-        towards = dot(_normal(chain, following.wall, p.r), relative(other, at))
+        other = wall_velocity(rules.laws.moving, walls, following.wall, p.r)
+        towards = dot(_normal(walls, following.wall, p.r), relative(other, at))
         if towards <= GRAZING * math.sqrt(speed2):
-            edge = _on_edge(rules, chain, gravity, Two(wall, following.wall), Particle(p.r, v, p.left, twice, p.scale2))
+            edge = _on_edge(
+                rules, walls, gravity, Two(wall, following.wall), Particle(p.r, v, p.remaining, twice, p.scale2)
+            )
             if edge.phase == EDGE:
                 return Next(EDGE, edge.v, edge.keep, edge.twice, wall, following.wall, impulse)
         if following.time <= _INSTANT * rules.size / math.sqrt(speed2):
@@ -150,16 +152,16 @@ def _kept(across, p):
 
 
 @outlined
-def _on_edge(rules, chain, gravity, two, p):
+def _on_edge(rules, walls, gravity, two, p):
     """`Next` of a particle in an edge: it slides there if both walls press on it."""
-    drift = hold.drift(rules.laws.moving, two, chain, p.r)
-    taken = two.split_at(chain, drift, p.r, p.v)
+    drift = hold.drift(rules.laws.moving, two, walls, p.r)
+    taken = two.split_at(walls, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
     stays = Next(FLYING, p.v, 0.0, p.twice, two.first)
     least = weightless(rules, gravity, p)
     if square(hold.edge(taken.n, taken.m)) < _SHARPEST * _SHARPEST:
         return stays
-    n, m = two.presses(chain, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
+    n, m = two.presses(walls, p.r, taken.along, accelerated(gravity, ZERO, 1.0))
     if not (n > least and m > least):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
@@ -179,44 +181,44 @@ def _across2(drift, v, taken):
 
 
 @outlined
-def meet(rules, held, chain, gravity, wall, p):
+def meet(rules, active, walls, gravity, wall, p):
     """`Next` of a sliding particle at another wall."""
-    bounce = _bounce(rules, chain, gravity, wall, p)
-    p, impulse = Particle(p.r, bounce.v, p.left, bounce.twice_energy, p.scale2), bounce.impulse
+    bounce = _bounce(rules, walls, gravity, wall, p)
+    p, impulse = Particle(p.r, bounce.v, p.remaining, bounce.twice_energy, p.scale2), bounce.impulse
     moving = rules.laws.moving
-    away = -dot(_normal(chain, wall, p.r), relative(wall_velocity(moving, chain, wall, p.r), p.v))
+    away = -dot(_normal(walls, wall, p.r), relative(wall_velocity(moving, walls, wall, p.r), p.v))
     slow = GRAZING * math.sqrt(own_speed2(p))
-    drift = hold.drift(moving, held, chain, p.r)
-    taken = held.split_at(chain, drift, p.r, p.v)
-    flies = Next(FLYING, p.v, 0.0, p.twice, held.first, impulse=impulse)
+    drift = hold.drift(moving, active, walls, p.r)
+    taken = active.split_at(walls, drift, p.r, p.v)
+    flies = Next(FLYING, p.v, 0.0, p.twice, active.first, impulse=impulse)
     if max(abs(taken.b), abs(taken.c)) > slow:
         return flies
     if away <= slow:
-        found = _at_rest_there(held, rules, chain, gravity, wall, p)
+        found = _at_rest_there(active, rules, walls, gravity, wall, p)
         if found.phase != FLYING:
             return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse)
     across2, kept2 = _across2(drift, p.v, taken)
     keep, twice = _kept(math.sqrt(kept2), p), p.twice
-    if _loses(rules, held.first):
+    if _loses(rules, active.first):
         keep, twice = 0.0, p.twice - across2
-    return Next(EDGE if held.second >= 0.0 else HELD, taken.along, keep, twice, held.first, held.second, impulse)
+    return Next(EDGE if active.second >= 0.0 else HELD, taken.along, keep, twice, active.first, active.second, impulse)
 
 
-def _at_rest_there(held, rules, chain, gravity, wall, p):
+def _at_rest_there(active, rules, walls, gravity, wall, p):
     """`Next` where a particle is too slow to leave the other wall: an edge, or that wall alone."""
-    if isinstance(held, Two):
+    if isinstance(active, Two):
         return Next(CAREFUL, p.v, 0.0, p.twice, wall)
-    edge = _on_edge(rules, chain, gravity, Two(held.first, wall), p)
+    edge = _on_edge(rules, walls, gravity, Two(active.first, wall), p)
     if edge.phase == EDGE:
         return edge
-    pull, n = accelerated(gravity, ZERO, 1.0), _normal(chain, wall, p.r)
+    pull, n = accelerated(gravity, ZERO, 1.0), _normal(walls, wall, p.r)
     moving = rules.laws.moving
-    away = -dot(n, relative(wall_velocity(moving, chain, wall, p.r), p.v))
+    away = -dot(n, relative(wall_velocity(moving, walls, wall, p.r), p.v))
     along = p.v + away * n
-    if not _press(chain, wall, p.r, along, pull) > weightless(rules, gravity, p):
+    if not _press(walls, wall, p.r, along, pull) > weightless(rules, gravity, p):
         return edge
-    drawn = sliding.force(NONE, One(wall), chain, gravity, p.r, along).acceleration
-    if dot(_normal(chain, held.first, p.r), drawn) > 0.0:
+    drawn = sliding.force(NONE, One(wall), walls, gravity, p.r, along).acceleration
+    if dot(_normal(walls, active.first, p.r), drawn) > 0.0:
         return edge
     keep, twice = _kept(away, p), p.twice
     if _loses(rules, wall):
@@ -225,20 +227,20 @@ def _at_rest_there(held, rules, chain, gravity, wall, p):
 
 
 @outlined
-def careful(rules, chain, gravity, wall, p, impulse):
+def careful(rules, walls, gravity, wall, p, impulse):
     """A short step of a particle that several walls hold, as a `Landing`. Adds to impulse[:, 0]."""
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
     contacts = touching.Contacts(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
-        contacts, chain, gravity, wall, touching.Moving(p.r, p.v, p.left), _energy(p.twice), impulse, 0
+        contacts, walls, gravity, wall, touching.Moving(p.r, p.v, p.remaining), _energy(p.twice), impulse, 0
     )
 
 
 @outlined
-def settles(rules, chain, gravity, p, held):
-    """Whether a slow particle is where several walls carry its weight together; `held` is of `are_carried`."""
+def settles(rules, walls, gravity, p, active):
+    """Whether a slow particle is where several walls carry its weight together; `active` is of `are_carried`."""
     slow = square(p.v) <= GRAZING * GRAZING * own_speed2(p)
-    return slow and touching.are_carried(chain, gravity, p.r, p.v, TOUCH * rules.size, held)
+    return slow and touching.are_carried(walls, gravity, p.r, p.v, TOUCH * rules.size, active)
 
 
 def rests(gravity, force):
@@ -247,11 +249,11 @@ def rests(gravity, force):
 
 
 @outlined
-def off_the_wall(chain, wall, r, v, u):
+def off_the_wall(walls, wall, r, v, u):
     """A velocity along a wall that lets the particle go, leaning away from it by more than round-off.
 
     u is the velocity of the wall, or None.
     """
-    n = _normal(chain, wall, r)
+    n = _normal(walls, wall, r)
     b, least = dot(relative(u, v), n), 4.0 * _EPSILON * norm(v)
     return v - (b + least) * n if abs(b) <= least else v

@@ -16,10 +16,10 @@ def strength(law, surface, q):
     return select(g > 0.0, push * slope, 0.0)
 
 
-def force(chain, law, r):
+def force(walls, law, r):
     """The force of all walls [N]."""
     found = ZERO
-    for wall in reversed(chain.walls):
+    for wall in reversed(walls.each):
         found = _added(found, wall, law, r)
     return found
 
@@ -33,32 +33,32 @@ def _added(others, surface, law, r):
 
 
 @outlined
-def add_impulses(chain, law, factor, r, impulse, lane):
+def add_impulses(walls, law, factor, r, impulse, lane):
     """Add `factor` times the magnitude of the force of each wall to impulse[wall, lane]."""
-    for k, wall in enumerate(chain.walls):
+    for k, wall in enumerate(walls.each):
         f = strength(law, wall, wall.inner(r))
         if f != 0.0:
             impulse[k, lane] += factor * abs(f) * norm(wall.discrete_gradient(r, r))
 
 
-def work(moving, chain, now, law, r):
-    """The sum of force.displacement of all walls: `chain` has them over the step, `now` when the particle is at r."""
+def work(moving, walls, now, law, r):
+    """The sum of force.displacement of all walls: `walls` has them over the step, `now` when the particle is at r."""
     found = 0.0
     if moving is None:
         return found
-    for over, wall in reversed(tuple(zip(chain.walls, now.walls, strict=True))):
+    for over, wall in reversed(tuple(zip(walls.each, now.walls, strict=True))):
         found = dot(_added(ZERO, wall, law, r), over.displacement()) + found
     return found
 
 
 @outlined
-def add_works(moving, chain, now, law, factor, r, impulse, lane):
+def add_works(moving, walls, now, law, factor, r, impulse, lane):
     """Add `factor` times force.displacement of each wall to its row of work in `impulse`: their sum, as `work`."""
     found = 0.0
     if moving is None:
         return found
-    count = chain.length()
-    for k, (over, wall) in reversed(tuple(enumerate(zip(chain.walls, now.walls, strict=True)))):
+    count = walls.length()
+    for k, (over, wall) in reversed(tuple(enumerate(zip(walls.each, now.walls, strict=True)))):
         here = factor * dot(_added(ZERO, wall, law, r), over.displacement())
         impulse[count + k, lane] += here
         found = here + found

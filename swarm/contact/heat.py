@@ -30,13 +30,13 @@ class Left(Record):
 
 
 @outlined
-def exchange(laws, chain, wall, arriving, mass, draw):
+def exchange(laws, walls, wall, arriving, mass, draw):
     """`Left` of a particle that is `arriving` at a thermal wall with (r, v)."""
     law = laws.thermal_of(wall)
     r, v = arriving
-    n = chain.unit_normal(wall, r)
+    n = walls.unit_normal(wall, r)
     u = uniforms(draw.seed, draw.particle, draw.number)
-    moving = wall_velocity(laws.moving, chain, wall, r)
+    moving = wall_velocity(laws.moving, walls, wall, r)
     before, after = relative(moving, v), flux_maxwellian(n, law.energy / mass, u)
     b, happens = dot(before, n), u.choice < law.accommodation
     work = given(moving, after - before)

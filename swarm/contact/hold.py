@@ -38,23 +38,23 @@ class Holding(Record):
             found = found | (wall == one)
         return found
 
-    def project(self: Any, chain, r):
+    def project(self: Any, walls, r):
         """A point within round-off of the walls, moved onto them."""
         for one in reversed(self):
-            r = chain.project(one, r)
+            r = walls.project(one, r)
         return r
 
-    def split(self: Any, chain, drift, r0, r1, w):
+    def split(self: Any, walls, drift, r0, r1, w):
         """`Held` of a velocity, with the normals of a step from r0 to r1."""
-        return self.parts(drift, w, *(chain.step_normal(one, r0, r1) for one in self))
+        return self.parts(drift, w, *(walls.step_normal(one, r0, r1) for one in self))
 
-    def split_at(self: Any, chain, drift, r, w):
+    def split_at(self: Any, walls, drift, r, w):
         """`Held` of a velocity at a point."""
-        return self.parts(drift, w, *(chain.unit_normal(one, r) for one in self))
+        return self.parts(drift, w, *(walls.unit_normal(one, r) for one in self))
 
-    def along(self, chain, drift, r0, r1, w):
+    def along(self, walls, drift, r0, r1, w):
         """The part P of `split` alone."""
-        return self.split(chain, drift, r0, r1, w).along
+        return self.split(walls, drift, r0, r1, w).along
 
 
 class One(Holding):
@@ -74,18 +74,18 @@ class One(Holding):
         b = _towards(drift, w, n)
         return Held(w - b * n, n, b, ZERO, 0.0)
 
-    def along(self, chain, drift, r0, r1, w):
+    def along(self, walls, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
-        g = chain.discrete_gradient(self.first, r0, r1)
+        g = walls.discrete_gradient(self.first, r0, r1)
         return w - (_towards(drift, w, g) / square(g)) * g
 
     def inward(self, n, m):
         """The unit vector away from the walls."""
         return -1.0 * n
 
-    def presses(self, chain, r, v, pull):
+    def presses(self, walls, r, v, pull):
         """The pressures of the walls on a particle that slides with this velocity, per mass: (first, second)."""
-        return chain.outward_acceleration(self.first, r, v, pull), 0.0
+        return walls.outward_acceleration(self.first, r, v, pull), 0.0
 
     def lets_go(self, n, m):
         """Whether a wall no longer presses."""
@@ -118,10 +118,10 @@ class Two(Holding):
         k = n + m
         return k * (-1.0 / math.sqrt(square(k)))
 
-    def presses(self, chain, r, v, pull):
+    def presses(self, walls, r, v, pull):
         """The pressures of the walls on it, per mass: (first, second)."""
-        one, other = (chain.outward_acceleration(wall, r, v, pull) for wall in self)
-        n, m = (chain.unit_normal(wall, r) for wall in self)
+        one, other = (walls.outward_acceleration(wall, r, v, pull) for wall in self)
+        n, m = (walls.unit_normal(wall, r) for wall in self)
         cosine, inverse = dot(n, m), _inverse(square(edge(n, m)))
         return (one - cosine * other) * inverse, (other - cosine * one) * inverse
 
@@ -141,19 +141,19 @@ class Three(Holding):
 # --- Their motion: None where no wall of the scene moves -------------------------------------------------
 
 
-def drift(moving, held, chain, r):
+def drift(moving, active, walls, r):
     """`Drift` at a point."""
     if moving is None:
         return None
-    return Drift(chain.velocity(held.first, r), chain.velocity(max(held.second, 0.0), r))
+    return Drift(walls.velocity(active.first, r), walls.velocity(max(active.second, 0.0), r))
 
 
-def mean_drift(moving, held, chain, r0, r1, h):
+def mean_drift(moving, active, walls, r0, r1, h):
     """`Drift` in the mean of a step from r0 to r1 of length h."""
     if moving is None:
         return None
-    other = max(held.second, 0.0)
-    return Drift(chain.mean_velocity(held.first, r0, r1, h), chain.mean_velocity(other, r0, r1, h))
+    other = max(active.second, 0.0)
+    return Drift(walls.mean_velocity(active.first, r0, r1, h), walls.mean_velocity(other, r0, r1, h))
 
 
 def given_by_second(drift, taken):

@@ -54,20 +54,20 @@ def _improve(surface, law, r, c, kappa):
     return step, pushes & (not (abs(step) <= _TOLERANCE * abs(kappa)))
 
 
-def guess(chain, wall, *given):
+def guess(walls, wall, *given):
     """`_guess` of a wall."""
-    return chain.of(wall, 0.0, _guess, *given)
+    return walls.of(wall, 0.0, _guess, *given)
 
 
-def improve(chain, wall, *given):
+def improve(walls, wall, *given):
     """`_improve` of a wall."""
-    return chain.of(wall, (0.0, False), _improve, *given)
+    return walls.of(wall, (0.0, False), _improve, *given)
 
 
-def reached(chain, wall, r, kappa):
+def reached(walls, wall, r, kappa):
     """s; r where there is no such wall."""
     end = r
-    for k, one in reversed(tuple(enumerate(chain.walls))):
+    for k, one in reversed(tuple(enumerate(walls.each))):
         end = select(wall == k, one.resolve(r, kappa), end)
     return end
 

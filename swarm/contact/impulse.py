@@ -252,11 +252,11 @@ def _improve(surface, law, multiplier, step, kappa):
     return equation(law, multiplier, surface, step).newton(kappa)
 
 
-def guess(chain, wall, *given):
+def guess(walls, wall, *given):
     """`_guess` of a wall."""
-    return chain.of(wall, 0.0, _guess, *given)
+    return walls.of(wall, 0.0, _guess, *given)
 
 
-def improve(chain, wall, *given):
+def improve(walls, wall, *given):
     """`_improve` of a wall."""
-    return chain.of(wall, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)), _improve, *given)
+    return walls.of(wall, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)), _improve, *given)

@@ -21,29 +21,29 @@ _PARALLEL = 1e-7
 
 
 @outlined
-def _lets_out(openings, rules, chain, wall, r, near):
+def _lets_out(openings, rules, walls, wall, r, near):
     """Whether a wall that a particle is on lets it out: it is open there, and no closed wall lies on it."""
     if not is_open(openings, wall, r, near):
         return False
-    return not _is_covered(openings, rules, chain, wall, r, near)
+    return not _is_covered(openings, rules, walls, wall, r, near)
 
 
 @outlined
-def _is_covered(openings, rules, chain, wall, r, near):
+def _is_covered(openings, rules, walls, wall, r, near):
     """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
-    number = numbers_near(chain, r)
-    touch, n = TOUCH * rules.size + near, chain.unit_normal(wall, r)
+    number = numbers_near(walls, r)
+    touch, n = TOUCH * rules.size + near, walls.unit_normal(wall, r)
     for i in range(number.size):
-        m = chain.unit_normal(number[i], r)
+        m = walls.unit_normal(number[i], r)
         alike = dot(n, m) > 0.0 and square(cross(n, m)) <= _PARALLEL * _PARALLEL
-        here = alike and abs(chain.distance(number[i], r)) <= touch
+        here = alike and abs(walls.distance(number[i], r)) <= touch
         if here and number[i] != wall and not is_open(openings, number[i], r, near):
             return True
     return False
 
 
 @outlined
-def hit_wall(openings, rules, chain, motion, wall, near):
+def hit_wall(openings, rules, walls, motion, wall, near):
     """The wall that a particle (r, v) hits that has reached this one: where this is open, a closed one at the place.
 
     Of several closed ones it is the one that it reaches first.
@@ -52,11 +52,11 @@ def hit_wall(openings, rules, chain, motion, wall, near):
     if not is_open(openings, wall, r, near):
         return wall
     moving, touch = rules.laws.moving, TOUCH * rules.size + near
-    number = numbers_near(chain, r)
+    number = numbers_near(walls, r)
     found, soonest = wall, math.inf
     for i in range(number.size):
-        w = relative(wall_velocity(moving, chain, number[i], r), v)
-        towards, distance = dot(chain.unit_normal(number[i], r), w), chain.distance(number[i], r)
+        w = relative(wall_velocity(moving, walls, number[i], r), v)
+        towards, distance = dot(walls.unit_normal(number[i], r), w), walls.distance(number[i], r)
         # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
         here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
         if here and -distance < soonest * towards and not is_open(openings, number[i], r, near):
@@ -65,21 +65,21 @@ def hit_wall(openings, rules, chain, motion, wall, near):
 
 
 @outlined
-def open_wall_of(openings, rules, chain, held, r, near):
+def open_wall_of(openings, rules, walls, active, r, near):
     """The wall of those that hold a particle that lets it out at its place, or nearer to that than `near`; or -1."""
-    if _lets_out(openings, rules, chain, held.first, r, near):
-        return held.first
-    return held.second if _lets_out(openings, rules, chain, held.second, r, near) else -1.0
+    if _lets_out(openings, rules, walls, active.first, r, near):
+        return active.first
+    return active.second if _lets_out(openings, rules, walls, active.second, r, near) else -1.0
 
 
 @outlined
-def open_wall_at(openings, rules, chain, r, near):
+def open_wall_at(openings, rules, walls, r, near):
     """A wall at a place that lets out there, or -1."""
     if openings is None:
         return -1.0
-    number, touch = numbers_near(chain, r), TOUCH * rules.size
+    number, touch = numbers_near(walls, r), TOUCH * rules.size
     for i in range(number.size):
-        if chain.distance(number[i], r) >= -touch and _lets_out(openings, rules, chain, number[i], r, near):
+        if walls.distance(number[i], r) >= -touch and _lets_out(openings, rules, walls, number[i], r, near):
             return number[i]
     return -1.0
 
@@ -92,14 +92,14 @@ def _reach(path):
     return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
-def may_pass(openings, held, path):
+def may_pass(openings, active, path):
     """Whether a step may come into an opening of a wall that holds the particle."""
     found, reach = False, _reach(path)
     for opening in openings or ():
         enters = False
         for volume in opening.volumes:
             enters = enters | _may_enter(volume, path, reach)
-        found = found | ((opening.is_of(held.first) | opening.is_of(held.second)) & enters)
+        found = found | ((opening.is_of(active.first) | opening.is_of(active.second)) & enters)
     return found
 
 
@@ -121,30 +121,30 @@ def _may_enter_one(members, path, reach):
     return False
 
 
-def part_until_open(openings, rules, chain, held, path, near):
+def part_until_open(openings, rules, walls, active, path, near):
     """The part of a step after which a wall that holds the particle lets it out, deeper than `near`; else infinite."""
     if openings is None:
         return math.inf
-    first = _part_uncovered(openings, rules, chain, held.first, path, near)
-    return min(first, _part_uncovered(openings, rules, chain, held.second, path, near))
+    first = _part_uncovered(openings, rules, walls, active.first, path, near)
+    return min(first, _part_uncovered(openings, rules, walls, active.second, path, near))
 
 
 @outlined
-def _part_uncovered(openings, rules, chain, wall, path, near):
+def _part_uncovered(openings, rules, walls, wall, path, near):
     """`part_until_open` of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
     low = _part(openings, wall, path, near)
-    if not low < math.inf or not _is_covered(openings, rules, chain, wall, at_part(path, low), near):
+    if not low < math.inf or not _is_covered(openings, rules, walls, wall, at_part(path, low), near):
         return low
     for k in range(1, _PLACES + 1):
         high = k / _PLACES
-        if high > low and _lets_out_at(openings, rules, chain, wall, path, near, high):
-            return bisected(_lets_out_at, (openings, rules, chain, wall, path, near), low, high)
+        if high > low and _lets_out_at(openings, rules, walls, wall, path, near, high):
+            return bisected(_lets_out_at, (openings, rules, walls, wall, path, near), low, high)
         low = max(low, high)
     return math.inf
 
 
-def _lets_out_at(openings, rules, chain, wall, path, near, part):
-    return _lets_out(openings, rules, chain, wall, at_part(path, part), near)
+def _lets_out_at(openings, rules, walls, wall, path, near, part):
+    return _lets_out(openings, rules, walls, wall, at_part(path, part), near)
 
 
 def _part(openings, wall, path, near):

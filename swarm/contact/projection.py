@@ -20,7 +20,7 @@ class Touch(Record):
     number: Any  # of the wall
     touched: Any  # whether it is
     normal: Any  # (3, walls): unit normal of the step
-    held: Any  # the part of the velocity that the wall takes
+    active: Any  # the part of the velocity that the wall takes
     depth: Any  # signed distance outside
     frame: Any  # None, or a velocity with which they move along their normals
 
@@ -35,13 +35,13 @@ class Edge(Record):
 
 
 @outlined
-def project(touched, normal, held, w):
+def project(touched, normal, active, w):
     """The nearest vector u to w with n.u <= 0 for the touched walls; w - u = sum of held n, held >= 0.
 
     `normal` (3, walls) has their unit normals. At most three walls carry: one, then an edge of two, then a corner.
     """
     count = touched.size
-    held[:] = 0.0
+    active[:] = 0.0
     near = ALLOWED * norm(w)
     if _allowed(touched, normal, w, near):
         return w
@@ -50,16 +50,16 @@ def project(touched, normal, held, w):
         if touched[i] and b > 0.0:
             u = w - b * column(normal, 0, i)
             if _allowed(touched, normal, u, near):
-                held[i] = b
+                active[i] = b
                 return u
     for i in range(count):
         for j in range(i):
             if touched[i] and touched[j]:
                 u, p, q = _on_edge(normal, i, j, w)
                 if p >= 0.0 and q >= 0.0 and _allowed(touched, normal, u, near):
-                    held[i], held[j] = p, q
+                    active[i], active[j] = p, q
                     return u
-    _carried(touched, normal, held, w)
+    _carried(touched, normal, active, w)
     return ZERO
 
 
@@ -107,7 +107,7 @@ def _edge(normal, i, j):
 
 
 @outlined
-def _carried(touched, normal, held, w):
+def _carried(touched, normal, active, w):
     """The part of w that each wall of a corner takes: the first three that carry it."""
     count = touched.size
     for i in range(count):
@@ -122,7 +122,7 @@ def _carried(touched, normal, held, w):
                     r = dot(w, e) / steepness
                     _u, p, q = _on_edge(normal, i, j, w - r * column(normal, 0, k))
                     if p >= 0.0 and q >= 0.0 and r >= 0.0:
-                        held[i], held[j], held[k] = p, q, r
+                        active[i], active[j], active[k] = p, q, r
                         return
 
 
@@ -130,12 +130,12 @@ def _carried(touched, normal, held, w):
 
 
 @outlined
-def velocity_along(chain, touch, r, w, h):
+def velocity_along(walls, touch, r, w, h):
     """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
     u, r1 = ZERO, r
     for _sweep in range(_SWEEPS):
-        put_normals(chain, touch, touch.touched, r, r1)
-        u = project(touch.touched, touch.normal, touch.held, w)
+        put_normals(walls, touch, touch.touched, r, r1)
+        u = project(touch.touched, touch.normal, touch.active, w)
         before, r1 = r1, r + h * u
         if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
             break
@@ -143,18 +143,18 @@ def velocity_along(chain, touch, r, w, h):
 
 
 @outlined
-def put_normals(chain, touch, which, r0, r1):
+def put_normals(walls, touch, which, r0, r1):
     """The unit vector along the discrete gradient of each of these walls, out of the admissible side, into `touch`."""
     for i in range(which.size):
         if which[i]:
-            put(touch.normal, 0, i, _normal(chain, touch.number[i], r0, r1))
+            put(touch.normal, 0, i, _normal(walls, touch.number[i], r0, r1))
 
 
 @outlined
-def _normal(chain, wall, r0, r1):
+def _normal(walls, wall, r0, r1):
     """The unit vector along the discrete gradient of a wall, out of the admissible side."""
-    n = chain.unit_normal(wall, r0)
-    d = chain.discrete_gradient(wall, r0, r1)
+    n = walls.unit_normal(wall, r0)
+    d = walls.discrete_gradient(wall, r0, r1)
     length = norm(d)
     if dot(d, n) < 0.0:
         length = -length

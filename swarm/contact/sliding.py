@@ -51,11 +51,11 @@ NEEDS = (
 # --- Friction --------------------------------------------------------------------------------------------
 
 
-def _grip(friction, held, presses):
+def _grip(friction, active, presses):
     """sum mu b, where a wall presses with b"""
     b, c = presses
-    first = of_wall(friction, held.first) * b
-    return first + (of_wall(friction, held.second) * c if isinstance(held, Two) else 0.0)
+    first = of_wall(friction, active.first) * b
+    return first + (of_wall(friction, active.second) * c if isinstance(active, Two) else 0.0)
 
 
 class Slowed(Record):
@@ -65,7 +65,7 @@ class Slowed(Record):
     lost: float
 
 
-def slow(friction, held, chain, gravity, r, motion, h):
+def slow(friction, active, walls, gravity, r, motion, h):
     """The velocity after a time h of friction alone; `motion` is (v, the direction in which the particle slides, u).
 
     u is the velocity of the wall, or None; the direction is relative to it, as the speed is.
@@ -82,7 +82,7 @@ def slow(friction, held, chain, gravity, r, motion, h):
     moving = speed > 0.0
     sign = select(dot(slip, towards) < 0.0, -1.0, 1.0)
     direction = either(moving, slip * (sign / select(moving, speed, 1.0)), towards)
-    k, linear, c = _force_of_speed(friction, held, chain, gravity, r, (direction, speed, u))
+    k, linear, c = _force_of_speed(friction, active, walls, gravity, r, (direction, speed, u))
     # s1 = 2 s - s0 with s = s0 - h/2 (k s^2 + l s + c)
     a, b = 0.5 * h * k, sign * speed - 0.5 * h * c
     one = 1.0 + 0.5 * h * linear
@@ -92,17 +92,17 @@ def slow(friction, held, chain, gravity, r, motion, h):
     return Slowed(v + (s1 - s0) * direction, s0 * s0 - s1 * s1)
 
 
-def _force_of_speed(friction, held, chain, gravity, r, slip):
+def _force_of_speed(friction, active, walls, gravity, r, slip):
     """(k, l, c) of the force of friction, k s^2 + l s + c; `slip` is (its direction, its speed, u)."""
     direction, speed, u = slip
     pull = accelerated(gravity, ZERO, 1.0)
     if u is None:
-        k = _grip(friction, held, held.presses(chain, r, direction, ZERO))
-        return k, 0.0, _grip(friction, held, held.presses(chain, r, ZERO, pull))
+        k = _grip(friction, active, active.presses(walls, r, direction, ZERO))
+        return k, 0.0, _grip(friction, active, active.presses(walls, r, ZERO, pull))
     step = select(speed > 0.0, speed, 1.0)
-    none = _grip(friction, held, held.presses(chain, r, u, pull))
-    ahead = _grip(friction, held, held.presses(chain, r, u + step * direction, pull))
-    back = _grip(friction, held, held.presses(chain, r, u - step * direction, pull))
+    none = _grip(friction, active, active.presses(walls, r, u, pull))
+    ahead = _grip(friction, active, active.presses(walls, r, u + step * direction, pull))
+    back = _grip(friction, active, active.presses(walls, r, u - step * direction, pull))
     # A force that is negative is none: the wall lets go.
     k, slope = 0.5 * (ahead + back) - none, 0.5 * (ahead - back)
     return k / (step * step), slope / step, none
@@ -128,17 +128,17 @@ class Force(Record):
     m: float
 
 
-def force(laws, held, chain, gravity, r, v):
+def force(laws, active, walls, gravity, r, v):
     """The `Force` on a particle that slides with this velocity along the walls."""
     pull, moving, friction = accelerated(gravity, ZERO, 1.0), laws.moving, laws.friction
-    n, m = held.presses(chain, r, v, pull)
-    taken = held.split_at(chain, None, r, v)
+    n, m = active.presses(walls, r, v, pull)
+    taken = active.split_at(walls, None, r, v)
     a = pull - n * taken.n - m * taken.m
     if friction is None:
         return Force(a, n, m)
-    slip = relative(wall_velocity(moving, chain, held.first, r), v)
-    drive = relative(None if moving is None else chain.acceleration(held.first, r), a)
-    return Force(a - _drag(_grip(friction, held, (n, m)), slip, drive), n, m)
+    slip = relative(wall_velocity(moving, walls, active.first, r), v)
+    drive = relative(None if moving is None else walls.acceleration(active.first, r), a)
+    return Force(a - _drag(_grip(friction, active, (n, m)), slip, drive), n, m)
 
 
 def _drag(grip, v, a):
@@ -178,10 +178,10 @@ class Swept(Record):
     moves: bool
 
 
-def sweep(moving, held, chain, h, step, still):
+def sweep(moving, active, walls, h, step, still):
     """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
-    end = r0 + h * held.along(chain, mean_drift(moving, held, chain, r0, r1, h), r0, r1, w)
+    end = r0 + h * active.along(walls, mean_drift(moving, active, walls, r0, r1, h), r0, r1, w)
     return Swept(end, not (total(absolute(end - r1)) <= still))
 
 

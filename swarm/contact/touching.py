@@ -48,7 +48,7 @@ class Moving(Record):
 
     r: Vec
     v: Vec
-    left: float
+    remaining: float
 
 
 class Landing(Record):
@@ -61,27 +61,27 @@ class Landing(Record):
 
 
 @outlined
-def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
+def impact(method, walls, gravity, wall, flight, energy, impulse, lane):
     """One impact of one particle on `wall` after a short flight.
 
     Adds to impulse[:, lane] what each wall gives, then, where that has rows, the work per mass of each. If the next
     flight would be shorter than the shortest too, the particle slides for that time instead.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
-    carried, chain = chain, chain.at(flight.left)
-    given, work = scratch(chain.length(), np.float64), scratch(chain.length(), np.float64)
+    carried, walls = walls, walls.at(flight.remaining)
+    given, work = scratch(walls.length(), np.float64), scratch(walls.length(), np.float64)
     w, now, met = v, energy, wall
     for _blow in range(_BLOWS):
-        bounce = reflection.exact(method.laws, chain, gravity, met, r, w, now)
+        bounce = reflection.exact(method.laws, walls, gravity, met, r, w, now)
         w, now = bounce.v, reflection.Energy(bounce.twice_energy, half_inverse)
-        given[chain.row(met)] += bounce.impulse
-        work[chain.row(met)] += 0.5 * bounce.work
-        following = flights.first_hit(chain, gravity, r, w)
+        given[walls.row(met)] += bounce.impulse
+        work[walls.row(met)] += 0.5 * bounce.work
+        following = flights.first_hit(walls, gravity, r, w)
         if following.time >= method.shortest or following.wall < 0.0:
-            row = chain.row(wall)
+            row = walls.row(wall)
             end = reflection.Stepped(r, w, 0.0, given[row])
             if method.contact_step is not None and met == wall:
-                end = reflection.contact(method.contact_step, chain, gravity, wall, r, v, flight.left, now)
+                end = reflection.contact(method.contact_step, walls, gravity, wall, r, v, flight.remaining, now)
                 given[row] = end.impulse
             for i in range(given.size):
                 impulse[i, lane] += given[i]
@@ -95,27 +95,27 @@ def impact(method, chain, gravity, wall, flight, energy, impulse, lane):
 
 
 @outlined
-def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
+def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
     laws, r, moving = method.laws, flight.r, method.laws.moving
-    carried, chain = chain, chain.at(flight.left)
-    number = numbers_near(chain, r)
+    carried, walls = walls, walls.at(flight.remaining)
+    number = numbers_near(walls, r)
     count = number.size
     touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
-    _depths(chain, number, r, depth)
+    _depths(walls, number, r, depth)
     for i in range(count):
         touched[i] = depth[i] >= -method.touch or number[i] == wall
-    normal, held, given = scratch((3, count), np.float64), scratch(count, np.float64), scratch(count, np.float64)
-    frame = None if moving is None else _frame_of(chain, number, touched, r)
-    touch = Touch(number, touched, normal, held, depth, frame)
-    v, twice_energy = _landed(laws, chain, touch, given, r, relative(frame, flight.v), energy.twice)
-    straight = moving is None and _goes_straight(chain, gravity, touch, r, v)
-    h = flight.left if straight else min(method.shortest, flight.left)
-    u, h = _unhindered(chain, gravity, touch, r, v, h, method.touch)
+    normal, active, given = scratch((3, count), np.float64), scratch(count, np.float64), scratch(count, np.float64)
+    frame = None if moving is None else _frame_of(walls, number, touched, r)
+    touch = Touch(number, touched, normal, active, depth, frame)
+    v, twice_energy = _landed(laws, walls, touch, given, r, relative(frame, flight.v), energy.twice)
+    straight = moving is None and _goes_straight(walls, gravity, touch, r, v)
+    h = flight.remaining if straight else min(method.shortest, flight.remaining)
+    u, h = _unhindered(walls, gravity, touch, r, v, h, method.touch)
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
     u = from_relative(frame, u)
     if moves(u):
-        r = _settled(carried.at(flight.left - h), wall, touch, r + h * u)
+        r = _settled(carried.at(flight.remaining - h), wall, touch, r + h * u)
     w = from_relative(frame, w)
     if moving is not None:
         # Walls do work.
@@ -124,46 +124,46 @@ def _slide(method, chain, gravity, wall, flight, energy, impulse, lane):
     half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
     w = reflection.restore(gravity, w, speed2, half_inverse)
     for i in range(count):
-        taken = given[i] + 2.0 * touch.held[i]
-        row, behind = chain.row(number[i]), chain.length()
+        taken = given[i] + 2.0 * touch.active[i]
+        row, behind = walls.row(number[i]), walls.length()
         impulse[row, lane] += taken
         if moving is not None and impulse.shape[0] > behind:
             gained = -taken * column(normal, 0, i)
-            impulse[behind + row, lane] += dot(gained, chain.velocity(number[i], flight.r))
+            impulse[behind + row, lane] += dot(gained, walls.velocity(number[i], flight.r))
     return Landing(r, w, h, twice_energy)
 
 
 @outlined
-def _frame_of(chain, number, touched, r):
+def _frame_of(walls, number, touched, r):
     """A velocity with which all touched walls move along their normals."""
     u = ZERO
     # One wall after the other, as in Kaczmarz' method
     for _sweep in range(_SWEEPS):
         for i in range(touched.size):
             if touched[i]:
-                n = chain.unit_normal(number[i], r)
-                u = u + dot(chain.velocity(number[i], r) - u, n) * n
+                n = walls.unit_normal(number[i], r)
+                u = u + dot(walls.velocity(number[i], r) - u, n) * n
     return u
 
 
 @outlined
-def _unhindered(chain, gravity, touch, r, v, h, near):
+def _unhindered(walls, gravity, touch, r, v, h, near):
     """P of the longest step up to h that no further wall is in the way of, and its length.
 
     A wall that is met within the distance `near` becomes one of the touched.
     """
     u = ZERO
     for cut in range(_CUTS):
-        u = velocity_along(chain, touch, r, accelerated(gravity, v, 0.5 * h), h)
+        u = velocity_along(walls, touch, r, accelerated(gravity, v, 0.5 * h), h)
         # Until then none but the near walls are met.
-        alone = until_others(chain, r, from_relative(touch.frame, u))
+        alone = until_others(walls, r, from_relative(touch.frame, u))
         if alone < h:
             h = alone
             continue
         following, other = h, -1
         for i in range(touch.touched.size):
             if not touch.touched[i]:
-                time, _found = flights.hit_of(chain, None, touch.number[i], r, from_relative(touch.frame, u))
+                time, _found = flights.hit_of(walls, None, touch.number[i], r, from_relative(touch.frame, u))
                 if time < following:
                     following, other = time, i
         if other < 0:
@@ -177,50 +177,50 @@ def _unhindered(chain, gravity, touch, r, v, h, near):
 
 
 @outlined
-def _settled(chain, wall, touch, r):
+def _settled(walls, wall, touch, r):
     """The end of a step on the wall that holds the particle, and on every touched one that it has left by round-off.
 
     Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
     where the particle is outside would lean inwards, and let it fall by the last place again and again.
     """
-    _depths(chain, touch.number, r, touch.depth)
+    _depths(walls, touch.number, r, touch.depth)
     for i in range(touch.touched.size):
-        holds = touch.number[i] == wall and touch.held[i] > 0.0
+        holds = touch.number[i] == wall and touch.active[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
-            r = chain.project(touch.number[i], r)
+            r = walls.project(touch.number[i], r)
     return r
 
 
-def numbers_near(chain, r):
+def numbers_near(walls, r):
     """The numbers of the walls near a point, in an array of the function that asks."""
-    number = scratch(count_near(chain, r), np.float64)
-    list_near(chain, r, number)
+    number = scratch(count_near(walls, r), np.float64)
+    list_near(walls, r, number)
     return number
 
 
 @outlined
-def inside(chain, r):
+def inside(walls, r):
     """A point that is no more than round-off outside of the walls, moved until it is not."""
-    number = numbers_near(chain, r)
+    number = numbers_near(walls, r)
     outside = scratch(number.size, np.float64)
     for _sweep in range(_SWEEPS):
-        _depths(chain, number, r, outside)
+        _depths(walls, number, r, outside)
         i = np.argmax(outside)
         if outside[i] <= _EPSILON * total(absolute(r)):
             break
-        r = chain.project(number[i], r)
+        r = walls.project(number[i], r)
     return r
 
 
 @outlined
-def _depths(chain, number, r, into):
+def _depths(walls, number, r, into):
     """Signed distance outside of walls into `into`."""
     for i in range(number.size):
-        into[i] = chain.distance(number[i], r)
+        into[i] = walls.distance(number[i], r)
 
 
 @outlined
-def _landed(laws, chain, touch, given, r, v, twice_energy):
+def _landed(laws, walls, touch, given, r, v, twice_energy):
     """Chattering ends: walls that lose energy take the rest of the velocity towards them.
 
     Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
@@ -231,18 +231,18 @@ def _landed(laws, chain, touch, given, r, v, twice_energy):
     lossy = scratch(given.size, np.bool_)
     for i in range(given.size):
         lossy[i] = touch.touched[i] and 1.0 + laws.restitution_of(touch.number[i]) < 2.0
-    put_normals(chain, touch, lossy, r, r)
+    put_normals(walls, touch, lossy, r, r)
     u = project(lossy, touch.normal, given, v)
     # |v|^2 - |u|^2, because v - u is orthogonal to u
     return u, twice_energy - square(v - u)
 
 
 @outlined
-def _goes_straight(chain, gravity, touch, r, v):
+def _goes_straight(walls, gravity, touch, r, v):
     """Whether the step may have any length: rest, or uniform motion along flat walls that no gravity pulls it from."""
     g = accelerated(gravity, ZERO, 1.0)
-    put_normals(chain, touch, touch.touched, r, r)
-    falling = project(touch.touched, touch.normal, touch.held, g)
+    put_normals(walls, touch, touch.touched, r, r)
+    falling = project(touch.touched, touch.normal, touch.active, g)
     if largest(falling) > ALLOWED * largest(g):
         return False
     speed = largest(v)
@@ -251,36 +251,36 @@ def _goes_straight(chain, gravity, touch, r, v):
             return False
     bent = 0
     for i in range(touch.touched.size):
-        bent += touch.touched[i] and not chain.flat(touch.number[i])
+        bent += touch.touched[i] and not walls.flat(touch.number[i])
     return speed == 0.0 or bent == 0
 
 
 @outlined
-def are_carried(chain, gravity, r, v, near, held):
+def are_carried(walls, gravity, r, v, near, active):
     """Whether several walls within the distance `near` carry the weight of a particle at rest.
 
-    `held` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
+    `active` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
     """
-    count = count_near(chain, r)
+    count = count_near(walls, r)
     number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
     normal, taken = scratch((3, count), np.float64), scratch(count, np.float64)
-    list_near(chain, r, number)
-    _depths(chain, number, r, depth)
+    list_near(walls, r, number)
+    _depths(walls, number, r, depth)
     several = 0
     for i in range(count):
         touched[i] = depth[i] >= -near
         several += touched[i]
         if touched[i]:
-            put(normal, 0, i, chain.unit_normal(number[i], r))
+            put(normal, 0, i, walls.unit_normal(number[i], r))
     g = accelerated(gravity, ZERO, 1.0)
     # v as a sum over the normals: what goes into the walls, then what goes away from them, and again.
     sign, rest = 1.0, v
     for _sweep in range(_SWEEPS):
         rest = sign * project(touched, normal, taken, sign * rest)
         for i in range(count):
-            held[1, chain.row(number[i])] += sign * taken[i]
+            active[1, walls.row(number[i])] += sign * taken[i]
         sign = -sign
     falling = project(touched, normal, taken, g)
     for i in range(count):
-        held[0, chain.row(number[i])] += taken[i]
+        active[0, walls.row(number[i])] += taken[i]
     return several > 1 and moves(g) and largest(falling) <= ALLOWED * largest(g)

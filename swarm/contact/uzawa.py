@@ -55,20 +55,20 @@ def multiplier_of(surface, law, r, c, kappa):
     return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 
 
-def reflection(chain, wall, law, step):
+def reflection(walls, wall, law, step):
     """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
-    kappa = chain.chord_guess(wall, step.r, step.p)
+    kappa = walls.chord_guess(wall, step.r, step.p)
     for _i in range(_CHORD_STEPS):
-        kappa = kappa - chain.chord_improve(wall, step.r, step.p, kappa)
-    multiplier = chain.of(wall, 0.0, multiplier_of, law, step.r, step.c, kappa)
+        kappa = kappa - walls.chord_improve(wall, step.r, step.p, kappa)
+    multiplier = walls.of(wall, 0.0, multiplier_of, law, step.r, step.c, kappa)
     good = (multiplier > 0.0) & (multiplier < math.inf)
     return select(good, kappa, 0.0), select(good, multiplier, 0.0)
 
 
-def meets_later(chain, wall, law, r, p):
+def meets_later(walls, wall, law, r, p):
     """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
     found = False
-    for k, other in enumerate(chain.walls):
+    for k, other in enumerate(walls.each):
         leaves = other.level_of(other.inner(r + p)) > 0.0
         found = found | (leaves & (wall != float(k)) & (not has_limit(other, law, r)))
     return found
@@ -100,18 +100,18 @@ class Loop(Record):
 
 
 @outlined
-def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
+def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
     """One sweep of (8) for all walls: the step, then the multipliers of the next sweep in place; `before` is kept."""
     count = multipliers.shape[0]
-    end = corner.hold(method.form, law, multipliers, chain, step, reactions)
+    end = corner.hold(method.form, law, multipliers, walls, step, reactions)
     first, last = scratch(count, np.float64), reactions[:, 3]
-    corner.constraints(chain, law, step.r, first)
+    corner.constraints(walls, law, step.r, first)
     stored = 0.0
     for k in range(count):
         stored += 0.5 * law.alpha * last[k] * last[k]
         miss = 0.5 * law.alpha * (first[k] + last[k])
         old = multipliers[k]
-        acceleration = method.acceleration if chain.of(float(k), False, has_limit, law, step.r) else PLAIN
+        acceleration = method.acceleration if walls.of(float(k), False, has_limit, law, step.r) else PLAIN
         if sweep == 0:
             multipliers[k] = old + miss
         else:
@@ -121,25 +121,25 @@ def sweep_all(method, law, chain, step, multipliers, before, sweep, reactions):
 
 
 @outlined
-def start(method, law, chain, step, multipliers):
+def start(method, law, walls, step, multipliers):
     """The multipliers that the loop starts from."""
     multipliers[:] = 0.0
-    touched = chain.touched(step.r, step.p)
+    touched = walls.touched(step.r, step.p)
     if method.acceleration == REFLECTION and touched.number == 1.0:
-        _kappa, multiplier = reflection(chain, touched.wall, law, step)
+        _kappa, multiplier = reflection(walls, touched.wall, law, step)
         multipliers[int(touched.wall)] = multiplier
 
 
 @outlined
-def loop(method, law, chain, step, reactions):
+def loop(method, law, walls, step, reactions):
     """Sweeps until V <= tolerance."""
-    count = chain.length()
+    count = walls.length()
     multipliers = scratch(count, np.float64)
     before = Before(scratch(count, np.float64), scratch(count, np.float64))
-    start(method, law, chain, step, multipliers)
+    start(method, law, walls, step, multipliers)
     end = Swept(step.r, math.inf, True)
     for sweep in range(method.max_sweeps):
-        end = sweep_all(method, law, chain, step, multipliers, before, sweep, reactions)
+        end = sweep_all(method, law, walls, step, multipliers, before, sweep, reactions)
         converged = end.solved and end.stored <= method.tolerance
         if converged or not end.solved:
             return Loop(end.r, sweep + 1, end.stored, end.solved, converged)

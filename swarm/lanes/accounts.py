@@ -10,29 +10,29 @@ def lose(state, i, before, after):
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
 
 
-def book(chain, state, i, wall, change, given, loses):
+def book(walls, state, i, wall, change, given, loses):
     """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion."""
     before, after = change
-    if not isinstance(chain, Carried):
+    if not isinstance(walls, Carried):
         lose(state, i, before, after)
         return
     # Where nothing is lost all of it is work, to the last digit.
     given = given if loses else after - before
     state.energy[i] = 0.5 * after
     state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
-    book_work(chain, state, i, wall, given)
+    book_work(walls, state, i, wall, given)
 
 
-def book_work(chain, state, i, wall, given):
+def book_work(walls, state, i, wall, given):
     """Book twice the work per mass of a wall, if it moves."""
-    if isinstance(chain, Carried):
-        state.impulse[chain.length() + chain.row(wall), i] += 0.5 * given * state.mass[i]
+    if isinstance(walls, Carried):
+        state.impulse[walls.length() + walls.row(wall), i] += 0.5 * given * state.mass[i]
 
 
-def book_step(chain, state, i, wall, change, given, loses):
+def book_step(walls, state, i, wall, change, given, loses):
     """Book a change (before, after) of twice the energy per mass in a short step, of which `given` is booked."""
     before, after = change
-    if not isinstance(chain, Carried):
+    if not isinstance(walls, Carried):
         lose(state, i, before, after)
         return
     state.energy[i] = 0.5 * after
@@ -40,7 +40,7 @@ def book_step(chain, state, i, wall, change, given, loses):
         state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
     else:
         # What is left is round-off.
-        book_work(chain, state, i, wall, after - before - given)
+        book_work(walls, state, i, wall, after - before - given)
 
 
 def book_heat(state, i, wall, before, after):

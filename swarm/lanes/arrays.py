@@ -21,7 +21,7 @@ _named = Rows()
 class Flying(Advanced):
     """A particle that flies, in its lane."""
 
-    r, v, left, own, hits = _named.vector(), _named.vector(), _named.number(), _named.vector(), _named.number()
+    r, v, remaining, own, hits = _named.vector(), _named.vector(), _named.number(), _named.vector(), _named.number()
     # The first of what its method keeps of it, where contacts change the energy: twice that, per mass.
     twice = Number(own.row)
 
@@ -34,7 +34,7 @@ class Flying(Advanced):
 
     def put_end(self, end):
         """Where it is at the end of a flight or a contact, and how much of its frame is left."""
-        self.r, self.v, self.left = end.r, end.v, end.left
+        self.r, self.v, self.remaining = end.r, end.v, end.remaining
 
 
 class Lanes(NamedTuple):
@@ -65,24 +65,24 @@ class Lanes(NamedTuple):
     def given(self, method, i):
         """A lane as methods are given it."""
         lane = self.lane(i)
-        return methods.Lane(lane.r, lane.v, lane.left, lane.hits, method.own(*lane.own))
+        return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own))
 
-    def load(self, method, chain, share, i, k):
+    def load(self, method, walls, share, i, k):
         """Particle i into lane k, as it starts the frame, or as a halt left it."""
         self.particle[k] = i
-        state, lane, left = share.state, self.lane(k), 0.0
+        state, lane, remaining = share.state, self.lane(k), 0.0
         if state.contacts is not None:
-            left = state.contacts.left[i]
+            remaining = state.contacts.remaining[i]
             # Where nothing lasts none of these arrays is written: their memory is not even there.
-            if left > 0.0:
-                state.contacts.left[i] = 0.0
-        if share.halted.particle.size > 0 and not left > 0.0 and self._pick_up(share.halted, i, k):
+            if remaining > 0.0:
+                state.contacts.remaining[i] = 0.0
+        if share.halted.particle.size > 0 and not remaining > 0.0 and self._pick_up(share.halted, i, k):
             return
         i = index(i)
         lane.r, lane.v = column(state.position, 0, i), column(state.velocity, 0, i)
         lane.own = Vec(*method.constants(state.mass[i], state.energy[i], speed2_scale(state, i)))
-        lane.left, lane.hits = select(left > 0.0, left, share.span), 0.0
-        for s in range(booked(chain)):
+        lane.remaining, lane.hits = select(remaining > 0.0, remaining, share.span), 0.0
+        for s in range(booked(walls)):
             self.impulse[s, k] = 0.0
 
     @outlined
@@ -110,34 +110,34 @@ class Lanes(NamedTuple):
             for s in range(self.impulse.shape[0]):
                 self.left_behind[Flying.ROWS + s, k] = self.impulse[s, k]
 
-    def retire(self, method, chain, share, k):
+    def retire(self, method, walls, share, k):
         """Lane k back into its particle, which has arrived or goes on along a wall."""
         state, lane, i = share.state, self.lane(k), index(self.particle[k])
         put(state.position, 0, i, lane.r)
         put(state.velocity, 0, i, lane.v)
         state.impacts[i] += np.int64(lane.hits)
-        for s in range(booked(chain)):
+        for s in range(booked(walls)):
             state.impulse[s, i] += self.impulse[s, k] * state.mass[i]
         if method.dissipates:
             # Each particle knows its energy: what it has lost is accounted for with it.
             now = 0.5 * lane.twice
             if method.laws.loses:
                 work = 0.0
-                for s in range(chain.length(), booked(chain)):
+                for s in range(walls.length(), booked(walls)):
                     work += self.impulse[s, k]
                 state.dissipated[i] += state.mass[i] * (state.energy[i] - now + work)
             state.energy[i] = now
         phase = ARRIVED
-        if state.contacts is not None and lane.left > 0.0:
+        if state.contacts is not None and lane.remaining > 0.0:
             phase, contacts = EVENT, state.contacts
-            contacts.left[i], contacts.met[i] = lane.left, self.wall[k]
+            contacts.remaining[i], contacts.met[i] = lane.remaining, self.wall[k]
             contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
         share.hand_over(i, phase)
 
-    def move(self, chain, source, target):
+    def move(self, walls, source, target):
         """The last live lane into the free slot. What flight and contact leave for each other need not move."""
         copy_lane(self.rows, source, self.rows, target, Flying.ROWS)
-        copy_lane(self.impulse, source, self.impulse, target, booked(chain))
+        copy_lane(self.impulse, source, self.impulse, target, booked(walls))
         self.particle[target] = self.particle[source]
 
 
@@ -152,7 +152,7 @@ class Halted(Record):
 
     def time_left(self):
         """The time left of the frame of each."""
-        return self.rows[Flying.left.row]
+        return self.rows[Flying.remaining.row]
 
 
 class Draws(NamedTuple):
@@ -205,10 +205,10 @@ class Share(NamedTuple):
         """The log and the counts of impacts, if the run has any."""
         return tuple(one for one in (self.log, self.counts) if one is not None)
 
-    def note_impact(self, method, chain, i, struck):
+    def note_impact(self, method, walls, i, struck):
         """Log and count an impact of particle i, a `log.Struck`."""
         for watch in self.watches():
-            watch.add_row(method, chain, self.state, i, struck)
+            watch.add_row(method, walls, self.state, i, struck)
 
     def hand_over(self, i, phase):
         """Leave particle i to the kernel of a phase."""
@@ -275,9 +275,9 @@ def take(draws: Draws, some: int) -> Array:
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-def booked(chain):
+def booked(walls):
     """How many rows book what the walls give: their impulses, then the work of those that move."""
-    return 2 * chain.length() if isinstance(chain, Carried) else chain.length()
+    return 2 * walls.length() if isinstance(walls, Carried) else walls.length()
 
 
 def speed2_scale(state, i):

@@ -40,7 +40,7 @@ class Hard(Record):
 
 
 @kernel
-def advance_block(method, chain, gravity, hard, share, lanes):
+def advance_block(method, walls, gravity, hard, share, lanes):
     """Advance what a thread draws of a frame: (status, particle, drawn), DONE or the first particle that failed.
 
     `drawn` is how many draws that were; `lanes` are any. After `share.halt[0]` passes, which another thread may change
@@ -49,13 +49,13 @@ def advance_block(method, chain, gravity, hard, share, lanes):
     it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
-    lanes, state, picked = with_distances(lanes), share.state, picks(chain)
+    lanes, state, picked = with_distances(lanes), share.state, picks(walls)
     place, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
         place = share.following(FLYING, place)
         if place.is_end():
             break
-        lanes.load(method, chain, share, place.i, index(live))
+        lanes.load(method, walls, share, place.i, index(live))
         lanes.lane(live).looked_particle = -1.0
         place, live = place.after(), live + 1
     while live > 0:
@@ -63,9 +63,9 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         if status != Status.DONE.value:
             return status, live, place.drawn
         passes += 1
-        some_arrived, some_hard = _pass(method, chain, gravity, share, lanes, picked, live)
+        some_arrived, some_hard = _pass(method, walls, gravity, share, lanes, picked, live)
         if some_hard or passes % LOOK == 0:
-            status, lane = _rare(hard, method, chain, gravity, state, lanes, live, some_hard)
+            status, lane = _rare(hard, method, walls, gravity, state, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane], place.drawn
@@ -75,14 +75,14 @@ def advance_block(method, chain, gravity, hard, share, lanes):
         # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
         for k in range(marked_lanes(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
-            lanes.retire(method, chain, share, lane)
+            lanes.retire(method, walls, share, lane)
             place = share.following(FLYING, place)
             if place.i < place.stop:
-                lanes.load(method, chain, share, place.i, lane)
+                lanes.load(method, walls, share, place.i, lane)
                 place = place.after()
             else:
                 live -= 1
-                lanes.move(chain, live, lane)
+                lanes.move(walls, live, lane)
     return Status.DONE.value, 0, place.drawn
 
 
@@ -98,23 +98,23 @@ def _halts(share, lanes, place, live, passes):
 
 
 @outlined
-def _rare(hard, method, chain, gravity, state, lanes, live, some_hard):
+def _rare(hard, method, walls, gravity, state, lanes, live, some_hard):
     """The rare part of a pass: (worst status, its lane)."""
     if not some_hard:
-        return _look(method, chain, state, lanes, live)
+        return _look(method, walls, state, lanes, live)
     if hard is None:
         return Status.HARD_CONTACT.value, 0
-    return _hard_passes(hard, method, chain, gravity, lanes, live)
+    return _hard_passes(hard, method, walls, gravity, lanes, live)
 
 
 @outlined
-def _look(method, chain, state, lanes, live):
+def _look(method, walls, state, lanes, live):
     """Whether a particle meets its walls without end, or has not gone on since it was looked at: (status, its lane).
 
     The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
     """
     # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
-    most_hits = 0.1 * MOST_HITS if isinstance(chain, Carried) else MOST_HITS
+    most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
         if method.holds and lane.hits > most_hits:
@@ -124,7 +124,7 @@ def _look(method, chain, state, lanes, live):
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], lane.r)
             if state.contacts is not None:
-                state.contacts.left[lanes.particle[i]] = lane.left
+                state.contacts.remaining[lanes.particle[i]] = lane.remaining
             return status, i
         lane.look(p)
         lane.looked_hits = lane.hits
@@ -132,13 +132,13 @@ def _look(method, chain, state, lanes, live):
 
 
 @outlined
-def _hard_passes(hard, method, chain, gravity, lanes, live):
+def _hard_passes(hard, method, walls, gravity, lanes, live):
     """The hard lanes, one by one: (worst status, its lane)."""
     worst, where = 0, 0
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
             lane = lanes.given(method, i)
-            contact, status = method.hard_pass(chain, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
+            contact, status = method.hard_pass(walls, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
             _put_contact(method, lanes, i, contact)
             if lanes.lane(i).hits > hard.most_hits:
                 status = Status.STALLED.value
@@ -147,37 +147,37 @@ def _hard_passes(hard, method, chain, gravity, lanes, live):
     return worst, where
 
 
-def _pass(method, chain, gravity, share, lanes, picked, live):
+def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     state, watches = share.state, share.watches()
-    go(method, chain, gravity, lanes, live)
+    go(method, walls, gravity, lanes, live)
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:
-        let_out_lanes(state.openings, method, chain, share, lanes, live)
+        let_out_lanes(state.openings, method, walls, share, lanes, live)
     if method.solves is not None:
-        solve(method, chain, gravity, state.multipliers, lanes, live)
+        solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
     if method.laws.thermal is not None:
-        _exchange_heat(method, chain, gravity, share, lanes, live)
-    pick(chain, lanes, picked, live)
-    some_arrived, some_hard = _make_contacts(method, chain, gravity, watches, lanes, picked, live)
+        _exchange_heat(method, walls, gravity, share, lanes, live)
+    pick(walls, lanes, picked, live)
+    some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
     for watch in watches:
-        watch.add_rows(method, chain, state, lanes, live)
+        watch.add_rows(method, walls, state, lanes, live)
     return some_arrived, some_hard
 
 
-def _make_contacts(method, chain, gravity, watches, lanes, picked, live):
+def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
     """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
-        here = method.walls_of(of_lane(chain, picked, i), lane.left)
+        here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
-        _add_impulse(chain, lanes.impulse, i, contact.wall, contact.impulse)
-        _add_work(chain, lanes.impulse, i, contact.wall, contact.work)
+        _add_impulse(walls, lanes.impulse, i, contact.wall, contact.impulse)
+        _add_work(walls, lanes.impulse, i, contact.wall, contact.work)
         lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
@@ -185,7 +185,7 @@ def _make_contacts(method, chain, gravity, watches, lanes, picked, live):
     return some_arrived, some_hard
 
 
-def _exchange_heat(method, chain, gravity, share, lanes, live):
+def _exchange_heat(method, walls, gravity, share, lanes, live):
     """The impacts on thermal walls that accommodate their particles."""
     state = share.state
     for i in range(index(live)):
@@ -193,19 +193,19 @@ def _exchange_heat(method, chain, gravity, share, lanes, live):
         if wall >= 0.0:
             r, v = lane.r, lane.v
             draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
-            now, laws = chain.at(lane.left), method.laws
-            left = exchange(laws, now, wall, (r, v), state.mass[p], draw)
-            if left.happens:
-                before, after = lane.twice, square(left.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, chain.row(wall), before, after - left.work)
-                _add_work(chain, lanes.impulse, i, wall, 0.5 * left.work)
-                lane.v, lane.twice = left.v, after
+            now, laws = walls.at(lane.remaining), method.laws
+            remaining = exchange(laws, now, wall, (r, v), state.mass[p], draw)
+            if remaining.happens:
+                before, after = lane.twice, square(remaining.v) + 2.0 * potential(gravity, r)
+                book_heat(state, p, walls.row(wall), before, after - remaining.work)
+                _add_work(walls, lanes.impulse, i, wall, 0.5 * remaining.work)
+                lane.v, lane.twice = remaining.v, after
                 lane.hits += 1.0
-                lanes.impulse[chain.row(wall), i] += left.impulse
+                lanes.impulse[walls.row(wall), i] += remaining.impulse
                 for watch in share.watches():
-                    watch.note(lanes, i, left.impulse)
+                    watch.note(lanes, i, remaining.impulse)
                 # The contact is done, unless a wall at 0 K holds the particle.
-                lanes.wall[i] = select(square(left.v) > 0.0, -1.0, wall)
+                lanes.wall[i] = select(square(remaining.v) > 0.0, -1.0, wall)
 
 
 def _put_contact(method, lanes, i, contact):
@@ -215,28 +215,28 @@ def _put_contact(method, lanes, i, contact):
     lane.hits += contact.hits
     if method.dissipates:
         lane.twice = contact.twice_energy
-    lanes.marked[i] = contact.lasts | (not (contact.left > 0.0))
-    return contact.lasts | (not (contact.left > 0.0))
+    lanes.marked[i] = contact.lasts | (not (contact.remaining > 0.0))
+    return contact.lasts | (not (contact.remaining > 0.0))
 
 
-def _add_impulse(chain, impulse, i, wall, given):
+def _add_impulse(walls, impulse, i, wall, given):
     """impulse[wall, i] += given, without a branch; a loop over rows here would not vectorise."""
-    if len(chain.walls) == 1 and not chain.fields():
+    if len(walls.each) == 1 and not walls.fields():
         # One wall: what is given is 0, or it is given by that.
         impulse[0, i] += given
     else:
-        _add_to(chain, impulse, 0, i, wall, given)
+        _add_to(walls, impulse, 0, i, wall, given)
 
 
-def _add_work(chain, impulse, i, wall, given):
+def _add_work(walls, impulse, i, wall, given):
     """The work of walls that move is in the rows after those of the impulses."""
-    if isinstance(chain, Carried):
-        _add_to(chain, impulse, chain.length(), i, wall, given)
+    if isinstance(walls, Carried):
+        _add_to(walls, impulse, walls.length(), i, wall, given)
 
 
-def _add_to(chain, impulse, row, i, wall, given):
+def _add_to(walls, impulse, row, i, wall, given):
     """The same for all walls, from `row` on."""
-    for one in chain.walls:
+    for one in walls.each:
         if isinstance(one, Field):
             count = one.count()
             here = (wall >= 0.0) & (wall < count)

@@ -62,8 +62,8 @@ def _parts(a, b, c, w):
 
 
 @outlined
-def _normals(chain, held, r):
-    return tuple(chain.unit_normal(wall, r) for wall in held)
+def _normals(walls, active, r):
+    return tuple(walls.unit_normal(wall, r) for wall in active)
 
 
 def _force(friction, wall, n, slip):
@@ -75,17 +75,17 @@ def _force(friction, wall, n, slip):
 
 
 @outlined
-def _corner(laws, chain, gravity, held, r, least):
+def _corner(laws, walls, gravity, active, r, least):
     """`Corner` of three walls at a point on them; they hold if each presses by more than `least`."""
-    a, b, c = _normals(chain, held, r)
+    a, b, c = _normals(walls, active, r)
     if not abs(dot(a, cross(b, c))) > _FLATTEST:
         return _NONE
-    v, w, x = tuple(chain.velocity(wall, r) for wall in held)
+    v, w, x = tuple(walls.velocity(wall, r) for wall in active)
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
     # What is left of the pull in the frame of the particle
-    rest = _solved(a, b, c, *(chain.outward_acceleration(wall, r, u, pull) for wall in held))
+    rest = _solved(a, b, c, *(walls.outward_acceleration(wall, r, u, pull) for wall in active))
     friction = laws.friction
-    p, q, s = tuple(_force(friction, *one) for one in zip(held, (a, b, c), (u - v, u - w, u - x), strict=True))
+    p, q, s = tuple(_force(friction, *one) for one in zip(active, (a, b, c), (u - v, u - w, u - x), strict=True))
     load = _parts(p, q, s, rest)
     holds = (load.x > least) & (load.y > least) & (load.z > least)
     power = Vec(-load.x * dot(p, v), -load.y * dot(q, w), -load.z * dot(s, x))
@@ -94,34 +94,34 @@ def _corner(laws, chain, gravity, held, r, least):
 
 
 @outlined
-def _find(laws, chain, gravity, r, near, least):
+def _find(laws, walls, gravity, r, near, least):
     """Three walls at a point that hold a particle there, and none of whose neighbours comes: `Three`."""
-    number = scratch(count_near(chain, r), np.float64)
-    list_near(chain, r, number)
+    number = scratch(count_near(walls, r), np.float64)
+    list_near(walls, r, number)
     count = 0
     for i in range(number.size):
-        if chain.distance(number[i], r) >= -near:
+        if walls.distance(number[i], r) >= -near:
             number[count] = number[i]
             count += 1
     for i in range(count):
         for j in range(i):
             for k in range(j):
-                held = Three(number[i], number[j], number[k])
-                corner = _corner(laws, chain, gravity, held, r, least)
+                active = Three(number[i], number[j], number[k])
+                corner = _corner(laws, walls, gravity, active, r, least)
                 if corner.holds:
-                    return held
+                    return active
     return _NOBODY
 
 
 @outlined
-def _settled(chain, held, r):
+def _settled(walls, active, r):
     """A point near three walls, moved onto them; whether it is there."""
     least = 4.0 * _EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
-        d, e, f = tuple(chain.distance(wall, r) for wall in held)
+        d, e, f = tuple(walls.distance(wall, r) for wall in active)
         if max(abs(d), abs(e), abs(f)) <= least:
             return r, True
-        a, b, c = _normals(chain, held, r)
+        a, b, c = _normals(walls, active, r)
         r = r - _solved(a, b, c, d, e, f)
     return r, False
 
@@ -130,33 +130,33 @@ def _settled(chain, held, r):
 
 
 @outlined
-def is_carried(method, chain, gravity, p):
+def is_carried(method, walls, gravity, p):
     """Whether three walls, some of which move, carry a particle that is slow in their corner."""
-    now = chain.at(p.left)
-    held = _find(method.laws, now, gravity, p.r, events.TOUCH * method.size, events.weightless(method, gravity, p))
-    if held.first < 0.0:
+    now = walls.at(p.remaining)
+    active = _find(method.laws, now, gravity, p.r, events.TOUCH * method.size, events.weightless(method, gravity, p))
+    if active.first < 0.0:
         return False
-    u = _corner(method.laws, now, gravity, held, p.r, 0.0).u
+    u = _corner(method.laws, now, gravity, active, p.r, 0.0).u
     part = events.GRAZING if method.laws.loses else _NO_SPEED
     return square(p.v - u) <= part * part * events.own_speed2(p)
 
 
 @outlined
-def carry(method, chain, gravity, state, i, p):
+def carry(method, walls, gravity, state, i, p):
     """Carry a particle: its next phase, or `NOT_CARRIED`."""
-    if not is_carried(method, chain, gravity, p):
+    if not is_carried(method, walls, gravity, p):
         return NOT_CARRIED
     laws, near, least = method.laws, events.TOUCH * method.size, events.weightless(method, gravity, p)
     shortest = 2.0 * events.GRAZING * method.size / math.sqrt(events.own_speed2(p))
-    r, left, now = p.r, p.left, chain.at(p.left)
-    held = _find(laws, now, gravity, r, near, least)
-    start, h, phase, used, tries = _corner(laws, now, gravity, held, r, 0.0), p.left, CAREFUL, 0.0, 0
-    while left > 0.0 and tries <= _MOST_TRIES:
-        h = min(h, left, now.shortest_time_scale())
-        middle, _there = _settled(chain.at(left - 0.5 * h), held, r + (0.5 * h) * start.u)
-        r1, there = _settled(chain.at(left - h), held, r + h * start.u)
-        half = _corner(laws, chain.at(left - 0.5 * h), gravity, held, middle, 0.0)
-        end = _corner(laws, chain.at(left - h), gravity, held, r1, 0.0)
+    r, remaining, now = p.r, p.remaining, walls.at(p.remaining)
+    active = _find(laws, now, gravity, r, near, least)
+    start, h, phase, used, tries = _corner(laws, now, gravity, active, r, 0.0), p.remaining, CAREFUL, 0.0, 0
+    while remaining > 0.0 and tries <= _MOST_TRIES:
+        h = min(h, remaining, now.shortest_time_scale())
+        middle, _there = _settled(walls.at(remaining - 0.5 * h), active, r + (0.5 * h) * start.u)
+        r1, there = _settled(walls.at(remaining - h), active, r + h * start.u)
+        half = _corner(laws, walls.at(remaining - 0.5 * h), gravity, active, middle, 0.0)
+        end = _corner(laws, walls.at(remaining - h), gravity, active, r1, 0.0)
         if not (there and half.holds and end.holds):
             h *= _RETRY
             if h < shortest:
@@ -164,8 +164,8 @@ def carry(method, chain, gravity, state, i, p):
             continue
         path = crossing.Path(r, start.u, r1, end.u, h)
         none = crossing.near(method, r)
-        if crossing.meets(now, chain.at(left - h), held, path, none):
-            found = crossing.arrival(chain, held, path, none, left)
+        if crossing.meets(now, walls.at(remaining - h), active, path, none):
+            found = crossing.arrival(walls, active, path, none, remaining)
             if found.time == 0.0:
                 phase = EVENT if used > 0.0 else phase
                 state.contacts.met[i] = found.wall
@@ -176,26 +176,26 @@ def carry(method, chain, gravity, state, i, p):
                 tries += 1
                 continue
         if used == 0.0:
-            _stop(laws, now, gravity, state, i, p, held, start.u)
-        _book(chain, gravity, state, i, held, (start, half, end), (r1, h, left == h))
+            _stop(laws, now, gravity, state, i, p, active, start.u)
+        _book(walls, gravity, state, i, active, (start, half, end), (r1, h, remaining == h))
         used += h
-        left = 0.0 if left == h else left - h
-        r, now, start, h, tries = r1, chain.at(left), end, h / _RETRY, 0
+        remaining = 0.0 if remaining == h else remaining - h
+        r, now, start, h, tries = r1, walls.at(remaining), end, h / _RETRY, 0
     if used == 0.0:
         return NOT_CARRIED
     put(state.position, 0, i, r)
     put(state.velocity, 0, i, start.u)
     state.contacts.sliding[i] += used
-    state.contacts.left[i] = left
-    return phase if left > 0.0 else ARRIVED
+    state.contacts.remaining[i] = remaining
+    return phase if remaining > 0.0 else ARRIVED
 
 
 @outlined
-def _stop(laws, now, gravity, state, i, p, held, u):
+def _stop(laws, now, gravity, state, i, p, active, u):
     """Book what the walls take of a velocity that is not theirs."""
-    a, b, c = _normals(now, held, p.r)
+    a, b, c = _normals(now, active, p.r)
     taken, mass = _parts(a, b, c, p.v - u), state.mass[i]
-    given = _push(now, state, i, held, taken, Vec(
+    given = _push(now, state, i, active, taken, Vec(
         -taken.x * dot(a, u), -taken.y * dot(b, u), -taken.z * dot(c, u)
     ))  # fmt: skip
     after = 0.5 * square(u) + potential(gravity, p.r)
@@ -204,7 +204,7 @@ def _stop(laws, now, gravity, state, i, p, held, u):
 
 
 @outlined
-def _book(chain, gravity, state, i, held, corners, end):
+def _book(walls, gravity, state, i, active, corners, end):
     """Book a step, by Simpson's rule; `end` is (where it ends, how long it is, whether the frame ends with it)."""
     start, half, last = corners
     r1, h, _ends = end
@@ -218,17 +218,17 @@ def _book(chain, gravity, state, i, held, corners, end):
     x, y, z = abs(work.x), abs(work.y), abs(work.z)
     first, second = (x >= y) & (x >= z), (y > x) & (y >= z)
     work = work + Vec(select(first, rest, 0.0), select(second, rest, 0.0), select(first | second, 0.0, rest))
-    _push(chain, state, i, held, load, work)
+    _push(walls, state, i, active, load, work)
     state.dissipated[i] += heat * state.mass[i]
     state.energy[i] = after
 
 
 @outlined
-def _push(chain, state, i, held, load, work):
+def _push(walls, state, i, active, load, work):
     """Book impulses and works per mass of three walls; the sum of the works."""
-    behind, mass = chain.length(), state.mass[i]
-    for wall, given, done in zip(held, load, work, strict=True):
-        row = chain.row(wall)
+    behind, mass = walls.length(), state.mass[i]
+    for wall, given, done in zip(active, load, work, strict=True):
+        row = walls.row(wall)
         state.impulse[row, i] += given * mass
         state.impulse[behind + row, i] += done * mass
     return work.x + work.y + work.z

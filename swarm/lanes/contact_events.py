@@ -33,15 +33,15 @@ _MOVED = 1e-9
 
 
 @long_kernel
-def meet_block(method, chain, gravity, share):
+def meet_block(method, walls, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
-    return _one_by_one(EVENT, _decide, (method, chain, gravity), share)
+    return _one_by_one(EVENT, _decide, (method, walls, gravity), share)
 
 
 @long_kernel
-def careful_block(method, chain, gravity, share):
+def careful_block(method, walls, gravity, share):
     """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    return _one_by_one(CAREFUL, _take_care, (method, chain, gravity), share)
+    return _one_by_one(CAREFUL, _take_care, (method, walls, gravity), share)
 
 
 def _one_by_one(phase, advance, scene, share):
@@ -62,17 +62,17 @@ def _one_by_one(phase, advance, scene, share):
 
 
 @outlined
-def _decide(method, chain, gravity, share, i):
+def _decide(method, walls, gravity, share, i):
     """Decide whether particle i goes on along its walls, or flies; whether it moves on."""
     state, contacts = share.state, share.state.contacts
-    r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
-    carried, chain = chain, chain.at(left)
-    if state.openings is not None and _let_out(method, chain, share, i, r, v, left):
+    r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
+    carried, walls = walls, walls.at(remaining)
+    if state.openings is not None and _let_out(method, walls, share, i, r, v, remaining):
         return True
-    p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
-    moved = contacts.events[0, i] - left
+    p = events.Particle(r, v, remaining, 2.0 * state.energy[i], speed2_scale(state, i))
+    moved = contacts.events[0, i] - remaining
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
-    contacts.events[0, i], contacts.events[1, i] = left, again
+    contacts.events[0, i], contacts.events[1, i] = remaining, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
     if method.laws.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
@@ -80,23 +80,23 @@ def _decide(method, chain, gravity, share, i):
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
-        found = events.enter(method, chain, gravity, wall, p)
+        found = events.enter(method, walls, gravity, wall, p)
     elif second < 0.0:
-        found = events.meet(method, One(first), chain, gravity, wall, p)
+        found = events.meet(method, One(first), walls, gravity, wall, p)
     else:
-        found = events.meet(method, Two(first, second), chain, gravity, wall, p)
-    state.impulse[chain.row(wall), i] += found.impulse * state.mass[i]
+        found = events.meet(method, Two(first, second), walls, gravity, wall, p)
+    state.impulse[walls.row(wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
-        share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, left, found.impulse))
+        share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, remaining, found.impulse))
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
-        _spare(moving, chain, state, i, found, wall)
-    u = wall_velocity(moving, chain, wall, r)
+        _spare(moving, walls, state, i, found, wall)
+    u = wall_velocity(moving, walls, wall, r)
     book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), method.laws.loses)
-    contacts.sliding[i] -= min(found.wait, left)
+    contacts.sliding[i] -= min(found.wait, remaining)
     phase, v = found.phase, found.v
     if phase == FLYING:
-        v = events.off_the_wall(chain, wall, r, v, u)
+        v = events.off_the_wall(walls, wall, r, v, u)
     slides = phase != FLYING
     put(state.velocity, 0, i, v)
     contacts.keep[i] = found.keep
@@ -110,130 +110,132 @@ def _decide(method, chain, gravity, share, i):
     return again < _MOST
 
 
-def _settles(method, chain, gravity, p):
+def _settles(method, walls, gravity, p):
     """Whether the walls around a particle hold it."""
     if method.laws.moving is not None:
-        return is_carried(method, chain, gravity, p)
-    return events.settles(method, chain, gravity, p, scratch((2, chain.length()), np.float64))
+        return is_carried(method, walls, gravity, p)
+    return events.settles(method, walls, gravity, p, scratch((2, walls.length()), np.float64))
 
 
 @outlined
-def _let_out(method, chain, share, i, r, v, left):
+def _let_out(method, walls, share, i, r, v, remaining):
     """Whether particle i has escaped, since the wall that it has met is open there."""
     openings, met, near = share.state.openings, share.state.contacts.met, crossing.near(method, r)
     # Where this one is open, a closed one at the same place.
-    met[i] = hit_wall(openings, method, chain, (r, v), met[i], near)
+    met[i] = hit_wall(openings, method, walls, (r, v), met[i], near)
     if not is_open(openings, met[i], r, near):
         return False
-    _leave(share, i, met[i], r, v, left)
+    _leave(share, i, met[i], r, v, remaining)
     return True
 
 
 @outlined
-def _leave(share, i, wall, r, v, left):
+def _leave(share, i, wall, r, v, remaining):
     """Particle i has escaped through a wall."""
-    escape(share, i, wall, r, v, left)
+    escape(share, i, wall, r, v, remaining)
     contacts = share.state.contacts
-    contacts.left[i], contacts.keep[i] = 0.0, 0.0
+    contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
     contacts.phase[i] = FLYING
     share.hand_over(i, ARRIVED)
 
 
 @outlined
-def _exchange_heat(method, chain, gravity, share, i):
+def _exchange_heat(method, walls, gravity, share, i):
     """Whether a thermal wall accommodates a sliding particle: then it flies."""
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
-    now = chain.at(contacts.left[i])
-    left = exchange(method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i]))
-    if not left.happens:
+    now = walls.at(contacts.remaining[i])
+    remaining = exchange(
+        method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i])
+    )
+    if not remaining.happens:
         return False
-    before, after = 2.0 * state.energy[i], square(left.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, chain.row(wall), before, after - left.work)
-    book_work(chain, state, i, wall, left.work)
+    before, after = 2.0 * state.energy[i], square(remaining.v) + 2.0 * potential(gravity, r)
+    book_heat(state, i, walls.row(wall), before, after - remaining.work)
+    book_work(walls, state, i, wall, remaining.work)
     state.energy[i] = 0.5 * after
-    put(state.velocity, 0, i, left.v)
+    put(state.velocity, 0, i, remaining.v)
     state.impacts[i] += 1
-    struck = impact_log.Struck(r, v, left.v, wall, contacts.left[i], left.impulse)
-    share.note_impact(method, chain, i, struck)
-    state.impulse[chain.row(wall), i] += left.impulse * state.mass[i]
+    struck = impact_log.Struck(r, v, remaining.v, wall, contacts.remaining[i], remaining.impulse)
+    share.note_impact(method, walls, i, struck)
+    state.impulse[walls.row(wall), i] += remaining.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True
 
 
 @outlined
-def _spare(moving, chain, state, i, found, wall):
+def _spare(moving, walls, state, i, found, wall):
     """Book how much less its walls give particle i, which chatters, than one that has no speed across them."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
-    turned = v - found.impulse * chain.unit_normal(wall, r)
+    turned = v - found.impulse * walls.unit_normal(wall, r)
     if found.phase == HELD:
-        held = One(found.wall)
-        taken = held.split_at(chain, drift(moving, held, chain, r), r, turned)
+        active = One(found.wall)
+        taken = active.split_at(walls, drift(moving, active, walls, r), r, turned)
     else:
         edge = Two(found.wall, found.other)
-        taken = edge.split_at(chain, drift(moving, edge, chain, r), r, turned)
-        state.impulse[chain.row(found.other), i] += taken.c * state.mass[i]
-    state.impulse[chain.row(found.wall), i] += taken.b * state.mass[i]
+        taken = edge.split_at(walls, drift(moving, edge, walls, r), r, turned)
+        state.impulse[walls.row(found.other), i] += taken.c * state.mass[i]
+    state.impulse[walls.row(found.wall), i] += taken.b * state.mass[i]
 
 
 # --- Short steps -----------------------------------------------------------------------------------------
 
 
-def _take_care(method, chain, gravity, share, i):
+def _take_care(method, walls, gravity, share, i):
     """A short step of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
-    _step(method, chain, gravity, share, i)
+    _step(method, walls, gravity, share, i)
     if state.period is not None:
-        return_particle(state.period, chain, state, i)
+        return_particle(state.period, walls, state, i)
     r = column(state.position, 0, i)
-    closed = isinstance(chain, Carried) and _have_closed(chain, method, r, contacts.left[i])
+    closed = isinstance(walls, Carried) and _have_closed(walls, method, r, contacts.remaining[i])
     return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
 
 
 @outlined
-def _rest(method, chain, gravity, share, i, p, held):
+def _rest(method, walls, gravity, share, i, p, active):
     """Let particle i rest."""
     state, contacts = share.state, share.state.contacts
     loses = method.laws.change_energy
-    for s in range(held.shape[1]):
-        taken = held[1, s] if loses else 0.0
-        contacts.load[s, i] = held[0, s]
-        state.impulse[s, i] += (held[0, s] * p.left + taken) * state.mass[i]
+    for s in range(active.shape[1]):
+        taken = active[1, s] if loses else 0.0
+        contacts.load[s, i] = active[0, s]
+        state.impulse[s, i] += (active[0, s] * p.remaining + taken) * state.mass[i]
     if loses:
         # Round-off that its walls have gathered, which nothing takes back from now on
-        r = touching.inside(chain, p.r)
+        r = touching.inside(walls, p.r)
         put(state.position, 0, i, r)
         lose(state, i, p.twice, 2.0 * potential(gravity, r))
         put(state.velocity, 0, i, ZERO)
-    contacts.sliding[i] += p.left
-    contacts.left[i], contacts.keep[i] = 0.0, 0.0
+    contacts.sliding[i] += p.remaining
+    contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
     contacts.phase[i] = ARRIVED
     share.hand_over(i, ARRIVED)
 
 
 @outlined
-def _step(method, chain, gravity, share, i):
+def _step(method, walls, gravity, share, i):
     state, contacts = share.state, share.state.contacts
-    impulses = scratch((booked(chain), 1), np.float64)
-    r, v, left = column(state.position, 0, i), column(state.velocity, 0, i), contacts.left[i]
+    impulses = scratch((booked(walls), 1), np.float64)
+    r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
     # What is carried begins the frame so.
-    left = left if left > 0.0 else share.span
-    now = chain.at(left)
+    remaining = remaining if remaining > 0.0 else share.span
+    now = walls.at(remaining)
     if state.openings is not None:
         wall = open_wall_at(state.openings, method, now, r, crossing.near(method, r))
         if wall >= 0.0:
-            _leave(share, i, wall, r, v, left)
+            _leave(share, i, wall, r, v, remaining)
             return
-    p = events.Particle(r, v, left, 2.0 * state.energy[i], speed2_scale(state, i))
-    held = scratch((2, chain.length()), np.float64)
-    if method.laws.moving is None and events.settles(method, now, gravity, p, held):
-        _rest(method, now, gravity, share, i, p, held)
+    p = events.Particle(r, v, remaining, 2.0 * state.energy[i], speed2_scale(state, i))
+    active = scratch((2, walls.length()), np.float64)
+    if method.laws.moving is None and events.settles(method, now, gravity, p, active):
+        _rest(method, now, gravity, share, i, p, active)
         return
     # Step by step, where places on its way are looked at.
     if method.laws.moving is not None and state.openings is None and state.period is None:
-        phase = carry(method, chain, gravity, state, i, p)
+        phase = carry(method, walls, gravity, state, i, p)
         if phase != NOT_CARRIED:
             contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
             contacts.step[i], contacts.keep[i] = 0.0, 0.0
@@ -243,28 +245,28 @@ def _step(method, chain, gravity, share, i):
     contacts.short_steps[i] += 1.0
     if state.openings is not None and square(v) > 0.0:
         # A short step, where the places on its way are looked at.
-        p = p._replace(left=min(left, 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))))
-    end = events.careful(method, chain, gravity, contacts.met[i], p, impulses)
+        p = p._replace(remaining=min(remaining, 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))))
+    end = events.careful(method, walls, gravity, contacts.met[i], p, impulses)
     for s in range(impulses.shape[0]):
         state.impulse[s, i] += impulses[s, 0] * state.mass[i]
     put(state.position, 0, i, end.r)
     put(state.velocity, 0, i, end.v)
     given_work = 0.0
-    for s in range(chain.length(), impulses.shape[0]):
+    for s in range(walls.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
-    book_step(chain, state, i, contacts.met[i], change, given_work, method.laws.loses)
+    book_step(walls, state, i, contacts.met[i], change, given_work, method.laws.loses)
     contacts.sliding[i] += end.used
-    contacts.left[i] = max(left - end.used, 0.0)
-    phase = FLYING if contacts.left[i] > 0.0 else ARRIVED
+    contacts.remaining[i] = max(remaining - end.used, 0.0)
+    phase = FLYING if contacts.remaining[i] > 0.0 else ARRIVED
     contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
     share.hand_over(i, phase)
 
 
 @outlined
-def _have_closed(chain, method, r, left):
+def _have_closed(walls, method, r, remaining):
     """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
-    now, deepest = chain.at(left), 0.0
+    now, deepest = walls.at(remaining), 0.0
     number = scratch(count_near(now, r), np.float64)
     list_near(now, r, number)
     for i in range(number.size):

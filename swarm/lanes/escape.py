@@ -9,14 +9,14 @@ from . import log as impact_log
 from .table import marked_lanes
 
 
-def escape(share, p, wall, r, v, left):
+def escape(share, p, wall, r, v, remaining):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
-    share.state.escape_time[p] = share.moment - left
+    share.state.escape_time[p] = share.moment - remaining
     if share.log is not None:
-        share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, left, 0.0))
+        share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
 
 
-def let_out_lanes(openings, method, chain, share, lanes, live):
+def let_out_lanes(openings, method, walls, share, lanes, live):
     """The lanes whose flight has ended on a wall where it is open, if no closed one is at the same place."""
     for i in range(index(live)):
         lanes.marked[i] = is_open(openings, lanes.wall[i], lanes.lane(i).r, 0.0)
@@ -24,12 +24,12 @@ def let_out_lanes(openings, method, chain, share, lanes, live):
         i = index(lanes.order[k])
         flier = lanes.lane(i)
         r, v = flier.r, flier.v
-        wall = hit_wall(openings, method, chain.at(flier.left), (r, v), lanes.wall[i], 0.0)
+        wall = hit_wall(openings, method, walls.at(flier.remaining), (r, v), lanes.wall[i], 0.0)
         if not is_open(openings, wall, r, 0.0):
             lanes.wall[i] = wall
             continue
-        escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.left)
-        flier.left, lanes.wall[i] = 0.0, -1.0
+        escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.remaining)
+        flier.remaining, lanes.wall[i] = 0.0, -1.0
 
 
 @outlined
@@ -37,7 +37,7 @@ def is_at_opening(slide, now, i):
     """Whether a lane that slides is where a wall that holds it is open: it is at that wall then, as if it flew."""
     lanes, lane = slide.lanes, slide.lanes.lane(i)
     near = crossing.near(slide.method, lane.r)
-    wall = open_wall_of(lanes.openings, slide.method, now, slide.held(lane), lane.r, near)
+    wall = open_wall_of(lanes.openings, slide.method, now, slide.active(lane), lane.r, near)
     if wall < 0.0:
         return False
     slide.state.contacts.met[lanes.particle[i]] = wall

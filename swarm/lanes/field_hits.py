@@ -98,9 +98,9 @@ def hit_of_lane(lanes, i):
     return flights.Hit(lanes.course[_TIME, i], lanes.course[_WALL, i])
 
 
-def seek(chain, gravity, lanes, live):
+def seek(walls, gravity, lanes, live):
     """The first hits of every live lane with the fields, or one found."""
-    for before, field in reversed(chain.fields()):
+    for before, field in reversed(walls.fields()):
         _seek(gravity, field.members, before, lanes, live)
 
 
@@ -164,7 +164,7 @@ def _find_near(members, gravity, lanes, live, seen):
         cell = cell_of(grid, r)
         until = until_next(gravity, grid, cell, r, v)
         # Bodies are known twice the margin beyond the cell's wall, and a flight ends one beyond it.
-        until = on_time(lanes.period, gravity, (r, v), lane.left, until, 0.5 * grid.margin)
+        until = on_time(lanes.period, gravity, (r, v), lane.remaining, until, 0.5 * grid.margin)
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])

@@ -12,7 +12,7 @@ from .table import marked_lanes
 _STRIDES = 3
 
 
-def go(method, chain, gravity, lanes, live):
+def go(method, walls, gravity, lanes, live):
     """Every lane to its next contact, or to the end of the frame.
 
     A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
@@ -21,29 +21,29 @@ def go(method, chain, gravity, lanes, live):
     110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
     a particle: the angular momentum in a sphere drifted five times as fast.)
     """
-    met = method.landed_on(chain)
-    _search(met, chain, gravity, lanes, live)
+    met = method.landed_on(walls)
+    _search(met, walls, gravity, lanes, live)
     for i in range(index(live)):
-        _flight(method, chain, gravity, lanes, i, _first_hit(met, chain, gravity, lanes.lane(i), lanes, i))
+        _flight(method, walls, gravity, lanes, i, _first_hit(met, walls, gravity, lanes.lane(i), lanes, i))
 
 
-def _search(met, chain, gravity, lanes, live):
+def _search(met, walls, gravity, lanes, live):
     """First hits with fields and by safe steps, each in a loop of its own."""
     if met is None:
         return
     if _has_fields(met):
-        free, before = chain.others(), chain.count_in_fields()
+        free, before = walls.others(), walls.count_in_fields()
         _search(free, free, gravity, lanes, live)
         for i in range(index(live)):
             keep_hit(lanes, i, _first_hit(free, free, gravity, lanes.lane(i), lanes, i), before)
-        seek(chain, gravity, lanes, live)
+        seek(walls, gravity, lanes, live)
     elif isinstance(met, Strided):
-        _stride(chain, gravity, lanes, live)
-    elif met.walls and not isinstance(met, Marched) and not _is_closed(gravity, chain):
-        _go_by_steps(chain, gravity, lanes, live)
+        _stride(walls, gravity, lanes, live)
+    elif met.walls and not isinstance(met, Marched) and not _is_closed(gravity, walls):
+        _go_by_steps(walls, gravity, lanes, live)
 
 
-def _first_hit(met, chain, gravity, lane, lanes, i):
+def _first_hit(met, walls, gravity, lane, lanes, i):
     """The first hit of a lane with the walls that the method lands on."""
     if met is None or not met.walls:
         return flights.NEVER
@@ -52,10 +52,10 @@ def _first_hit(met, chain, gravity, lane, lanes, i):
     if isinstance(met, Strided):
         return strides.end(lanes.course, i)
     if isinstance(met, Marched):
-        return safe.first_hit(chain, gravity, lane.r, lane.v, lane.left)
-    if _is_closed(gravity, chain):
-        return flights.first_hit(chain.at(lane.left), gravity, lane.r, lane.v)
-    return flights.end(chain.at(lane.left), lanes.course, 0, i)
+        return safe.first_hit(walls, gravity, lane.r, lane.v, lane.remaining)
+    if _is_closed(gravity, walls):
+        return flights.first_hit(walls.at(lane.remaining), gravity, lane.r, lane.v)
+    return flights.end(walls.at(lane.remaining), lanes.course, 0, i)
 
 
 def _has_fields(met):
@@ -63,65 +63,65 @@ def _has_fields(met):
     return len(met.fields()) > 0 and not isinstance(met, Carried)
 
 
-def _is_closed(gravity, chain):
+def _is_closed(gravity, walls):
     """Whether the first hit has a closed form: flights are straight, and no wall is met by steps."""
-    return gravity is None and chain.in_steps() is None
+    return gravity is None and walls.in_steps() is None
 
 
-def _stride(chain, gravity, lanes, live):
+def _stride(walls, gravity, lanes, live):
     """Safe steps of all lanes to walls in any motion."""
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        strides.begin(chain, gravity, course, i, lane.r, lane.v, lane.left)
+        strides.begin(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
         lane = lanes.lane(i)
-        strides.stride(chain, gravity, course, i, lane.r, lane.v, lane.left, True)
+        strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
     for _round in range(_STRIDES):
         for i in range(index(live)):
             lane = lanes.lane(i)
-            strides.stride(chain, gravity, course, i, lane.r, lane.v, lane.left, False)
+            strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
 
 
-def _go_by_steps(chain, gravity, lanes, live):
+def _go_by_steps(walls, gravity, lanes, live):
     """The course of every lane to its first hit, by safe steps."""
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        flights.begin(chain.at(lane.left), gravity, course, 0, i, lane.r, lane.v)
+        flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v)
     for _step in range(SAFE_STEPS):
         for i in range(index(live)):
-            _step_on(chain, gravity, lanes, i)
+            _step_on(walls, gravity, lanes, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
     for i in range(index(live)):
-        lanes.marked[i] = _needs_more(chain, lanes, i)
+        lanes.marked[i] = _needs_more(walls, lanes, i)
     for k in range(marked_lanes(lanes, live)):
         i = lanes.order[k]
         for _step in range(MORE_STEPS):
-            _step_on(chain, gravity, lanes, i)
-            if not _needs_more(chain, lanes, i):
+            _step_on(walls, gravity, lanes, i)
+            if not _needs_more(walls, lanes, i):
                 break
 
 
-def _step_on(chain, gravity, lanes, i):
+def _step_on(walls, gravity, lanes, i):
     """One safe step of a lane."""
     lane = lanes.lane(i)
-    flights.step(chain.at(lane.left), gravity, lanes.course, 0, i, lane.r, lane.v)
+    flights.step(walls.at(lane.remaining), gravity, lanes.course, 0, i, lane.r, lane.v)
 
 
-def _needs_more(chain, lanes, i):
+def _needs_more(walls, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
-    left = lanes.lane(i).left
-    hit = flights.end(chain.at(left), lanes.course, 0, i)
-    return (hit.wall < 0.0) & (hit.time < left)
+    remaining = lanes.lane(i).remaining
+    hit = flights.end(walls.at(remaining), lanes.course, 0, i)
+    return (hit.wall < 0.0) & (hit.time < remaining)
 
 
-def _flight(method, chain, gravity, lanes, i, hit):
+def _flight(method, walls, gravity, lanes, i, hit):
     """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lanes.given(method, i)
     if method.lands:
-        end = method.land(chain, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.left, hit))
+        end = method.land(walls, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.remaining, hit))
     else:
-        end = method.flight(chain, gravity, lane)
+        end = method.flight(walls, gravity, lane)
     lanes.lane(i).put_end(end)
     lanes.wall[i] = end.wall

@@ -32,19 +32,19 @@ class Picked(Record):
         return self.body
 
 
-def _fields(chain):
+def _fields(walls):
     """The fields of a scene, with their numbers. Of walls that move each contact looks at all."""
-    return () if isinstance(chain, Carried) else chain.fields()
+    return () if isinstance(walls, Carried) else walls.fields()
 
 
-def picks(chain):
+def picks(walls):
     """Room for the numbers of a body in each lane, of every field."""
-    return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(chain))
+    return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(walls))
 
 
-def pick(chain, lanes, picked, live):
+def pick(walls, lanes, picked, live):
     """The numbers of the body that each lane has met; of any where it has met none of this field."""
-    for (before, field), rows in zip(_fields(chain), picked, strict=True):
+    for (before, field), rows in zip(_fields(walls), picked, strict=True):
         members, last = field.members, field.count() - 1.0
         for i in range(index(live)):
             wall = lanes.wall[i] - before
@@ -52,12 +52,12 @@ def pick(chain, lanes, picked, live):
             copy_row(rows, i, members.table, m, width(members.like))
 
 
-def of_lane(chain, picked, i):
+def of_lane(walls, picked, i):
     """The walls of a scene for the contact of one lane."""
     if not picked:
-        return chain
+        return walls
     fields = (
         Field(Picked(gathered(field.members.like, rows, i, 0), field.count()))
-        for (_number, field), rows in zip(_fields(chain), picked, strict=True)
+        for (_number, field), rows in zip(_fields(walls), picked, strict=True)
     )
-    return Walls((*fields, *chain.others().walls))
+    return Walls((*fields, *walls.others().each))

@@ -24,7 +24,7 @@ _named = Rows()
 class Before(Lane):
     """A lane before its contact: its flight, the wall, and the impulse that this has given it since."""
 
-    r, v, left = _named.vector(), _named.vector(), _named.number()
+    r, v, remaining = _named.vector(), _named.vector(), _named.number()
     hits, wall, impulse = _named.number(), _named.number(), _named.number()
 
 
@@ -38,7 +38,7 @@ class Struck(Record):
     before: Vec
     after: Vec
     wall: float
-    left: float  # of the frame [s]
+    remaining: float  # of the frame [s]
     impulse: float
 
 
@@ -47,7 +47,7 @@ class Log(NamedTuple):
 
     time: Array  # (rows,) [s]
     particle: Array  # (rows,) int32
-    wall: Array  # (rows,) int32, its number in the chain
+    wall: Array  # (rows,) int32, its number in the scene
     position: Array  # (rows, 3) [m], in the cell where the scene repeats
     velocity_before: Array  # (rows, 3) [m/s]
     velocity_after: Array  # (rows, 3)
@@ -65,7 +65,7 @@ class Log(NamedTuple):
         """Keep every lane as it is before its contact."""
         for i in range(index(live)):
             lane, before = lanes.lane(i), Before(lanes.before, i)
-            before.r, before.v, before.left, before.hits = lane.r, lane.v, lane.left, lane.hits
+            before.r, before.v, before.remaining, before.hits = lane.r, lane.v, lane.remaining, lane.hits
             before.wall, before.impulse = lanes.wall[i], 0.0
 
     def note(self, lanes, i, impulse):
@@ -73,7 +73,7 @@ class Log(NamedTuple):
         Before(lanes.before, i).impulse += impulse
 
     @outlined
-    def add_rows(self, method, chain, state, lanes, live):
+    def add_rows(self, method, walls, state, lanes, live):
         """A row for each lane with one more impact than before its contact."""
         order, n = self.order, index(0)
         for i in range(index(live)):
@@ -82,17 +82,17 @@ class Log(NamedTuple):
         for k in range(n):
             i = index(order[k])
             before = Before(lanes.before, i)
-            struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.left, before.impulse)
-            self._add(state, lanes.particle[i], struck, self._slip_of(method, chain, struck))
+            struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.remaining, before.impulse)
+            self._add(state, lanes.particle[i], struck, self._slip_of(method, walls, struck))
 
-    def add_row(self, method, chain, state, particle, struck):
+    def add_row(self, method, walls, state, particle, struck):
         """A row for an impact of a particle."""
         if self.has(particle):
-            self._add_impact(method, chain, state, particle, struck)
+            self._add_impact(method, walls, state, particle, struck)
 
     @outlined
-    def _add_impact(self, method, chain, state, particle, struck):
-        self._add(state, particle, struck, self._slip_of(method, chain, struck))
+    def _add_impact(self, method, walls, state, particle, struck):
+        self._add(state, particle, struck, self._slip_of(method, walls, struck))
 
     @outlined
     def add_escape(self, state, particle, struck):
@@ -104,11 +104,11 @@ class Log(NamedTuple):
         """Whether a particle has rows."""
         return True if self.chosen is None else self.chosen[index(particle)]
 
-    def _slip_of(self, method, chain, struck):
+    def _slip_of(self, method, walls, struck):
         """How fast a particle slips along the wall that it strikes, where the log has that."""
         if self.slip is None:
             return ZERO
-        now = chain.at(struck.left)
+        now = walls.at(struck.remaining)
         u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
         n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
         return before - dot(before, n) * n
@@ -116,7 +116,7 @@ class Log(NamedTuple):
     def _add(self, state, particle, struck, slip):
         k, p = index(self.filled[0]), index(particle)
         self.filled[0] += 1
-        self.time[k] = max(self.begin, self.end - struck.left)
+        self.time[k] = max(self.begin, self.end - struck.remaining)
         self.particle[k], self.wall[k] = np.int32(particle), np.int32(struck.wall)
         _put(self.position, k, struck.r)
         _put(self.velocity_before, k, struck.before)
@@ -134,7 +134,7 @@ def _put(rows, k, vector):
 
 
 class Counts(Record):
-    """Impacts on each wall of the chain that one thread has computed."""
+    """Impacts on each wall of the scene that one thread has computed."""
 
     impacts: Array  # (walls,) int64
 
@@ -147,14 +147,14 @@ class Counts(Record):
     def note(self, lanes, i, impulse):
         """Nothing: impulses are not counted."""
 
-    def add_rows(self, method, chain, state, lanes, live):
+    def add_rows(self, method, walls, state, lanes, live):
         """Count the impacts of a pass."""
         for i in range(index(live)):
             before = Before(lanes.before, i)
             # A lane without an impact may be at no wall.
             self.impacts[index(int(max(before.wall, 0.0)))] += np.int64(lanes.lane(i).hits - before.hits)
 
-    def add_row(self, method, chain, state, particle, struck):
+    def add_row(self, method, walls, state, particle, struck):
         """Count an impact of a particle."""
         self.impacts[index(int(struck.wall))] += 1
 

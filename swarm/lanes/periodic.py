@@ -53,14 +53,14 @@ def _come_through(period, state, p, images, twice):
 
 
 @outlined
-def return_sliding(period, chain, state, lanes, i, phase):
+def return_sliding(period, walls, state, lanes, i, phase):
     """A lane that slides, back into the cell where it goes on; its phase then: it flies to the image of its wall."""
     lane, p = lanes.lane(i), lanes.particle[i]
     r = lane.r
     if phase == ARRIVED or not has_left(period, r):
         return phase
     back, slides = into(period, r), phase in (HELD, EDGE, AGAIN)
-    if not slides or not _are_there(period, chain.at(lane.left), lane.first, lane.second, r, back.r):
+    if not slides or not _are_there(period, walls.at(lane.remaining), lane.first, lane.second, r, back.r):
         return FLYING
     lane.r = back.r
     lane.twice = _come_through(period, state, p, back.images, lane.twice)
@@ -68,7 +68,7 @@ def return_sliding(period, chain, state, lanes, i, phase):
 
 
 @outlined
-def return_particle(period, chain, state, p):
+def return_particle(period, walls, state, p):
     """A particle that its kernel has given back, into the cell."""
     contacts, r = state.contacts, column(state.position, 0, p)
     if not has_left(period, r):
@@ -78,19 +78,19 @@ def return_particle(period, chain, state, p):
     _come_through(period, state, p, back.images, 0.0)
     first, second = contacts.walls[0, p], contacts.walls[1, p]
     holds = contacts.phase[p] == HELD or contacts.phase[p] == EDGE
-    if holds and not _are_there(period, chain.at(contacts.left[p]), first, second, r, back.r):
+    if holds and not _are_there(period, walls.at(contacts.remaining[p]), first, second, r, back.r):
         contacts.phase[p], contacts.step[p] = FLYING, 0.0
         contacts.walls[0, p], contacts.walls[1, p] = -1.0, -1.0
 
 
 @outlined
-def _are_there(period, chain, first, second, r, back):
+def _are_there(period, walls, first, second, r, back):
     """Whether the walls that hold a particle at r are those that hold it in the cell, not images of others."""
     near = _ON_THE_WALL * (length_of(period.x) + length_of(period.y) + length_of(period.z))
-    return _is_there(chain, first, r, back, near) and (second < 0.0 or _is_there(chain, second, r, back, near))
+    return _is_there(walls, first, r, back, near) and (second < 0.0 or _is_there(walls, second, r, back, near))
 
 
 @outlined
-def _is_there(chain, wall, r, back, near):
-    same = dot(chain.unit_normal(wall, r), chain.unit_normal(wall, back)) > 0.5
-    return same and abs(chain.distance(wall, back) - chain.distance(wall, r)) <= near
+def _is_there(walls, wall, r, back, near):
+    same = dot(walls.unit_normal(wall, r), walls.unit_normal(wall, back)) > 0.5
+    return same and abs(walls.distance(wall, back) - walls.distance(wall, r)) <= near

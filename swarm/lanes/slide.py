@@ -23,13 +23,13 @@ from .table import LANES, LOOK, with_distances
 
 
 @long_kernel
-def slide_block(kind, method, chain, gravity, share, lanes):
+def slide_block(kind, method, walls, gravity, share, lanes):
     """Advance the particles of this kind, `One` or `Two`, that a thread draws: (status, particle, drawn).
 
     Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
     """
     lanes = with_distances(lanes)
-    slide = Slide(kind, method, chain, gravity, share.state, lanes)
+    slide = Slide(kind, method, walls, gravity, share.state, lanes)
     place, live, passes, loaded = Place(0, 0, 0), 0, 0, True
     while live < LANES and loaded:
         place, loaded = _refill(slide, share, live, place, passes)
@@ -79,8 +79,8 @@ def _next_phase(slide, i):
     phase, lanes = slide.phase(), slide.lanes
     if lanes.event[i] != 0:
         phase = decide(slide, i)
-    phase = phase if lanes.lane(i).left > 0.0 else ARRIVED
-    return phase if lanes.period is None else return_sliding(lanes.period, slide.chain, slide.state, lanes, i, phase)
+    phase = phase if lanes.lane(i).remaining > 0.0 else ARRIVED
+    return phase if lanes.period is None else return_sliding(lanes.period, slide.walls, slide.state, lanes, i, phase)
 
 
 # --- Into lanes and out of them --------------------------------------------------------------------------
@@ -106,17 +106,17 @@ def _refill(slide, share, i, place, passes):
 def _load(slide, share, i, p):
     """Particle p into lane i; whether it slides: it may also rest until the end of the frame, or fly."""
     lane, state, contacts = slide.lanes.lane(i), slide.state, slide.state.contacts
-    begins = not contacts.left[p] > 0.0
-    left = share.span if begins else contacts.left[p]
+    begins = not contacts.remaining[p] > 0.0
+    remaining = share.span if begins else contacts.remaining[p]
     r, v = column(state.position, 0, p), column(state.velocity, 0, p)
     slide.lanes.particle[i] = p
-    lane.left, lane.step, lane.cut, lane.trials = left, contacts.step[p], np.inf, 0.0
+    lane.remaining, lane.step, lane.cut, lane.trials = remaining, contacts.step[p], np.inf, 0.0
     lane.first, lane.second = contacts.walls[0, p], contacts.walls[1, p]
     lane.keep, lane.twice, lane.scale2 = contacts.keep[p], 2.0 * state.energy[p], speed2_scale(state, p)
     if begins:
-        held, now = slide.held(lane), slide.chain.at(left)
+        active, now = slide.active(lane), slide.walls.at(remaining)
         # Frames show the speed that is kept across the walls too.
-        v = held.split_at(now, hold.drift(slide.moving(), held, now, r), r, v).along
+        v = active.split_at(now, hold.drift(slide.moving(), active, now, r), r, v).along
     lane.r, lane.v = r, v
     phase = set_going(slide, i)
     if phase != slide.phase():
@@ -130,12 +130,12 @@ def _retire(slide, share, i, phase):
     """A lane back into its particle, for its next phase."""
     lanes, state, contacts = slide.lanes, slide.state, slide.state.contacts
     lane, p = lanes.lane(i), index(lanes.particle[i])
-    now = slide.chain.at(lane.left)
+    now = slide.walls.at(lane.remaining)
     if phase == AGAIN:
         phase = slide.phase()
     v, keep = lane.v, lane.keep
     slid = phase != FLYING and phase != CAREFUL
-    if not (slid and lane.left > 0.0):
+    if not (slid and lane.remaining > 0.0):
         v = slide.with_kept(now, lane)
     if phase == FLYING:
         u = wall_velocity(slide.moving(), now, lane.first, lane.r)
@@ -148,9 +148,9 @@ def _retire(slide, share, i, phase):
         contacts.phase[p] = phase if slid else FLYING
     elif contacts.phase[p] != ARRIVED:
         contacts.phase[p] = slide.phase()
-    contacts.left[p] = lane.left if phase != ARRIVED else 0.0
+    contacts.remaining[p] = lane.remaining if phase != ARRIVED else 0.0
     contacts.step[p] = lane.step if slid else 0.0
     contacts.keep[p] = keep
     if lanes.period is not None:
-        return_particle(lanes.period, slide.chain, state, p)
+        return_particle(lanes.period, slide.walls, state, p)
     share.hand_over(p, phase)

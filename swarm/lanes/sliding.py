@@ -26,7 +26,7 @@ class Sliding(Advanced):
     # The numbers of its walls, -1 for none, and how they press on it.
     first, second, press, press_second = _named.number(), _named.number(), _named.number(), _named.number()
     # The time left, the next step, and where a step is cut; how often the step has been cut.
-    left, step, cut, trials = _named.number(), _named.number(), _named.number(), _named.number()
+    remaining, step, cut, trials = _named.number(), _named.number(), _named.number(), _named.number()
     # The speed that it keeps across the walls, twice its energy, the square of its speed scale.
     keep, twice, scale2 = _named.number(), _named.number(), _named.number()
     # The particle and the time left when all lanes were looked at last.
@@ -90,7 +90,7 @@ class Slide(Record):
 
     kind: Any
     method: Any
-    chain: Any
+    walls: Any
     gravity: Any
     state: Any
     lanes: Lanes
@@ -107,13 +107,13 @@ class Slide(Record):
         """Whether a wall moves: a constant for the compiler."""
         return self.moving() is not None
 
-    def held(self, lane):
+    def active(self, lane):
         """The walls that hold a lane."""
         return self.kind.of_lane(lane.first, lane.second)
 
     def force(self, lane, now, r, v):
         """The force on a lane at a place, from the walls of this instant."""
-        return slides.force(self.method.laws, self.held(lane), now, self.gravity, r, v)
+        return slides.force(self.method.laws, self.active(lane), now, self.gravity, r, v)
 
     @outlined
     def with_kept(self, now, lane):
@@ -121,9 +121,9 @@ class Slide(Record):
         v, keep = lane.v, lane.keep
         if not keep > 0.0:
             return v
-        held = self.held(lane)
-        taken = held.split_at(now, None, lane.r, v)
-        return v + keep * held.inward(taken.n, taken.m)
+        active = self.active(lane)
+        taken = active.split_at(now, None, lane.r, v)
+        return v + keep * active.inward(taken.n, taken.m)
 
     # --- Accounts
 
@@ -143,18 +143,18 @@ class Slide(Record):
     def push(self, i, first, second):
         """Impulses per mass to the walls that hold a lane."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
-        state.impulse[self.chain.row(lane.first), p] += first * state.mass[p]
+        state.impulse[self.walls.row(lane.first), p] += first * state.mass[p]
         if lane.second >= 0.0:
-            state.impulse[self.chain.row(lane.second), p] += second * state.mass[p]
+            state.impulse[self.walls.row(lane.second), p] += second * state.mass[p]
 
     def work(self, i, twice, second):
         """Book twice the work per mass of walls that move, and of it that of the second wall."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
         behind = state.impulse.shape[0] // 2
         state.energy[p] = 0.5 * lane.twice
-        state.impulse[behind + self.chain.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
+        state.impulse[behind + self.walls.row(lane.first), p] += 0.5 * (twice - second) * state.mass[p]
         if lane.second >= 0.0:
-            state.impulse[behind + self.chain.row(lane.second), p] += 0.5 * second * state.mass[p]
+            state.impulse[behind + self.walls.row(lane.second), p] += 0.5 * second * state.mass[p]
 
     def lose(self, i, twice):
         """Book twice the energy per mass that a lane has lost; its row knows what is left."""

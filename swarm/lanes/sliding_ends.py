@@ -27,9 +27,9 @@ _RETRY = 0.25
 @outlined
 def set_going(slide, i):
     """The forces on a lane at the start of its next step; its phase then, which may be to rest."""
-    chain, lanes, lane = slide.chain, slide.lanes, slide.lanes.lane(i)
-    r, v, left = lane.r, lane.v, lane.left
-    now = chain.at(left)
+    walls, lanes, lane = slide.walls, slide.lanes, slide.lanes.lane(i)
+    r, v, remaining = lane.r, lane.v, lane.remaining
+    now = walls.at(remaining)
     if lanes.openings is not None and is_at_opening(slide, now, i):
         return EVENT
     force = slide.force(lane, now, r, v)
@@ -40,12 +40,12 @@ def set_going(slide, i):
         return stay(slide, i)
     if square(v) == 0.0 and events.rests(slide.gravity, force):
         p, contacts = lanes.particle[i], slide.state.contacts
-        contacts.sliding[p] += left
-        contacts.phase[p], contacts.load[chain.row(lane.first), p] = ARRIVED, force.n
+        contacts.sliding[p] += remaining
+        contacts.phase[p], contacts.load[walls.row(lane.first), p] = ARRIVED, force.n
         if lane.second >= 0.0:
-            contacts.load[chain.row(lane.second), p] = force.m
-        slide.push(i, force.n * left, force.m * left)
-        lane.left = 0.0
+            contacts.load[walls.row(lane.second), p] = force.m
+        slide.push(i, force.n * remaining, force.m * remaining)
+        lane.remaining = 0.0
         return ARRIVED
     return slide.phase()
 
@@ -56,7 +56,7 @@ def decide(slide, i):
 
     The step is cut where the event is, and taken again, until the event is at its start.
     """
-    method, chain, lanes, lane = slide.method, slide.chain, slide.lanes, slide.lanes.lane(i)
+    method, walls, lanes, lane = slide.method, slide.walls, slide.lanes, slide.lanes.lane(i)
     event, h = lanes.event[i], lane.h
     if event & STOPPED:
         _stop(slide, i)
@@ -65,25 +65,25 @@ def decide(slide, i):
         return _give_up(slide, i)
     if event & FAILED:
         return _shorten(slide, i)
-    held, r, v = slide.held(lane), lane.r, lane.v
+    active, r, v = slide.active(lane), lane.r, lane.v
     path, near = crossing.Path(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
     cut = 1.0
     if event & LIFTED:
-        particle = events.Particle(r, v, lane.left, lane.twice, lane.scale2)
+        particle = events.Particle(r, v, lane.remaining, lane.twice, lane.scale2)
         phase, cut = _lift(slide.phase(), lane, events.weightless(method, slide.gravity, particle))
         if phase != slide.phase():
             return phase
     if event & MET:
-        met = crossing.arrival(chain, held, path, near, lane.left)
+        met = crossing.arrival(walls, active, path, near, lane.remaining)
         # At once, or so soon that the time left does not change.
-        if lane.left - met.time * h == lane.left:
+        if lane.remaining - met.time * h == lane.remaining:
             slide.state.contacts.met[lanes.particle[i]] = met.wall
-            lane.r = chain.at(lane.left).project(met.wall, r)
+            lane.r = walls.at(lane.remaining).project(met.wall, r)
             return EVENT
         cut = min(cut, met.time)
     if event & (LEAVES | PASSES):
         cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
-        cut = min(cut, part_until_open(lanes.openings, method, chain.at(lane.left), held, path, near))
+        cut = min(cut, part_until_open(lanes.openings, method, walls.at(lane.remaining), active, path, near))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(slide, i)
@@ -96,7 +96,7 @@ def _stop(slide, i):
     """Friction has stopped a lane."""
     lane, r, u, given = slide.lanes.lane(i), slide.lanes.lane(i).r, ZERO, 0.0
     if slide.moves():
-        u = slide.chain.at(lane.left).velocity(lane.first, r)
+        u = slide.walls.at(lane.remaining).velocity(lane.first, r)
         lost, twice = square(lane.v - u) + lane.keep * lane.keep, square(u) + 2.0 * potential(slide.gravity, r)
         given = twice - lane.twice + lost
         lane.twice = twice
@@ -114,7 +114,7 @@ def _stop(slide, i):
 def _take(slide, i):
     """Take a step after all."""
     lanes, lane = slide.lanes, slide.lanes.lane(i)
-    lane.r, lane.v, lane.left, lane.cut = lane.r1, lane.v1, lane.left - lane.h, np.inf
+    lane.r, lane.v, lane.remaining, lane.cut = lane.r1, lane.v1, lane.remaining - lane.h, np.inf
     lane.twice = twice_after(slide, lane.twice - lane.work, lanes.after[i])
     lanes.unsolved[i] = True
     slide.account(i)
@@ -134,10 +134,10 @@ def _shorten(slide, i):
     if h > SHORTEST * slide.method.size / math.sqrt(lane.scale2):
         return slide.phase()
     end = lane.r + h * lane.v
-    if slide.chain.at(lane.left - h).outside(-1.0, end) or not h > 0.0:
+    if slide.walls.at(lane.remaining - h).outside(-1.0, end) or not h > 0.0:
         return _give_up(slide, i)
     lane.r = end
-    lane.left -= h
+    lane.remaining -= h
     return FLYING
 
 

@@ -22,7 +22,7 @@ SLOWEST = 1e-24
 
 def compose(slide, live):
     """One composed step of every live lane, from its r, v and a to its r1 and v1."""
-    chain, gravity, lanes = slide.chain, slide.gravity, slide.lanes
+    walls, gravity, lanes = slide.walls, slide.gravity, slide.lanes
     friction, moving = slide.method.laws.friction, slide.moving()
     rubs = friction is not None
     for i in range(live):
@@ -31,7 +31,7 @@ def compose(slide, live):
         for i in range(live):
             lane = lanes.lane(i)
             r, v, h = lane.r1, lane.v1, slides.part(k) * lane.h
-            now = chain.at(lane.left - slides.before(k) * lane.h)
+            now = walls.at(lane.remaining - slides.before(k) * lane.h)
             last = lane.change
             change = last + slides.lead(k) * (last - lane.before)
             lane.before = last
@@ -41,7 +41,7 @@ def compose(slide, live):
                 # The drive of a particle that is at rest on its first wall
                 drive = last - lane.h * now.acceleration(lane.first, r) if slide.moves() else last
                 toward = slides.direction(friction, relative(u, v), drive)
-                slowed = slides.slow(friction, slide.held(lane), now, gravity, r, (v, toward, u), 0.5 * h)
+                slowed = slides.slow(friction, slide.active(lane), now, gravity, r, (v, toward, u), 0.5 * h)
                 v = slowed.v
                 lane.work += slowed.lost
                 lane.toward = toward
@@ -55,17 +55,17 @@ def compose(slide, live):
                 break
         for i in range(live):
             lane = lanes.lane(i)
-            h, w, v0, r0, held = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, slide.held(lane)
-            left, after = _when(lane, k)
-            step, end = chain.during(left, after), lane.end
+            h, w, v0, r0, active = slides.part(k) * lane.h, lane.w, lane.v1, lane.r1, slide.active(lane)
+            remaining, after = _when(lane, k)
+            step, end = walls.during(remaining, after), lane.end
             # The last sweep
-            drift = hold.mean_drift(moving, held, step, r0, end, h)
-            taken = held.split(step, drift, r0, end, w)
+            drift = hold.mean_drift(moving, active, step, r0, end, h)
+            taken = active.split(step, drift, r0, end, w)
             r, v1 = r0 + h * taken.along, accelerated(gravity, 2.0 * taken.along - w, 0.5 * h)
             if rubs:
-                now = chain.at(after)
+                now = walls.at(after)
                 u = wall_velocity(moving, now, lane.first, r)
-                slowed = slides.slow(friction, held, now, gravity, r, (v1, lane.toward, u), 0.5 * h)
+                slowed = slides.slow(friction, active, now, gravity, r, (v1, lane.toward, u), 0.5 * h)
                 v1 = slowed.v
                 lane.work += slowed.lost
             lane.r1, lane.v1 = r, v1
@@ -80,7 +80,7 @@ def _start(slide, i):
     """How long the step of a lane is, by how much it may be off, and from where it goes."""
     lane, method = slide.lanes.lane(i), slide.method
     v, a, r = lane.v, lane.a, lane.r
-    h = select(lane.step < lane.left, lane.step, lane.left)
+    h = select(lane.step < lane.remaining, lane.step, lane.remaining)
     h = select(lane.cut < h, lane.cut, h)
     stop = _longest(slide, lane)
     h = select(stop < h, stop, h)
@@ -96,7 +96,7 @@ def _start(slide, i):
 
 def _longest(slide, lane):
     """A time within which a lane that slides with friction surely does not stop on its first wall."""
-    now, r, v, a = slide.chain.at(lane.left), lane.r, lane.v, lane.a
+    now, r, v, a = slide.walls.at(lane.remaining), lane.r, lane.v, lane.a
     if slide.moves():
         v, a = v - now.velocity(lane.first, r), a - now.acceleration(lane.first, r)
     return slides.longest(slide.method.laws.friction, v, a)
@@ -104,15 +104,15 @@ def _longest(slide, lane):
 
 def _when(lane, k):
     """How much of the frame is left at the start and at the end of part k."""
-    left, h = lane.left, lane.h
-    return left - slides.before(k) * h, left - (slides.before(k) + slides.part(k)) * h
+    remaining, h = lane.remaining, lane.h
+    return remaining - slides.before(k) * h, remaining - (slides.before(k) + slides.part(k)) * h
 
 
 def _sweep_lane(slide, i, k):
     """One sweep of a lane that still moves: whether it needs another."""
     lane, unsolved = slide.lanes.lane(i), slide.lanes.unsolved
-    end, step, h = lane.end, slide.chain.during(*_when(lane, k)), slides.part(k) * lane.h
-    swept = slides.sweep(slide.moving(), slide.held(lane), step, h, (lane.r1, end, lane.w), lane.still)
+    end, step, h = lane.end, slide.walls.during(*_when(lane, k)), slides.part(k) * lane.h
+    swept = slides.sweep(slide.moving(), slide.active(lane), step, h, (lane.r1, end, lane.w), lane.still)
     on = unsolved[i]
     lane.end = either(on, swept.r, end)
     more = on & swept.moves
@@ -130,13 +130,13 @@ def end_steps(slide, live):
 
 
 def _end_step(slide, i):
-    method, chain, gravity, lanes, lane = slide.method, slide.chain, slide.gravity, slide.lanes, slide.lanes.lane(i)
-    moving, held = slide.moving(), slide.held(lane)
-    start, now = chain.at(lane.left), chain.at(lane.left - lane.h)
+    method, walls, gravity, lanes, lane = slide.method, slide.walls, slide.gravity, slide.lanes, slide.lanes.lane(i)
+    moving, active = slide.moving(), slide.active(lane)
+    start, now = walls.at(lane.remaining), walls.at(lane.remaining - lane.h)
     h, scale2, keep = lane.h, lane.scale2, lane.keep
     r0, v0, a0 = lane.r, lane.v, lane.a
-    r1 = held.project(now, lane.r1)
-    v1 = held.split_at(now, hold.drift(moving, held, now, r1), r1, lane.v1).along
+    r1 = active.project(now, lane.r1)
+    v1 = active.split_at(now, hold.drift(moving, active, now, r1), r1, lane.v1).along
     rest = 2.0 * potential(gravity, r1) + keep * keep
     twice = twice_after(slide, lane.twice - lane.work, square(v1) + rest)
     if not slide.moves():
@@ -145,11 +145,11 @@ def _end_step(slide, i):
     force = slide.force(lane, now, r1, v1)
     ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), lane.allowed)
     path = crossing.Path(r0, v0, r1, v1, h)
-    lifted = held.lets_go(force.n, force.m)
-    met = crossing.meets(start, now, held, path, crossing.near(method, r1))
+    lifted = active.lets_go(force.n, force.m)
+    met = crossing.meets(start, now, active, path, crossing.near(method, r1))
     good = (ratio <= 1.0) & (lanes.event[i] == 0)
     leaves = is_beyond(lanes.period, r1)
-    passes = may_pass(lanes.openings, held, path)
+    passes = may_pass(lanes.openings, active, path)
     fine = good & (not lifted) & (not met) & (not leaves) & (not passes)
     happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
     happened |= select(passes, PASSES, 0)
@@ -160,7 +160,7 @@ def _end_step(slide, i):
     whole = (fine & (h == lane.step)) | (not (ratio <= 1.0))
     lane.step = select(whole, slides.next_step(h, ratio), lane.step)
     lane.cut = select(fine, np.inf, lane.cut)
-    lane.left -= select(fine, h, 0.0)
+    lane.remaining -= select(fine, h, 0.0)
     lanes.gained[i], lanes.after[i] = twice + lane.work - lane.twice, twice
     lane.twice = select(fine, twice, lane.twice)
     lane.r1, lane.v1, lane.press1, lane.press1_second = r1, v1, force.n, force.m

@@ -14,20 +14,20 @@ from ..kernel.vector import column, put
 from ..methods import contract as methods
 
 
-def solve(method, chain, gravity, multipliers, lanes, live):
+def solve(method, walls, gravity, multipliers, lanes, live):
     """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
-    if method.most_sweeps(chain) > 0:
+    if method.most_sweeps(walls) > 0:
         for i in range(live):
-            lanes.kappa[i], lanes.unsolved[i] = method.guess(chain, gravity, lanes.given(method, i), lanes.wall[i])
+            lanes.kappa[i], lanes.unsolved[i] = method.guess(walls, gravity, lanes.given(method, i), lanes.wall[i])
     if multipliers is not None:
-        _begin_multipliers(method, chain, gravity, lanes, live)
-    _newton(method, chain, gravity, multipliers, lanes, live)
+        _begin_multipliers(method, walls, gravity, lanes, live)
+    _newton(method, walls, gravity, multipliers, lanes, live)
     if multipliers is not None:
-        _sweep_multipliers(multipliers, method, chain, gravity, lanes, live)
+        _sweep_multipliers(multipliers, method, walls, gravity, lanes, live)
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if method.turns:
         for i in range(live):
-            turned = method.turn(chain, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
+            turned = method.turn(walls, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
             put(lanes.turned, 0, i, turned.v)
             lanes.turned[3, i] = turned.impulse
 
@@ -42,14 +42,14 @@ def solution(method, lanes, i):
     return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
 
-def _newton(method, chain, gravity, multipliers, lanes, live):
+def _newton(method, walls, gravity, multipliers, lanes, live):
     """Sweeps of the inner solve, until the last lane is solved."""
     kappa, unsolved, record = lanes.kappa, lanes.unsolved, lanes.record
-    for _sweep in range(method.most_sweeps(chain)):
+    for _sweep in range(method.most_sweeps(walls)):
         remaining = 0
         for i in range(live):
             going = unsolved[i]
-            kappa[i], unsolved[i], found = method.improve(chain, gravity, lanes.given(method, i), lanes.wall[i],
+            kappa[i], unsolved[i], found = method.improve(walls, gravity, lanes.given(method, i), lanes.wall[i],
                 methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), record[MULTIPLIER, i],
             )  # fmt: skip
             if multipliers is not None:
@@ -64,24 +64,24 @@ def _newton(method, chain, gravity, multipliers, lanes, live):
 # --- Multipliers -----------------------------------------------------------------------------------------
 
 
-def _begin_multipliers(method, chain, gravity, lanes, live):
+def _begin_multipliers(method, walls, gravity, lanes, live):
     """The start of the loop (8) of every lane that has a contact."""
     kappa, record = lanes.kappa, lanes.record
     for i in range(live):
         record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = method.first_multiplier(
-            chain, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
+            walls, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
         )
         lanes.sweeping[i] = lanes.unsolved[i]
         record[BEFORE, i], record[MISS, i] = np.nan, np.nan
         record[SWEEPS, i], record[STORED, i], record[UNCONVERGED, i] = 0.0, 0.0, 0.0
 
 
-def _sweep_multipliers(multipliers, method, chain, gravity, lanes, live):
+def _sweep_multipliers(multipliers, method, walls, gravity, lanes, live):
     """Sweeps of the loop (8), until the last lane has converged."""
     for _sweep in range(method.multiplier_sweeps):
         if _update_multipliers(method, lanes, live) == 0:
             break
-        _newton(method, chain, gravity, multipliers, lanes, live)
+        _newton(method, walls, gravity, multipliers, lanes, live)
     for i in range(live):
         lanes.unsolved[i] = lanes.unsolved[i] | lanes.sweeping[i]
 
@@ -92,7 +92,7 @@ def _update_multipliers(method, lanes, live):
     remaining = 0
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
-        new, miss, more = method.next_multiplier(lanes.lane(i).left, record[ACCELERATION, i], old,
+        new, miss, more = method.next_multiplier(lanes.lane(i).remaining, record[ACCELERATION, i], old,
             LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
             methods.Sweep(record[BEFORE, i], record[MISS, i]),
         )  # fmt: skip
@@ -135,4 +135,4 @@ def keep_failure(multipliers, lanes, i):
     particle = lanes.particle[i]
     multipliers.sweeps[particle] = np.int64(lanes.record[SWEEPS, i])
     multipliers.stored_energy[particle] = lanes.record[STORED, i]
-    multipliers.left[particle] = lanes.lane(i).left
+    multipliers.remaining[particle] = lanes.lane(i).remaining

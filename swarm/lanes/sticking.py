@@ -32,18 +32,18 @@ class Clear(Record):
 @outlined
 def stay(slide, i):
     """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
-    chain, lanes, contacts, lane = slide.chain, slide.lanes, slide.state.contacts, slide.lanes.lane(i)
-    left, first = lane.left, lane.first
-    now = chain.at(left)
+    walls, lanes, contacts, lane = slide.walls, slide.lanes, slide.state.contacts, slide.lanes.lane(i)
+    remaining, first = lane.remaining, lane.first
+    now = walls.at(remaining)
     u, slowest = now.velocity(first, lane.r), SLOWEST * lane.scale2
     moves_on = square(lane.v - u) > slowest or _rubs(slide, now, lane, slowest)
     if moves_on or not _rests(slide, now, lane, lane.r):
         return slide.phase()
     pace, low, high, met, paces = now.shortest_time_scale(), 0.0, 0.0, -1.0, 0.0
     pressed, pressed_second = 0.0, 0.0
-    while low < left and met < 0.0 and paces < _MOST_PACES:
-        step = min(pace, left - low)
-        clear = _clear(slide, lane, low, left if low + step >= left else low + step)
+    while low < remaining and met < 0.0 and paces < _MOST_PACES:
+        step = min(pace, remaining - low)
+        clear = _clear(slide, lane, low, remaining if low + step >= remaining else low + step)
         high = clear.time
         middle = 0.5 * (low + high)
         if not (_rests_later(slide, lane, middle) and _rests_later(slide, lane, high)):
@@ -58,7 +58,7 @@ def stay(slide, i):
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
         low, met, paces = high, clear.wall, paces + 1.0
     end, start, goes_on = low, low, paces == _MOST_PACES and met < 0.0
-    if low < left and met < 0.0 and not goes_on:
+    if low < remaining and met < 0.0 and not goes_on:
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
             if _rests_later(slide, lane, middle):
@@ -69,12 +69,12 @@ def stay(slide, i):
         one, two = _press_later(slide, lane, start), _press_later(slide, lane, low)
         pressed += 0.5 * (one.n + two.n) * (end - start)
         pressed_second += 0.5 * (one.m + two.m) * (end - start)
-    after = left - end
-    r1, then = _carried(chain, lane, end), chain.at(after)
+    after = remaining - end
+    r1, then = _carried(walls, lane, end), walls.at(after)
     v1 = then.velocity(first, r1)
     twice = square(v1) + 2.0 * potential(slide.gravity, r1)
     given = twice - lane.twice
-    lane.r, lane.v, lane.left, lane.twice, lane.keep = r1, v1, after, twice, 0.0
+    lane.r, lane.v, lane.remaining, lane.twice, lane.keep = r1, v1, after, twice, 0.0
     slide.push(i, pressed, pressed_second)
     slide.work(i, given, 0.0)
     contacts.sliding[lanes.particle[i]] += end
@@ -101,17 +101,22 @@ def _rubs(slide, now, lane, slowest):
 @outlined
 def _clear(slide, lane, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
-    chain, left, held, near = slide.chain, lane.left, slide.held(lane), crossing.near(slide.method, lane.r)
+    walls, remaining, active, near = (
+        slide.walls,
+        lane.remaining,
+        slide.active(lane),
+        crossing.near(slide.method, lane.r),
+    )
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step
-        start, then, path = chain.at(left - time), chain.at(left - end), _way(chain, lane, time, end)
-        if not crossing.meets(start, then, held, path, near):
+        start, then, path = walls.at(remaining - time), walls.at(remaining - end), _way(walls, lane, time, end)
+        if not crossing.meets(start, then, active, path, near):
             if end == high:
                 return Clear(high, -1.0)
             time, step = end, 2.0 * step
             continue
-        found = crossing.arrival(chain, held, path, near, left - time)
+        found = crossing.arrival(walls, active, path, near, remaining - time)
         met = found.wall
         if found.time == 0.0 or not time < end:
             break
@@ -121,17 +126,17 @@ def _clear(slide, lane, low, high):
 
 
 @outlined
-def _carried(chain, lane, t):
+def _carried(walls, lane, t):
     """Where a lane that moves with its first wall is after a time."""
-    return chain.during(lane.left, lane.left - t).carry(lane.first, lane.r)
+    return walls.during(lane.remaining, lane.remaining - t).carry(lane.first, lane.r)
 
 
 @outlined
-def _way(chain, lane, start, end):
+def _way(walls, lane, start, end):
     """The way of a lane that moves with its first wall, from one time to another."""
-    r0, r1 = _carried(chain, lane, start), _carried(chain, lane, end)
-    v0 = chain.at(lane.left - start).velocity(lane.first, r0)
-    v1 = chain.at(lane.left - end).velocity(lane.first, r1)
+    r0, r1 = _carried(walls, lane, start), _carried(walls, lane, end)
+    v0 = walls.at(lane.remaining - start).velocity(lane.first, r0)
+    v1 = walls.at(lane.remaining - end).velocity(lane.first, r1)
     return crossing.Path(r0, v0, r1, v1, end - start)
 
 
@@ -151,8 +156,8 @@ def _force_at_rest(slide, now, lane, r):
 
 
 def _rests_later(slide, lane, t):
-    return _rests(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))
+    return _rests(slide, slide.walls.at(lane.remaining - t), lane, _carried(slide.walls, lane, t))
 
 
 def _press_later(slide, lane, t):
-    return _force_at_rest(slide, slide.chain.at(lane.left - t), lane, _carried(slide.chain, lane, t))
+    return _force_at_rest(slide, slide.walls.at(lane.remaining - t), lane, _carried(slide.walls, lane, t))

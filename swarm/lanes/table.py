@@ -78,12 +78,12 @@ class Advanced(Lane):
 
     def stands(self, method, p):
         """Whether particle p, of this lane, has not gone on by what it must since a look."""
-        least = min(method.instant(self.v), MOVED * self.left)
-        return self.looked_particle == p and least >= self.looked_left - self.left
+        least = min(method.instant(self.v), MOVED * self.remaining)
+        return self.looked_particle == p and least >= self.looked_left - self.remaining
 
     def look(self, p):
         """Keep what the next look asks for."""
-        self.looked_particle, self.looked_left = p, self.left
+        self.looked_particle, self.looked_left = p, self.remaining
 
 
 def table(rows: int) -> NDArray[np.float64]:

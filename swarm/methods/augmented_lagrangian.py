@@ -148,8 +148,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     def has_multipliers(self) -> bool:
         return True
 
-    def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
-        now = moment - (left if self.adaptive else left * self.dt)
+    def failure(self, moment: float, remaining: float, sweeps: int, stored: float) -> str:
+        now = moment - (remaining if self.adaptive else remaining * self.dt)
         hint = "more max_sweeps" if self.adaptive and self.exponent == 1.0 else "exponent = 1 and adaptive=True"
         return (
             f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "

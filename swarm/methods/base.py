@@ -63,7 +63,7 @@ class Method:
         """Whether most runs meet no contact for `hard_pass`: then the slow-path kernel is compiled at the first one."""
         return False
 
-    def failure(self, moment: float, left: float, sweeps: int, stored: float) -> str:
+    def failure(self, moment: float, remaining: float, sweeps: int, stored: float) -> str:
         """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
         raise NotImplementedError
 

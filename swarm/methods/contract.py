@@ -34,7 +34,7 @@ class Lane(NamedTuple):
 
     r: Vec
     v: Vec
-    left: float
+    remaining: float
     hits: float
     own: Any
 
@@ -44,7 +44,7 @@ class Flight(NamedTuple):
 
     r: Vec
     v: Vec
-    left: float
+    remaining: float
     wall: float
 
 
@@ -76,7 +76,7 @@ class Contact(NamedTuple):
 
     r: Vec
     v: Vec
-    left: float
+    remaining: float
     wall: float
     impulse: float
     hits: float
@@ -87,7 +87,7 @@ class Contact(NamedTuple):
 
 def refused(lane, status):
     """A contact that is not taken, for this reason: a result of `hard_pass`."""
-    return Contact(lane.r, lane.v, lane.left, 0.0, 0.0, 0.0, 0.0, False), status
+    return Contact(lane.r, lane.v, lane.remaining, 0.0, 0.0, 0.0, 0.0, False), status
 
 
 class MethodNumbers(Record):
@@ -135,43 +135,43 @@ class MethodNumbers(Record):
         """The relative error of a crossing, of a particle that slides."""
         return 0.0
 
-    def walls_of(self, chain, left):
+    def walls_of(self, walls, remaining):
         """The walls of a scene as `contact` takes them, with so much of the frame left: those at this instant.
 
         A method of steps takes all there are, to ask them over its step.
         """
-        return chain.at(left)
+        return walls.at(remaining)
 
     # --- Flight ---
 
-    def flight(self, chain, gravity, lane):
+    def flight(self, walls, gravity, lane):
         """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
-        return Flight(lane.r, lane.v, lane.left, -1.0)
+        return Flight(lane.r, lane.v, lane.remaining, -1.0)
 
-    def land(self, chain, gravity, lane, hit):
+    def land(self, walls, gravity, lane, hit):
         """The `Flight` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
-        return Flight(lane.r, lane.v, lane.left, -1.0)
+        return Flight(lane.r, lane.v, lane.remaining, -1.0)
 
     @property
     def lands(self):
         """Whether the method has a `land`."""
         return self.gives("land")
 
-    def landed_on(self, chain):
+    def landed_on(self, walls):
         """The walls whose first hits `land` takes; None where the method finds its contacts by itself."""
-        return chain if self.lands else None
+        return walls if self.lands else None
 
     # --- The unknown of a contact ---
 
-    def guess(self, chain, gravity, lane, wall):
+    def guess(self, walls, gravity, lane, wall):
         """First guess of the contact's unknown kappa, and whether the lane has one to solve for."""
         return 0.0, False
 
-    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
         """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved stays as it is, bit by bit."""
         return solution.kappa, False, NO_RECORD
 
-    def most_sweeps(self, chain):
+    def most_sweeps(self, walls):
         """The most sweeps of `improve` a contact may take: a constant for the compiler."""
         return 0
 
@@ -180,7 +180,7 @@ class MethodNumbers(Record):
         """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
         return self if self.gives("guess") else None
 
-    def turn(self, chain, gravity, lane, wall, kappa):
+    def turn(self, walls, gravity, lane, wall, kappa):
         """The `Turned` velocity, for `contact`, where one loop of both would be too long."""
         return NOT_TURNED
 
@@ -191,11 +191,11 @@ class MethodNumbers(Record):
 
     # --- Uzawa's loop (8) around it ---
 
-    def first_multiplier(self, chain, gravity, lane, wall, kappa):
+    def first_multiplier(self, walls, gravity, lane, wall, kappa):
         """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
         return 0.0, kappa, 0.0
 
-    def next_multiplier(self, left, acceleration, multiplier, record, before):
+    def next_multiplier(self, remaining, acceleration, multiplier, record, before):
         """The multiplier after a sweep, its miss, and whether to go on; `before` is the last `Sweep`."""
         return 0.0, 0.0, False
 
@@ -206,7 +206,7 @@ class MethodNumbers(Record):
 
     # --- Contact ---
 
-    def contact(self, chain, gravity, lane, wall, solution):
+    def contact(self, walls, gravity, lane, wall, solution):
         """The `Contact` with this wall.
 
         A wall that is HARD already passes through and nothing else changes; to become hard, return `HARD - wall`. A
@@ -215,7 +215,7 @@ class MethodNumbers(Record):
         raise NotImplementedError
 
     @outlined
-    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+    def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         """The `Contact` that `flight` or `contact` left to this function, and its status.
 
         Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.

@@ -171,21 +171,21 @@ class Steps(contract.MethodNumbers):
     def dissipates(self):
         return self.moving is not None
 
-    def walls_of(self, chain, left):
+    def walls_of(self, walls, remaining):
         # Of all walls: each part of a step asks for those that it needs.
-        return chain
+        return walls
 
-    def before(self: Any, chain, left):
+    def before(self: Any, walls, remaining):
         """The walls at the start of a step, with so many of the frame left."""
-        return chain.at(left * self.dt)
+        return walls.at(remaining * self.dt)
 
-    def over(self: Any, chain, left):
+    def over(self: Any, walls, remaining):
         """The walls over that step."""
-        return chain.during(left * self.dt, (left - 1.0) * self.dt)
+        return walls.during(remaining * self.dt, (remaining - 1.0) * self.dt)
 
-    def after(self: Any, chain, left):
+    def after(self: Any, walls, remaining):
         """The walls at the end of that step."""
-        return chain.at((left - 1.0) * self.dt)
+        return walls.at((remaining - 1.0) * self.dt)
 
     def reach(self: Any, before, gravity, lane):
         """From r0 to the point whose force it takes, as if there were no wall."""
@@ -199,24 +199,24 @@ class Steps(contract.MethodNumbers):
         """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.displacement(wall))
 
-    def flight(self: Any, chain, gravity, lane):
+    def flight(self: Any, walls, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
         dt = self.dt
         # One too many by round-off starts a contact 1e-16 deep: harmless.
-        steps = np.floor(safe.free_time(chain, gravity, lane.r, lane.v, lane.left * dt) * (1.0 / dt))
-        steps = select(steps < lane.left, steps, lane.left)
+        steps = np.floor(safe.free_time(walls, gravity, lane.r, lane.v, lane.remaining * dt) * (1.0 / dt))
+        steps = select(steps < lane.remaining, steps, lane.remaining)
         t = steps * dt
         start = contract.Lane(
-            lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.left - steps, lane.hits,
-            lane.own,
+            lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.remaining - steps,
+            lane.hits, lane.own,
         )  # fmt: skip
-        to_point = chain.during(start.left * dt, (start.left - self.point) * dt)
-        touched = to_point.touched(start.r, self.reach(self.before(chain, start.left), gravity, start))
+        to_point = walls.during(start.remaining * dt, (start.remaining - self.point) * dt)
+        touched = to_point.touched(start.r, self.reach(self.before(walls, start.remaining), gravity, start))
         # Several walls at once, or nested solves: the careful way.
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
         wall = select(self.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
-        return contract.Flight(start.r, start.v, start.left, select(start.left > 0.0, wall, -1.0))
+        return contract.Flight(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
 
 
 class Numbers(Steps):
@@ -229,19 +229,19 @@ class Numbers(Steps):
     form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves
 
-    def careful_step(self, chain, gravity, lane, impulse, i):
+    def careful_step(self, walls, gravity, lane, impulse, i):
         """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
         raise NotImplementedError
 
     @outlined
-    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
+    def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
             return contract.refused(lane, Status.TOO_FAST.value)
-        step = self.careful_step(chain, gravity, lane, lanes.impulse, i)
-        new = select(self.before(chain, lane.left).outside(-1.0, lane.r), 0.0, 1.0)
+        step = self.careful_step(walls, gravity, lane, lanes.impulse, i)
+        new = select(self.before(walls, lane.remaining).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
         twice_energy = lane.own.twice_energy + 2.0 * step.work
-        return contract.Contact(step.r, step.v, lane.left - 1.0, 0.0, 0.0, new, twice_energy, False), status
+        return contract.Contact(step.r, step.v, lane.remaining - 1.0, 0.0, 0.0, new, twice_energy, False), status
 
 
 # --- The contact -----------------------------------------------------------------------------------------
@@ -261,12 +261,12 @@ class Taken(NamedTuple):
 def contact(lane, wall, taken):
     """The `Contact` of a lane that takes its step, or leaves it to the careful way, or is at the end of its frame."""
     touching = wall >= 0.0
-    step = (lane.left > 0.0) & select(touching, taken.solved, wall > contract.HARD)
+    step = (lane.remaining > 0.0) & select(touching, taken.solved, wall > contract.HARD)
     work = select(step & touching, taken.work, 0.0)
     return contract.Contact(
         select(step, taken.r, kept(lane.r)),
         select(step, taken.v, kept(lane.v)),
-        lane.left - select(step, 1.0, 0.0),
+        lane.remaining - select(step, 1.0, 0.0),
         select(touching & (not taken.solved), contract.HARD - wall, wall),
         select(step, taken.impulse, 0.0),
         select(step & taken.new, 1.0, 0.0),

@@ -210,25 +210,25 @@ class Reflection(contract.MethodNumbers):
 
     # --- Flight ---
 
-    def land(self, chain, gravity, lane, hit):
-        t = select(hit.time < lane.left, hit.time, lane.left)
+    def land(self, walls, gravity, lane, hit):
+        t = select(hit.time < lane.remaining, hit.time, lane.remaining)
         return contract.Flight(
             lane.r + displacement(gravity, lane.v, t),
             accelerated(gravity, lane.v, t),
-            lane.left - t,
-            select((hit.time <= lane.left) & (hit.wall >= 0.0), hit.wall, -1.0),
+            lane.remaining - t,
+            select((hit.time <= lane.remaining) & (hit.wall >= 0.0), hit.wall, -1.0),
         )
 
     # --- Contact ---
 
-    def contact(self, chain, gravity, lane, wall, solution):
-        bounce = exact(self.laws, chain, gravity, wall, lane.r, lane.v, lane.own.energy)
+    def contact(self, walls, gravity, lane, wall, solution):
+        bounce = exact(self.laws, walls, gravity, wall, lane.r, lane.v, lane.own.energy)
         hit = wall >= 0.0
         impulse = select(hit, bounce.impulse, 0.0)
         return contract.Contact(
             lane.r,
             select(hit, bounce.v, kept(lane.v)),
-            lane.left,
+            lane.remaining,
             wall,
             impulse,
             select(self.is_within(lane, impulse, _NO_IMPACT), 0.0, 1.0),
@@ -255,36 +255,36 @@ class Chord(Reflection):
 
     def step(self, lane):
         """The length of the contact step, which the end of the frame cuts."""
-        return select(self.contact_step < lane.left, self.contact_step, lane.left)
+        return select(self.contact_step < lane.remaining, self.contact_step, lane.remaining)
 
     # --- The unknown of a contact ---
 
-    def most_sweeps(self, chain):
-        return chain.chord_sweeps()
+    def most_sweeps(self, walls):
+        return walls.chord_sweeps()
 
-    def guess(self, chain, gravity, lane, wall):
+    def guess(self, walls, gravity, lane, wall):
         h = self.step(lane)
-        return chain.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
+        return walls.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
 
-    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
         p = displacement(gravity, lane.v, self.step(lane))
-        better, more = chord_step(chain, wall, lane.r, p, solution.kappa)
+        better, more = chord_step(walls, wall, lane.r, p, solution.kappa)
         return select(solution.unsolved, better, solution.kappa), solution.unsolved & more, contract.NO_RECORD
 
-    def turn(self, chain, gravity, lane, wall, kappa):
-        return chord_turn(chain, gravity, wall, lane.r, lane.v, self.step(lane), kappa)
+    def turn(self, walls, gravity, lane, wall, kappa):
+        return chord_turn(walls, gravity, wall, lane.r, lane.v, self.step(lane), kappa)
 
     # --- Contact ---
 
-    def contact(self, chain, gravity, lane, wall, solution):
+    def contact(self, walls, gravity, lane, wall, solution):
         h, turned = self.step(lane), solution.turned
-        r, v, stays = chord_end(chain, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
+        r, v, stays = chord_end(walls, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
         hit = wall >= 0.0
         chord = hit & stays & (turned.impulse > lane.own.slow) & (not solution.unsolved)
         return contract.Contact(
             select(chord, r, kept(lane.r)),
             select(chord, v, kept(lane.v)),
-            lane.left - select(chord, h, 0.0),
+            lane.remaining - select(chord, h, 0.0),
             wall,
             select(chord, turned.impulse, 0.0),
             select(chord, 1.0, 0.0),

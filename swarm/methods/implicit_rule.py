@@ -30,36 +30,40 @@ class RuleNumbers(fixed_step.Numbers):
         """The `RuleStep`, from the point s and `push`, kappa grad q(s), with the walls at its start."""
         raise NotImplementedError
 
-    def add_impulses(self, chain, lane, reactions, impulse, i):
+    def add_impulses(self, walls, lane, reactions, impulse, i):
         """Add the impulse per mass of each wall to impulse[wall, i], its work to the rows behind: their sum."""
         raise NotImplementedError
 
-    def free(self, chain, gravity, lane):
+    def free(self, walls, gravity, lane):
         """The point, as if it felt no force."""
-        return lane.r + self.reach(self.before(chain, lane.left), gravity, lane)
+        return lane.r + self.reach(self.before(walls, lane.remaining), gravity, lane)
 
-    def there(self, chain, lane):
+    def there(self, walls, lane):
         """The walls when the particle is at the point."""
-        return chain.at((lane.left - self.point) * self.dt)
+        return walls.at((lane.remaining - self.point) * self.dt)
 
-    def most_sweeps(self, chain):
+    def most_sweeps(self, walls):
         return implicit.SWEEPS
 
-    def guess(self, chain, gravity, lane, wall):
-        r = self.free(chain, gravity, lane)
+    def guess(self, walls, gravity, lane, wall):
+        r = self.free(walls, gravity, lane)
         touching = wall >= 0.0
-        kappa = implicit.guess(self.there(chain, lane), wall, self.law, r, lane.own.over_mass)
+        kappa = implicit.guess(self.there(walls, lane), wall, self.law, r, lane.own.over_mass)
         return select(touching, kappa, 0.0), touching
 
-    def improve(self, chain, gravity, lane, wall, solution, multiplier):
-        r, kappa = self.free(chain, gravity, lane), solution.kappa
-        there = self.there(chain, lane)
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
+        r, kappa = self.free(walls, gravity, lane), solution.kappa
+        there = self.there(walls, lane)
         step, more = implicit.improve(there, wall, self.law, r, lane.own.over_mass, kappa)
         return select(solution.unsolved, kappa - step, kappa), solution.unsolved & more, contract.NO_RECORD
 
-    def contact(self, chain, gravity, lane, wall, solution):
-        r, there = self.free(chain, gravity, lane), self.there(chain, lane)
-        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+    def contact(self, walls, gravity, lane, wall, solution):
+        r, there = self.free(walls, gravity, lane), self.there(walls, lane)
+        before, over, after = (
+            self.before(walls, lane.remaining),
+            self.over(walls, lane.remaining),
+            self.after(walls, lane.remaining),
+        )
         point = implicit.reached(there, wall, r, solution.kappa)
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
@@ -73,11 +77,11 @@ class RuleNumbers(fixed_step.Numbers):
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
         return fixed_step.contact(lane, wall, taken)
 
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        before = self.before(chain, lane.left)
+    def careful_step(self, walls, gravity, lane, impulse, i):
+        before = self.before(walls, lane.remaining)
         free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
-        reactions = scratch((chain.length(), 4), np.float64)
-        point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(chain, lane), free, reactions)
-        work = self.add_impulses(chain, lane, reactions, impulse, i)
+        reactions = scratch((walls.length(), 4), np.float64)
+        point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(walls, lane), free, reactions)
+        work = self.add_impulses(walls, lane, reactions, impulse, i)
         step = self.end(before, gravity, lane, point, corner.total(reactions))
         return fixed_step.Careful(step.r, step.v, solved, work)

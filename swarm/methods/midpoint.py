@@ -60,7 +60,7 @@ class MidpointNumbers(implicit_rule.RuleNumbers):
         kick = 4.0 / self.dt * push
         return implicit_rule.RuleStep(2.0 * s - lane.r, accelerated(gravity, lane.v, self.dt) - kick, kick)
 
-    def add_impulses(self, chain, lane, reactions, impulse, i):
+    def add_impulses(self, walls, lane, reactions, impulse, i):
         h = self.dt
         corner.add_impulses(reactions, 0.5 * h, impulse, i)
-        return corner.add_works(self.moving, self.over(chain, lane.left), -4.0 / (h * h), reactions, impulse, i)
+        return corner.add_works(self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, impulse, i)

@@ -82,25 +82,25 @@ class PenaltyNumbers(fixed_step.Numbers):
         )
         return energies.restored(self.law, over, after, gravity, budget, ends)
 
-    def most_sweeps(self, chain):
+    def most_sweeps(self, walls):
         return contact_impulse.NEWTON_STEPS
 
-    def guess(self, chain, gravity, lane, wall):
-        over = self.over(chain, lane.left)
+    def guess(self, walls, gravity, lane, wall):
+        over = self.over(walls, lane.remaining)
         kappa = contact_impulse.guess(over, wall, self.law, self.free(gravity, lane))
         touching = wall >= 0.0
         return select(touching, kappa, 0.0), touching
 
-    def improve(self, chain, gravity, lane, wall, solution, multiplier):
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
         kappa, unsolved = solution.kappa, solution.unsolved
-        over = self.over(chain, lane.left)
+        over = self.over(walls, lane.remaining)
         newton = contact_impulse.improve(over, wall, self.law, None, self.free(gravity, lane), kappa)
         return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
 
-    def contact(self, chain, gravity, lane, wall, solution):
+    def contact(self, walls, gravity, lane, wall, solution):
         # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
         h, kappa = self.dt, solution.kappa
-        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
         step = self.free(gravity, lane)
         touching = wall >= 0.0
         r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
@@ -118,10 +118,10 @@ class PenaltyNumbers(fixed_step.Numbers):
         taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
         return fixed_step.contact(lane, wall, taken)
 
-    def careful_step(self, chain, gravity, lane, impulse, i):
+    def careful_step(self, walls, gravity, lane, impulse, i):
         h, step = self.dt, self.free(gravity, lane)
-        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
-        reactions = scratch((chain.length(), 4), np.float64)
+        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
+        reactions = scratch((walls.length(), 4), np.float64)
         r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
         corner.add_impulses(reactions, h, impulse, i)
         work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)

@@ -35,7 +35,7 @@ _ROUND_OFF = 1e-13
 
 
 class Cut(NamedTuple):
-    """Length of the contact step, the same in the unit of `left`, and the regularisation."""
+    """Length of the contact step, the same in the unit of `remaining`, and the regularisation."""
 
     h: float
     used: float
@@ -58,23 +58,23 @@ class Numbers(fixed_step.Steps):
     longest: Any  # step that jumps over no solid [m], None where there is none
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
 
-    def cut(self, left):
+    def cut(self, remaining):
         """The `Cut` of the next contact step."""
         raise NotImplementedError
 
-    def is_new(self, chain, r):
+    def is_new(self, walls, r):
         """Whether a contact step starts with an impact."""
         raise NotImplementedError
 
-    def is_alone(self, chain, wall, r0, r1, kappa):
+    def is_alone(self, walls, wall, r0, r1, kappa):
         """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
         raise NotImplementedError
 
-    def is_blocked(self, chain, wall, r, p):
+    def is_blocked(self, walls, wall, r, p):
         """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
         return False
 
-    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+    def as_impacts(self, walls, lane, cut, wall, lanes, i):
         """The contact as exact impacts: the result of `hard_pass`."""
         raise NotImplementedError
 
@@ -84,17 +84,17 @@ class Numbers(fixed_step.Steps):
         """The step without walls: r0, p and c = h^2/(2m)."""
         return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
-    def most_sweeps(self, chain):
+    def most_sweeps(self, walls):
         return contact_impulse.NEWTON_STEPS
 
-    def guess(self, chain, gravity, lane, wall):
-        cut, over = self.cut(lane.left), self.over(chain, lane.left)
+    def guess(self, walls, gravity, lane, wall):
+        cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
         kappa = contact_impulse.guess(over, wall, cut.law, self.free(gravity, lane, cut.h))
         touching = wall >= 0.0
         return select(touching, kappa, 0.0), touching
 
-    def improve(self, chain, gravity, lane, wall, solution, multiplier):
-        cut, over, kappa = self.cut(lane.left), self.over(chain, lane.left), solution.kappa
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
+        cut, over, kappa = self.cut(lane.remaining), self.over(walls, lane.remaining), solution.kappa
         newton = contact_impulse.improve(over, wall, cut.law, multiplier, self.free(gravity, lane, cut.h), kappa)
         return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
@@ -104,24 +104,24 @@ class Numbers(fixed_step.Steps):
     def multiplier_sweeps(self):
         return self.max_sweeps
 
-    def first_multiplier(self, chain, gravity, lane, wall, kappa):
-        cut, over = self.cut(lane.left), self.over(chain, lane.left)
+    def first_multiplier(self, walls, gravity, lane, wall, kappa):
+        cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
         better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
         limited = over.of(wall, False, uzawa.has_limit, cut.law, lane.r)
         return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
 
-    def next_multiplier(self, left, acceleration, multiplier, record, before):
-        miss = self.cut(left).law.alpha * record.mean
+    def next_multiplier(self, remaining, acceleration, multiplier, record, before):
+        miss = self.cut(remaining).law.alpha * record.mean
         following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
         return following, miss, not (record.stored <= self.tolerance)
 
     # --- Contact ---
 
-    def contact(self, chain, gravity, lane, wall, solution):
+    def contact(self, walls, gravity, lane, wall, solution):
         # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
-        cut, kappa = self.cut(lane.left), solution.kappa
-        over, after = self.over(chain, lane.left), self.after(chain, lane.left)
+        cut, kappa = self.cut(lane.remaining), solution.kappa
+        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
         h, p = cut.h, displacement(gravity, lane.v, cut.h)
         r1 = over.push(wall, lane.r, p, kappa)
         g = over.discrete_gradient(wall, lane.r, r1)
@@ -133,17 +133,17 @@ class Numbers(fixed_step.Steps):
         alone = self.is_alone(after, wall, lane.r, r1, kappa)
         solved = alone & (not solution.unsolved) & over.pushes(wall, kappa)
         touching = wall >= 0.0
-        step = (lane.left > 0.0) & touching & solved
+        step = (lane.remaining > 0.0) & touching & solved
         budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
         factor, _balanced = energies.restored(self.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
         new = step & self.is_new(over, lane.r)
         work = select(step, work, 0.0)
         # A step without contact: only fixed steps end here that way, just before one.
-        loose = (lane.left > 0.0) & (wall > contract.HARD) & (not touching)
+        loose = (lane.remaining > 0.0) & (wall > contract.HARD) & (not touching)
         return contract.Contact(
             select(step, r1, select(loose, lane.r + p, kept(lane.r))),
             select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
-            lane.left - select(step | loose, cut.used, 0.0),
+            lane.remaining - select(step | loose, cut.used, 0.0),
             select(touching & (not solved), contract.HARD - wall, wall),
             select(step, given, 0.0),
             select(new, 1.0, 0.0),
@@ -153,21 +153,21 @@ class Numbers(fixed_step.Steps):
         )
 
     @outlined
-    def hard_pass(self, chain, gravity, lane, wall, lanes, i):
-        cut, record = self.cut(lane.left), lanes.record
-        h, over, after = cut.h, self.over(chain, lane.left), self.after(chain, lane.left)
-        if self.is_blocked(chain, wall, lane.r, h * lane.v):
+    def hard_pass(self, walls, gravity, lane, wall, lanes, i):
+        cut, record = self.cut(lane.remaining), lanes.record
+        h, over, after = cut.h, self.over(walls, lane.remaining), self.after(walls, lane.remaining)
+        if self.is_blocked(walls, wall, lane.r, h * lane.v):
             record[uzawa.SWEEPS, i] = 0.0
-            return self.as_impacts(chain, lane, cut, wall, lanes, i)
+            return self.as_impacts(walls, lane, cut, wall, lanes, i)
         free = self.free(gravity, lane, h)
         if self.is_too_fast(free.p):
             return contract.refused(lane, Status.TOO_FAST.value)
-        reactions = scratch((chain.length(), 4), np.float64)
+        reactions = scratch((walls.length(), 4), np.float64)
         end = uzawa.loop(self, cut.law, over, free, reactions)
         record[uzawa.SWEEPS, i], record[uzawa.STORED, i] = end.sweeps, end.stored
         record[uzawa.UNCONVERGED, i] = 0.0 if end.converged else 1.0
         if not end.converged and self.policy == IMPACT:
-            return self.as_impacts(chain, lane, cut, wall, lanes, i)
+            return self.as_impacts(walls, lane, cut, wall, lanes, i)
         if not end.converged and (self.policy == RAISE or not end.solved):
             return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
         new = 1.0 if self.is_new(over, lane.r) else 0.0
@@ -180,8 +180,8 @@ class Numbers(fixed_step.Steps):
         factor, _balanced = energies.restored(
             self.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h)
         )
-        left, twice_energy = lane.left - cut.used, lane.own.twice_energy + 2.0 * work
-        return contract.Contact(end.r, v1 * factor, left, wall, 0.0, new, twice_energy, False), Status.DONE.value
+        remaining, twice_energy = lane.remaining - cut.used, lane.own.twice_energy + 2.0 * work
+        return contract.Contact(end.r, v1 * factor, remaining, wall, 0.0, new, twice_energy, False), Status.DONE.value
 
 
 @outlined
@@ -192,86 +192,86 @@ def _first_energy(lane):
     return Energy(speed2, 0.5 / speed2)
 
 
-def _after(r, v, left, hits):
+def _after(r, v, remaining, hits):
     """The contact, whose impulses were added one by one."""
-    return contract.Contact(r, v, left, 0.0, 0.0, hits, 0.0, False)
+    return contract.Contact(r, v, remaining, 0.0, 0.0, hits, 0.0, False)
 
 
 class FixedSteps(Numbers):
     """The method with steps of fixed length."""
 
-    def cut(self, left):
+    def cut(self, remaining):
         return Cut(self.dt, 1.0, self.law)
 
-    def is_new(self, chain, r):
-        return not chain.outside(-1.0, r)
+    def is_new(self, walls, r):
+        return not walls.outside(-1.0, r)
 
-    def is_alone(self, chain, wall, r0, r1, kappa):
-        return not chain.outside(wall, r1)
+    def is_alone(self, walls, wall, r0, r1, kappa):
+        return not walls.outside(wall, r1)
 
     @outlined
-    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+    def as_impacts(self, walls, lane, cut, wall, lanes, i):
         if self.moving is not None:
             # Refused before the run.
             return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
         remaining, hits = cut.h, 0.0
         for _i in range(_MOST_BOUNCES):
-            hit = flights.first_hit(chain, None, r, v)
+            hit = flights.first_hit(walls, None, r, v)
             t = min(hit.time, remaining)
             r, remaining = r + t * v, remaining - t
             if not hit.time < math.inf or remaining <= 0.0:
-                return _after(r, v, lane.left - cut.used, hits), Status.DONE.value
+                return _after(r, v, lane.remaining - cut.used, hits), Status.DONE.value
             if hit.wall < 0.0:
                 continue
-            bounce = exact(NONE, chain, None, hit.wall, r, v, energy)
+            bounce = exact(NONE, walls, None, hit.wall, r, v, energy)
             v = bounce.v
             lanes.impulse[int(hit.wall), i] += bounce.impulse
             hits += 1.0
-        return _after(r, v, lane.left, hits), Status.STALLED.value
+        return _after(r, v, lane.remaining, hits), Status.STALLED.value
 
 
 class CutSteps(Numbers):
     """The method with steps that begin at the impact, without gravity."""
 
-    def cut(self, left):
+    def cut(self, remaining):
         # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger
         # alpha.
-        h = select(self.dt < left, self.dt, left)
+        h = select(self.dt < remaining, self.dt, remaining)
         part = self.dt / h
         return Cut(h, h, self.law.stiffened(part * part))
 
-    def is_new(self, chain, r):
+    def is_new(self, walls, r):
         return True
 
-    def is_alone(self, chain, wall, r0, r1, kappa):
+    def is_alone(self, walls, wall, r0, r1, kappa):
         # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
         # flight ends outside it again) was hit all the same.
-        return (flights.other_hit(chain, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
+        return (flights.other_hit(walls, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
 
-    def is_blocked(self, chain, wall, r, p):
-        kappa = chord(chain, wall, r, p)
-        r1 = chain.push(wall, r, p, kappa)
-        other = flights.other_hit(chain, wall, r, r1 - r)
+    def is_blocked(self, walls, wall, r, p):
+        kappa = chord(walls, wall, r, p)
+        r1 = walls.push(wall, r, p, kappa)
+        other = flights.other_hit(walls, wall, r, r1 - r)
         # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-        later = other.time <= 1.0 and not chain.of(other.wall, False, uzawa.has_limit, self.law, r)
-        later = later or uzawa.meets_later(chain, wall, self.law, r, p)
-        return not chain.pushes(wall, kappa) or kappa == 0.0 or later
+        later = other.time <= 1.0 and not walls.of(other.wall, False, uzawa.has_limit, self.law, r)
+        later = later or uzawa.meets_later(walls, wall, self.law, r, p)
+        return not walls.pushes(wall, kappa) or kappa == 0.0 or later
 
     @outlined
-    def as_impacts(self, chain, lane, cut, wall, lanes, i):
+    def as_impacts(self, walls, lane, cut, wall, lanes, i):
         energy = _first_energy(lane)
         shortest = self.shortest_length / math.sqrt(energy.twice)
         contacts = Contacts(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
-        end = impact(contacts, chain, None, wall, Moving(lane.r, lane.v, lane.left), energy, lanes.impulse, i)
-        return _after(end.r, end.v, lane.left - end.used, 1.0), Status.DONE.value
+        end = impact(contacts, walls, None, wall, Moving(lane.r, lane.v, lane.remaining), energy, lanes.impulse, i)
+        return _after(end.r, end.v, lane.remaining - end.used, 1.0), Status.DONE.value
 
-    def land(self, chain, gravity, lane, hit):
-        met = hit.time <= lane.left
-        t = select(met, hit.time, lane.left)
+    def land(self, walls, gravity, lane, hit):
+        met = hit.time <= lane.remaining
+        t = select(met, hit.time, lane.remaining)
         r = lane.r + t * lane.v
-        left = lane.left - t
+        remaining = lane.remaining - t
         # A hit in the last instant of a frame is met again in the next one.
-        met = met & (hit.wall >= 0.0) & (left > 0.0)
+        met = met & (hit.wall >= 0.0) & (remaining > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-        return contract.Flight(select(met, chain.project(hit.wall, r), r), lane.v, left, select(met, wall, -1.0))
+        return contract.Flight(select(met, walls.project(hit.wall, r), r), lane.v, remaining, select(met, wall, -1.0))

@@ -59,9 +59,9 @@ class TrapezoidalNumbers(implicit_rule.RuleNumbers):
         kick = 2.0 / self.dt * (push - lane.own.over_mass * force(before, self.law, lane.r))
         return implicit_rule.RuleStep(s, accelerated(gravity, lane.v, self.dt) - kick, kick)
 
-    def add_impulses(self, chain, lane, reactions, impulse, i):
+    def add_impulses(self, walls, lane, reactions, impulse, i):
         h, law, moving = self.dt, self.law, self.moving
-        before, over = self.before(chain, lane.left), self.over(chain, lane.left)
+        before, over = self.before(walls, lane.remaining), self.over(walls, lane.remaining)
         corner.add_impulses(reactions, h, impulse, i)
         # h/(2m) |F0|
         factor = 2.0 * lane.own.over_mass / h

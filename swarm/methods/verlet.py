@@ -61,10 +61,14 @@ class VerletStep(NamedTuple):
 class VerletNumbers(fixed_step.Numbers):
     """The rule."""
 
-    def step(self, chain, gravity, lane):
+    def step(self, walls, gravity, lane):
         """The `VerletStep` of a lane."""
         h, over_mass = self.dt, lane.own.over_mass
-        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+        before, over, after = (
+            self.before(walls, lane.remaining),
+            self.over(walls, lane.remaining),
+            self.after(walls, lane.remaining),
+        )
         f0 = force(before, self.law, lane.r)
         # h^2/(2m) F0
         r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
@@ -72,15 +76,19 @@ class VerletNumbers(fixed_step.Numbers):
         given = work(self.moving, over, before, self.law, lane.r) + work(self.moving, over, after, self.law, r1)
         return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
 
-    def contact(self, chain, gravity, lane, wall, solution):
-        step = self.step(chain, gravity, lane)
-        new = (wall >= 0.0) & (not self.before(chain, lane.left).outside(-1.0, lane.r))
+    def contact(self, walls, gravity, lane, wall, solution):
+        step = self.step(walls, gravity, lane)
+        new = (wall >= 0.0) & (not self.before(walls, lane.remaining).outside(-1.0, lane.r))
         taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
         return fixed_step.contact(lane, wall, taken)
 
-    def careful_step(self, chain, gravity, lane, impulse, i):
-        step, over_mass, law = self.step(chain, gravity, lane), lane.own.over_mass, self.law
-        before, over, after = self.before(chain, lane.left), self.over(chain, lane.left), self.after(chain, lane.left)
+    def careful_step(self, walls, gravity, lane, impulse, i):
+        step, over_mass, law = self.step(walls, gravity, lane), lane.own.over_mass, self.law
+        before, over, after = (
+            self.before(walls, lane.remaining),
+            self.over(walls, lane.remaining),
+            self.after(walls, lane.remaining),
+        )
         add_impulses(before, law, over_mass, lane.r, impulse, i)
         add_impulses(after, law, over_mass, step.r, impulse, i)
         work = add_works(self.moving, over, before, law, over_mass / self.dt, lane.r, impulse, i)

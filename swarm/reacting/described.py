@@ -27,7 +27,7 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     given = Scene(rest, scene.gravity).apart("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
-        Walls(()) if given is None else given.chain(moment),
+        Walls(()) if given is None else given.walls(moment),
         (given.laws() if given else None) or NONE,
         np.flatnonzero(~reacts),
         _reacting(scene),
@@ -149,7 +149,7 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
     return found
 
 
-def chain_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Walls:
+def walls_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
     given = iter(scenery.given.at(0.0).walls)
     reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)

@@ -183,8 +183,8 @@ class Pendulum(Turning):
     def _extend(self, walls):
         """The lease lasts as long as the weight leaves the rate in it, and the polynomial is good."""
         k, most = index(self.row), self.stiffness
-        left = (walls.width[k] - abs(walls.rate[k] - walls.turning[k])) / most
-        walls.until[k] = walls.time[k] + min(left, _PART / (math.sqrt(most) + abs(walls.rate[k])))
+        remaining = (walls.width[k] - abs(walls.rate[k] - walls.turning[k])) / most
+        walls.until[k] = walls.time[k] + min(remaining, _PART / (math.sqrt(most) + abs(walls.rate[k])))
 
     def hit(self, body, gravity, walls, flight):
         # What comes after the lease is asked again then.

@@ -79,11 +79,11 @@ class Rule(NamedTuple):
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-def _given_hit(chain, gravity, r, v, left):
+def _given_hit(walls, gravity, r, v, remaining):
     """The first hit with the walls that do not react."""
-    if isinstance(chain, Marched):
-        return safe.first_hit(chain, gravity, r, v, left)
-    return flights.first_hit(chain.at(left), gravity, r, v)
+    if isinstance(walls, Marched):
+        return safe.first_hit(walls, gravity, r, v, remaining)
+    return flights.first_hit(walls.at(remaining), gravity, r, v)
 
 
 def _aim(scenery, queue, i, end):
@@ -128,11 +128,11 @@ def _fly(scenery, queue, i, t, way):
 
 
 @outlined
-def _bounce(scenery, queue, i, wall, left):
+def _bounce(scenery, queue, i, wall, remaining):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
     energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    bounce = exact(scenery.laws, scenery.given.at(left), scenery.pull, wall, r, v, energy)
+    bounce = exact(scenery.laws, scenery.given.at(remaining), scenery.pull, wall, r, v, energy)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
     queue.impulse[owner, i] += m * bounce.impulse

@@ -122,9 +122,9 @@ class BaseRun:
 
     def _limit(self, latest: float) -> float:
         """When kernels return at the latest [s of time.monotonic]: plain Python has little time, and may have none."""
-        if self._tier.is_plain and self._tier.left <= 0.0:
+        if self._tier.is_plain and self._tier.remaining <= 0.0:
             self._choose_tier()
-        return min(latest, time.monotonic() + self._tier.left) if self._tier.is_plain else latest
+        return min(latest, time.monotonic() + self._tier.remaining) if self._tier.is_plain else latest
 
 
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:

@@ -46,7 +46,7 @@ class BodyRun(BaseRun):
         self._ties = ties_of(bodies.body, law.alpha if looped else None)
         self._touching = touching_of(bodies.body, self._ties, scene)
         self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
-        self._chains = scene.chain(own=()), scene.chain(own=own)
+        self._walls = scene.walls(own=()), scene.walls(own=own)
         self._energies = Energies(scene, self._carried, bodies.body, self._ties, law)
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), len(scene.owners()) + len(own)
         self._bodies = _state_of(bodies, particles, rows, walls)
@@ -66,7 +66,7 @@ class BodyRun(BaseRun):
         at_once = 8 * (rows * rows + pressed * (pressed + 3 * rows))
         # Sines of two libraries differ in the last bit.
         choice = "always" if compile == "auto" and led_points(bodies.body) else compile
-        tier = Tier(choice, self._chains, n * points)
+        tier = Tier(choice, self._walls, n * points)
         super().__init__(scene, method, n, threads_with(self._threads, self._lanes * per_lane + at_once), tier, first)
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = _ROUND_OFF * max(size, scene.extent())
@@ -94,7 +94,7 @@ class BodyRun(BaseRun):
     def _arguments(self) -> tuple[Any, ...]:
         """Arguments of `advance_bodies`, with a ticket of their own."""
         both, ticket = (self._ties, self._touching), np.zeros(1, np.int64)
-        return both, self._chains, self._rule, self._bodies, ticket, self._size, self._watch.passes
+        return both, self._walls, self._rule, self._bodies, ticket, self._size, self._watch.passes
 
     def _choose_tier(self) -> None:
         super()._choose_tier()
@@ -103,10 +103,10 @@ class BodyRun(BaseRun):
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         if not self._cut_short:
-            self._bodies.left.fill(span * self._unit)
+            self._bodies.remaining.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
-        if self._tier.left < math.inf:
-            self._tier.left = 0.0
+        if self._tier.remaining < math.inf:
+            self._tier.remaining = 0.0
         latest = self._limit(latest)
         kernel, arguments = self._tier.kernel(advance_bodies), self._arguments()
         threads = 1 if self._tier.is_plain else self._threads
@@ -121,7 +121,7 @@ class BodyRun(BaseRun):
         return not self._cut_short
 
     def _failure(self, status: Status, number: int, moment: float) -> str:
-        time_of = moment - self._bodies.left[number]
+        time_of = moment - self._bodies.remaining[number]
         sentence = f"the frame at {moment:g} s failed at body {self._first + number}, at {time_of:.6g} s: "
         if status == Status.UNSOLVED:
             return sentence + (
@@ -139,7 +139,7 @@ class BodyRun(BaseRun):
         )
 
     def share_done(self, span: float) -> float:
-        return float((1.0 - self._bodies.left / (span * self._unit)).mean())
+        return float((1.0 - self._bodies.remaining / (span * self._unit)).mean())
 
     # --- What is observed --------------------------------------------------------------------------------
 
@@ -149,7 +149,7 @@ class BodyRun(BaseRun):
         BLAS rounds a column by how many there are, and NumPy a sum by where its numbers lie: with arrays of its own a
         chunk has the same bits in every run that it is a part of.
         """
-        for begin in range(0, len(self._bodies.left), CHUNK):
+        for begin in range(0, len(self._bodies.remaining), CHUNK):
             some = slice(begin, begin + CHUNK)
             both = self._bodies.position[..., some], self._bodies.velocity[..., some]
             yield some, np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
@@ -242,7 +242,7 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> Bo
     return BodyState(
         position=particles.position.reshape(bodies.position.shape),
         velocity=particles.velocity.reshape(bodies.position.shape),
-        left=np.zeros(n),
+        remaining=np.zeros(n),
         guess=guess,
         path=np.ascontiguousarray(path),
         short=whole[0],

@@ -60,9 +60,9 @@ class Energies:
             for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
                 places.append((scene, (r[:, point] - r[:, carrier])[:, None, :]))
             for scene, points in places:
-                chain, flat = scene.chain(), points.reshape(3, -1)
+                walls, flat = scene.walls(), points.reshape(3, -1)
                 for k in np.flatnonzero((scene.gaps(flat) > 0.0).any(axis=0)) if flat.size else ():
-                    total[k % total.size] += contact_energy(self._law, chain, 1.0, column(flat, 0, k))
+                    total[k % total.size] += contact_energy(self._law, walls, 1.0, column(flat, 0, k))
         return total
 
     def led(self, r: Floats, v: Floats) -> Floats:

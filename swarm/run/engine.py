@@ -54,11 +54,11 @@ class Run(BaseRun):
     ) -> None:  # fmt: skip
         n = len(particles)
         self._numbers, self._law = method.numbers(scene), method.law()
-        self._chain, self._gravity = scene.chain(), scene.pull()
-        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._chain), n)
+        self._walls, self._gravity = scene.walls(), scene.pull()
+        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._walls), n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
         self._impacts, self._tally = watched
-        self._booked = lanes.booked(self._chain)
+        self._booked = lanes.booked(self._walls)
         self.state = state_of(scene, particles, method, self._booked)
         observables.start_energies(scene, self._law, self.state)
         self._moment, self._faces = 0.0, scene.open_faces()
@@ -103,7 +103,9 @@ class Run(BaseRun):
             status, particle, _left = max(ends, key=lambda end: end[:2])
             self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
             if self._cut_short:
-                self._halted = left_behind(self._halted, self._phase, [left for *_, left in ends if left is not None])
+                self._halted = left_behind(
+                    self._halted, self._phase, [remaining for *_, remaining in ends if remaining is not None]
+                )
             if status == Status.HARD_CONTACT:
                 # Go on with the kernel of this phase, or with hard contacts where none last.
                 if self.state.contacts is not None:
@@ -190,13 +192,13 @@ class Run(BaseRun):
         """The walls of the frame that ends at a moment [s]."""
         self._moment = moment = self._method.instant(moment)
         if self._scene.moves():
-            self._chain, self._faces = self._scene.chain(moment), self._scene.open_faces(moment)
+            self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
 
     def share_done(self, span: float) -> float:
-        left = self._halted.time_left()
+        remaining = self._halted.time_left()
         if self.state.contacts is not None:
-            left = np.append(left, self.state.contacts.left[self.state.contacts.left > 0.0])
-        return float((self._phase == ARRIVED).sum() + (1.0 - left / span).sum()) / len(self._phase)
+            remaining = np.append(remaining, self.state.contacts.remaining[self.state.contacts.remaining > 0.0])
+        return float((self._phase == ARRIVED).sum() + (1.0 - remaining / span).sum()) / len(self._phase)
 
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
         """How many threads of the pool advance a frame, and whether the caller's thread does too."""
@@ -228,22 +230,22 @@ class Run(BaseRun):
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
-        return self._numbers, self._chain, self._gravity, self._hard, share, mine
+        return self._numbers, self._walls, self._gravity, self._hard, share, mine
 
     def _lasting(self, phase: int, share: lanes.Share) -> tuple[Any, tuple[Any, ...]]:
         """The kernel that advances particles in this phase, which is not flight, and its arguments."""
-        common = self._numbers, self._chain, self._gravity, share
+        common = self._numbers, self._walls, self._gravity, share
         if _KINDS[phase] is None:
             return contact_events.meet_block if phase == EVENT else contact_events.careful_block, common
         return slide.slide_block, (_KINDS[phase], *common, sliding.empty(self.state.period, self.state.openings))
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
-        return self._law, self._chain, self._gravity, self.state, drawn, self._size, self._partial
+        return self._law, self._walls, self._gravity, self.state, drawn, self._size, self._partial
 
     def _escaping(self) -> tuple[Any, ...]:
         """Arguments of `count_escaped`."""
-        return self._chain, self._gravity, self._far, self._faces, self.state
+        return self._walls, self._gravity, self._far, self._faces, self.state
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         draws, mine = self._drawing(), self._empty_lanes()
@@ -274,7 +276,7 @@ class Run(BaseRun):
         if self._tally is not None:
             self._tally.restore(arrays["member_impacts"])
         contacts = self.state.contacts
-        if contacts is not None and (contacts.phase.any() or (contacts.left > 0.0).any()):
+        if contacts is not None and (contacts.phase.any() or (contacts.remaining > 0.0).any()):
             self._kinds = set(_KINDS)
             self._choose_tier()
 

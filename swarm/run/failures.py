@@ -24,8 +24,8 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
         sentence += f", {method.too_fast(scene)}"
     multipliers = state.multipliers
     if status == Status.UNCONVERGED and multipliers is not None:
-        left, stored = multipliers.left[particle], multipliers.stored_energy[particle]
-        sentence += f" {method.failure(moment, left, multipliers.sweeps[particle], stored)}"
+        remaining, stored = multipliers.remaining[particle], multipliers.stored_energy[particle]
+        sentence += f" {method.failure(moment, remaining, multipliers.sweeps[particle], stored)}"
     return sentence
 
 
@@ -53,11 +53,11 @@ def require_admissible(
 
 def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     """Where a particle is that does not go on, and when, if its contacts may last: kernels leave that there."""
-    left = 0.0 if state.contacts is None else state.contacts.left[particle]
-    place, found = state.position[:, particle], moment - left
+    remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
+    place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
     where = f"({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
-    return f"; it is at {where}" + (f" at {found:.9g} s" if left > 0.0 else "")
+    return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
 
 
 def _failed(moment: float) -> str:

@@ -17,7 +17,7 @@ from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Particles, State
 from ..reacting import queue as events
-from ..reacting.described import chain_now, freedoms_of, observed, scenery_of
+from ..reacting.described import freedoms_of, observed, scenery_of, walls_now
 from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
 from ..scene import Scene
 from ..status import Status
@@ -158,11 +158,11 @@ class ReactingRun(BaseRun):
         yield events.take, (self._scenery, *moving)
         yield events.arrive, (self._scenery, self._queue, rule, *part)
         yield events.settle, (self._scenery, self._freedoms, 0.0)
-        yield observables.observe, self._observing(chain_now(self._scene, self._scenery, self._freedoms))
+        yield observables.observe, self._observing(walls_now(self._scene, self._scenery, self._freedoms))
 
-    def _observing(self, chain: Any) -> tuple[Any, ...]:
+    def _observing(self, walls: Any) -> tuple[Any, ...]:
         drawn = np.arange(len(self._partial))
-        return None, chain, self._gravity, self.state, drawn, observables.CHUNK, self._partial
+        return None, walls, self._gravity, self.state, drawn, observables.CHUNK, self._partial
 
     def observe(self) -> None:
         self._observe(0.0)
@@ -170,8 +170,8 @@ class ReactingRun(BaseRun):
 
     def _observe(self, moment: float) -> None:
         self._walls = observed(self._scene, self._freedoms, moment)
-        chain = chain_now(self._scene, self._scenery, self._freedoms)
-        self._tier.kernel(observables.observe)(*self._observing(chain))
+        walls = walls_now(self._scene, self._scenery, self._freedoms)
+        self._tier.kernel(observables.observe)(*self._observing(walls))
 
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False)

@@ -65,8 +65,8 @@ def begin(state: State, phase: NDArray[np.int8], span: float, lasts: bool) -> No
 
 def _no_contacts(walls: int, n: int) -> Contacts:
     phase, load = np.zeros(n, np.int8), np.zeros((walls, n))
-    met, step, keep, left, short_steps, sliding = np.zeros((6, n))
-    return Contacts(phase, np.zeros((2, n)), met, step, keep, left, np.zeros((2, n)), short_steps, load, sliding)
+    met, step, keep, remaining, short_steps, sliding = np.zeros((6, n))
+    return Contacts(phase, np.zeros((2, n)), met, step, keep, remaining, np.zeros((2, n)), short_steps, load, sliding)
 
 
 def _no_sweeps(n: int) -> Multipliers:

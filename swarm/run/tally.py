@@ -23,7 +23,7 @@ class Tally:
         return self._counts.setdefault(threading.get_ident(), Counts(np.zeros(len(self._surface), np.int64)))
 
     def total(self) -> NDArray[np.int64]:
-        """Of each wall of the chain, all threads."""
+        """Of each wall of the scene, all threads."""
         of_threads = [counts.impacts for counts in list(self._counts.values())]
         return np.asarray(np.sum([0 * self._surface, *of_threads], axis=0))
 

@@ -39,26 +39,26 @@ class Tier:
     def __init__(self, choice: str, numbers: Any, particles: int) -> None:
         patience = 0.0 if particles > _FEW or not _same_bits(numbers) else _PATIENCE
         # Time left for plain Python [s].
-        self.left = {"always": 0.0, "never": math.inf}.get(choice, patience)
-        self.is_plain = self.left > 0.0
+        self.remaining = {"always": 0.0, "never": math.inf}.get(choice, patience)
+        self.is_plain = self.remaining > 0.0
         self._missing: list[str] = []
         self._latest = time.monotonic() + _LONGEST_COMPILATION if self.is_plain else -math.inf
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
         """Choose the tier for the next calls, kernels and their arguments; whether it has changed."""
-        before, may = self.is_plain, self.left > 0.0
-        if self.left == math.inf:
+        before, may = self.is_plain, self.remaining > 0.0
+        if self.remaining == math.inf:
             return False
         missing = [call for call in calls if (before or may) and not cache.is_compiled(*call)]
         self._missing = [cache.kind(*call) for call in missing]
         if may and missing:
             known = ledger.is_remembered(self._missing)
-            self.left = 0.0 if known else min(self.left, _PATIENCE - ledger.spent(self._missing))
-            may = self.left > 0.0
+            self.remaining = 0.0 if known else min(self.remaining, _PATIENCE - ledger.spent(self._missing))
+            may = self.remaining > 0.0
         if before and missing and not may and time.monotonic() < self._latest:
             # Where another process has begun, to wait for it would waste a core.
             may = any(cache.is_being_compiled(*call) for call in missing)
-            self.left = _PATIENCE if may else self.left
+            self.remaining = _PATIENCE if may else self.remaining
         self.is_plain = may and bool(missing)
         if missing and not may and ledger.spent(self._missing) >= _PATIENCE:
             ledger.remember(self._missing)
@@ -66,7 +66,7 @@ class Tier:
 
     def spend(self, seconds: float) -> None:
         """Count a time [s] that the kernels of this tier took."""
-        self.left -= seconds
+        self.remaining -= seconds
         if self.is_plain:
             ledger.book(self._missing, seconds)
 

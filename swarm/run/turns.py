@@ -49,16 +49,16 @@ class Turns:
         mine: NDArray[np.int64] = np.add.outer(drawn * size, np.arange(size)).ravel()
         mine = mine[mine < len(self._phase)]
         mine = mine[(self._phase[mine] != FLYING) & (self._phase[mine] != ARRIVED)]
-        left = self._contacts.left[mine]
+        remaining = self._contacts.remaining[mine]
         _both, now, then = np.intersect1d(mine, self._particles, return_indices=True)
-        still: NDArray[np.int64] = mine[now[left[now] == self._left[then]]]
-        self._particles, self._left = mine, left
+        still: NDArray[np.int64] = mine[now[remaining[now] == self._left[then]]]
+        self._particles, self._left = mine, remaining
         return still
 
 
 def left_behind(before: Halted, phase: NDArray[np.int8], now: list[Halted]) -> Halted:
     """What halts have left in the lanes: `now`, and `before` what no lane has taken since."""
-    picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(left.particle for left in now)])
+    picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(remaining.particle for remaining in now)])
     waiting = ~np.isin(before.particle, picked_up)
     parts = [Halted(before.particle[waiting], before.rows[:, waiting]), *now]
     particle = np.concatenate([part.particle for part in parts])

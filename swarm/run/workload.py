@@ -86,11 +86,11 @@ def _is_much(found: Flights, particles: Particles, until: float, every: float) -
 
 def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
     """From the flights of some particles at the start, from the impact before it to the one after it."""
-    chain, pull, seen = scene.chain(), scene.pull(), []
+    walls, pull, seen = scene.walls(), scene.pull(), []
     for i in _chosen(particles):
         position, velocity = particles.position[:, i], particles.velocity[:, i]
-        until, wall = _hit(chain, pull, position, velocity)
-        since, _wall = _hit(chain, pull, position, -velocity)
+        until, wall = _hit(walls, pull, position, velocity)
+        since, _wall = _hit(walls, pull, position, -velocity)
         # 0 is a particle that rests, or rolls along its wall.
         if since + until > 0.0:
             seen.append(Flights(impact + since + until, wall))
@@ -102,31 +102,31 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
 
     Between two chords it moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
     """
-    chain, random, seen = scene.chain(), np.random.default_rng(0), []
+    walls, random, seen = scene.walls(), np.random.default_rng(0), []
     pull = math.hypot(*(scene.gravity or (0.0,)))
     for i in _chosen(particles):
         point, velocity = particles.position[:, i], particles.velocity[:, i]
         for k in range(_CHORDS):
             way = random.standard_normal(3)
             way = way / math.sqrt(way @ way)
-            length, ahead, wall = _chord(chain, point, way)
+            length, ahead, wall = _chord(walls, point, way)
             if not length < math.inf:
                 return Flights(math.inf, -1)
-            normal = np.array(chain.unit_normal(float(wall), vec(point + ahead * way)))
+            normal = np.array(walls.unit_normal(float(wall), vec(point + ahead * way)))
             point = point + (ahead - length * random.random()) * way
             speed = math.sqrt(velocity @ velocity + pull * length)
             if k >= _CHORDS - _COUNTED and length > 0.0 and speed > 0.0:
                 seen.append(Flights(impact + length / speed, wall))
             way = way - (way @ normal) * normal
-            length, ahead, _wall = _chord(chain, point, way)
+            length, ahead, _wall = _chord(walls, point, way)
             if length < math.inf:
                 point = point + (ahead - length * random.random()) * way
     return _typical(seen)
 
 
-def _chord(chain: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
+def _chord(walls: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
     """The chord through a point, in units of the vector along it: its length, the part ahead, and the wall there."""
-    (ahead, wall), (behind, _wall) = _hit(chain, None, point, way), _hit(chain, None, point, -way)
+    (ahead, wall), (behind, _wall) = _hit(walls, None, point, way), _hit(walls, None, point, -way)
     return ahead + behind, ahead, wall
 
 
@@ -135,13 +135,13 @@ def _chosen(particles: Particles) -> list[int]:
 
 
 def _hit(
-    chain: Any, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
+    walls: Any, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> tuple[float, int]:
     """The time to the first hit and its wall, infinite if it is not found in a few parts."""
     total = 0.0
     gravity = np.zeros(3) if pull is None else np.array(pull)
     for _part in range(_PARTS):
-        time, wall = flights.first_hit(chain, pull, vec(position), vec(velocity))
+        time, wall = flights.first_hit(walls, pull, vec(position), vec(velocity))
         total += float(time)
         if wall >= 0.0 or not time < math.inf:
             return total, int(wall)

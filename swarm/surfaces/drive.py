@@ -161,9 +161,9 @@ class Drive(Record):
     late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
     jerks: Vec  # bounds of the components of d''' [m/s^3]
 
-    def pose(self, left):
+    def pose(self, remaining):
         """The `Pose` when so much of the frame is left [s]."""
-        t = -left
+        t = -remaining
         d, v, a = ZERO, ZERO, ZERO
         for swing in self.swings:
             d, v, a = swing.added(t, d, v, a)

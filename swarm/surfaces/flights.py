@@ -42,10 +42,10 @@ def hit(gravity, surface, r, v):
     return surface.falling_hit(r, v, as_vector(gravity))
 
 
-def first_hit(chain, gravity, r, v):
+def first_hit(walls, gravity, r, v):
     """The first `Hit` of a free flight."""
     first = NEVER
-    for number, wall in reversed(chain.numbered()):
+    for number, wall in reversed(walls.numbered()):
         if isinstance(wall, Field):
             first = soonest(wall.members.field_hit(gravity, r, v), number, first)
         else:
@@ -74,9 +74,9 @@ COURSE = 9
 _WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
 
 
-def begin(chain, gravity, course, row, lane, r, v):
+def begin(walls, gravity, course, row, lane, r, v):
     """The start of a flight for every wall into course[row:, lane]."""
-    for k, wall in enumerate(chain.walls):
+    for k, wall in enumerate(walls.each):
         wall.begin_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
@@ -93,9 +93,9 @@ def begin_whole(gravity, surface, course, row, lane, r, v):
         course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
 
 
-def step(chain, gravity, course, row, lane, r, v):
+def step(walls, gravity, course, row, lane, r, v):
     """One safe step of every wall that needs steps, of the flight that starts at r."""
-    for k, wall in enumerate(chain.walls):
+    for k, wall in enumerate(walls.each):
         wall.step_flight(gravity, course, row + k * COURSE, lane, r, v)
 
 
@@ -112,10 +112,10 @@ def step_whole(gravity, surface, course, row, lane):
         )  # fmt: skip
 
 
-def end(chain, course, row, lane):
+def end(walls, course, row, lane):
     """`first_hit` from the course."""
     first = NEVER
-    for k, _wall in reversed(tuple(enumerate(chain.walls))):
+    for k, _wall in reversed(tuple(enumerate(walls.each))):
         at = row + k * COURSE
         first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), float(k), first)
     return first
@@ -124,10 +124,10 @@ def end(chain, course, row, lane):
 # --- Of one wall, and of all but one ---------------------------------------------------------------------
 
 
-def hit_of(chain, gravity, wall, r, v):
+def hit_of(walls, gravity, wall, r, v):
     """`hit` of the wall with this number."""
     first, found = math.inf, True
-    for number, one in reversed(chain.numbered()):
+    for number, one in reversed(walls.numbered()):
         if isinstance(one, Field):
             surface, here = one.members.wall(wall - number), wall < number + one.count()
         else:
@@ -137,11 +137,11 @@ def hit_of(chain, gravity, wall, r, v):
     return first, found
 
 
-def other_hit(chain, wall, r, v):
-    """The first hit of a straight flight with any wall but this one, which is one of the chain's."""
+def other_hit(walls, wall, r, v):
+    """The first hit of a straight flight with any wall but this one, which is one of these."""
     first = NEVER
     # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
-    for k, other in reversed(tuple(enumerate(chain.walls if len(chain.walls) > 1 else ()))):
+    for k, other in reversed(tuple(enumerate(walls.each if len(walls.each) > 1 else ()))):
         time, _found = other.first_hit(r, v)
         use = (first.time < time) | (wall == k)
         first = Hit(select(use, first.time, time), select(use, first.wall, float(k)))
@@ -151,17 +151,17 @@ def other_hit(chain, wall, r, v):
 # --- Free time, with and without gravity -----------------------------------------------------------------
 
 
-def free_time(gravity, chain, r, v):
+def free_time(gravity, walls, r, v):
     """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
     if gravity is None:
-        return select(chain.outside(-1.0, r), 0.0, first_hit(chain, gravity, r, v).time)
-    return safe_time(chain, r, v, as_vector(gravity))
+        return select(walls.outside(-1.0, r), 0.0, first_hit(walls, gravity, r, v).time)
+    return safe_time(walls, r, v, as_vector(gravity))
 
 
-def safe_time(chain, r, v, pull):
+def safe_time(walls, r, v, pull):
     """The smallest safe time of all walls."""
     shortest = math.inf
-    for wall in reversed(chain.walls):
+    for wall in reversed(walls.each):
         time = wall.safe_time(r, v, pull)
         shortest = select(shortest < time, shortest, time)
     return shortest

@@ -34,15 +34,15 @@ class Moving(Driven):
         """How many walls a field has."""
         return self.body.count()
 
-    def during(self, left, after):
+    def during(self, remaining, after):
         """The wall over a step, at whose start and end so much of the frame is left [s]."""
-        start = self.drive.pose(left)
-        end = start if after is left else self.drive.pose(after)
-        return self.posed(self.body, start, end, self.drive, left, after)
+        start = self.drive.pose(remaining)
+        end = start if after is remaining else self.drive.pose(after)
+        return self.posed(self.body, start, end, self.drive, remaining, after)
 
     def seen(self, flight, t):
-        left = flight.left - t
-        return flight.seen(t, self.during(left, left), flight.pull)
+        remaining = flight.remaining - t
+        return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
 
 class Translated(Moving):
@@ -63,14 +63,14 @@ class Following(Record):
 class Carried(Walls):
     """The walls of a scene, some of which move, all of them uniformly."""
 
-    def at(self, left):
-        return self.during(left, left)
+    def at(self, remaining):
+        return self.during(remaining, remaining)
 
-    def during(self, left, after):
+    def during(self, remaining, after):
         made: tuple[Any, ...] = ()
         last: Any = None
-        for wall in self.walls:
-            last = _during(wall.members if isinstance(wall, Field) else wall, last, left, after)
+        for wall in self.each:
+            last = _during(wall.members if isinstance(wall, Field) else wall, last, remaining, after)
             made = (*made, Field(last) if isinstance(wall, Field) else last)
         return Walls(made)
 
@@ -86,11 +86,11 @@ class Strided(Marched):
     """The same where all of these steps are taken in lanes: see strides.py."""
 
 
-def _during(wall, last, left, after):
+def _during(wall, last, remaining, after):
     """A wall over a step; `last` is the one before it then."""
     if isinstance(wall, Following):
         return last._replace(body=wall.body)
-    return wall.during(left, after) if isinstance(wall, Moving) else wall
+    return wall.during(remaining, after) if isinstance(wall, Moving) else wall
 
 
 # --- From a description ----------------------------------------------------------------------------------

@@ -5,28 +5,28 @@ import math
 from ..kernel.jit import outlined
 
 
-def count_near(chain, r):
+def count_near(walls, r):
     """How many walls are near a point."""
-    near = chain.others().length()
-    for _number, field in reversed(chain.fields()):
+    near = walls.others().length()
+    for _number, field in reversed(walls.fields()):
         near = field.members.count_in_cell(r) + near
     return near
 
 
 @outlined
-def list_near(chain, r, into):
+def list_near(walls, r, into):
     """The numbers of the walls near a point into `into`."""
     k = 0
-    for number, field in chain.fields():
+    for number, field in walls.fields():
         k += field.members.list_in_cell(k, number, r, into)
-    before = chain.count_in_fields()
-    for i in range(chain.others().length()):
+    before = walls.count_in_fields()
+    for i in range(walls.others().length()):
         into[k + i] = before + i
 
 
-def until_others(chain, r, v):
+def until_others(walls, r, v):
     """When a straight flight may meet a wall that is not near its start."""
     soonest = math.inf
-    for _number, field in reversed(chain.fields()):
+    for _number, field in reversed(walls.fields()):
         soonest = min(field.members.until_next_cell(r, v), soonest)
     return soonest

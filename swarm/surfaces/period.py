@@ -1,7 +1,7 @@
 """A cell that repeats without end: when a flight leaves it, and the way back into it.
 
 Every wall that reaches beyond a face, or close to one, is there a second time, shifted by the period: so the walls of a
-particle in the cell, and a little outside of it, are all in the chain. A flight ends a little beyond the face at the
+particle in the cell, and a little outside of it, are all in the scene. A flight ends a little beyond the face at the
 latest, so that no round-off decides whether it has left; where no wall that has images is in the way it goes on over
 any number of cells, which are counted at its end.
 """
@@ -86,18 +86,18 @@ def is_beyond(period, r):
     return is_beyond_face(period.x, r.x) | is_beyond_face(period.y, r.y) | is_beyond_face(period.z, r.z)
 
 
-def cut(period, gravity, motion, left, hit):
-    """The `Hit` of a flight (r, v), or that it leaves the cell before; `left` is the time until the frame ends."""
+def cut(period, gravity, motion, remaining, hit):
+    """The `Hit` of a flight (r, v), or that it leaves the cell before; `remaining` is the time until the frame ends."""
     if period is None:
         return hit
     (r, v), (gx, gy, gz) = motion, pulls(gravity)
     x, y = time_to_leave(period.x, r.x, v.x, gx), time_to_leave(period.y, r.y, v.y, gy)
     z = time_to_leave(period.z, r.z, v.z, gz)
-    late = _EPSILON * left
+    late = _EPSILON * remaining
     first, hit = over_faces(period.gaps, period, gravity, motion, (least(x, y, z), hit, 2.0 * late))
     # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
     # ends a little later, after a time that leaves exactly what it is rounded to.
-    exact = left - (left - (first + late))
+    exact = remaining - (remaining - (first + late))
     room = least(room_along(period.x), room_along(period.y), room_along(period.z))
     short = _fastest(gravity, v, first) * late <= room
     time = select(short, exact, first)
@@ -111,7 +111,7 @@ def _fastest(gravity, v, t):
     return most(fastest(gx, v.x, t), fastest(gy, v.y, t), fastest(gz, v.z, t))
 
 
-def on_time(period, gravity, motion, left, time, room):
+def on_time(period, gravity, motion, remaining, time, room):
     """When a flight (r, v) among bodies ends that is free until `time`, and may go on by `room` along each axis.
 
     Where nothing repeats that is then.
@@ -120,8 +120,8 @@ def on_time(period, gravity, motion, left, time, room):
         return time
     _r, v = motion
     # As in `cut`: cells of a grid are as many as faces.
-    late = _EPSILON * left
-    exact = left - (left - (time + late))
+    late = _EPSILON * remaining
+    exact = remaining - (remaining - (time + late))
     short = 2.0 * _fastest(gravity, v, time) * late <= least(room.x, room.y, room.z)
     return longer(period.gaps, period, gravity, motion, (select(short, exact, time), 2.0 * late))
 

@@ -23,7 +23,7 @@ class Posed(Framed):
     pose: Pose
     end: Pose  # at the end of the step
     drive: Drive
-    left: float  # of the frame [s]
+    remaining: float  # of the frame [s]
     after: float  # of the frame, at the end of the step [s]
 
     def wall(self, number):
@@ -68,7 +68,7 @@ class Posed(Framed):
 
     def middle(self):
         """The middle of the step, from the end of the frame on."""
-        return -0.5 * (self.left + self.after)
+        return -0.5 * (self.remaining + self.after)
 
     place_in = own_place
 
@@ -128,7 +128,7 @@ class Posed(Framed):
             return self.end.shift - self.pose.shift + r
         rate = norm(spin)
         k = spin / select(rate > 0.0, rate, 1.0)
-        sine, versine = sine_and_versine(rate * (self.left - self.after))
+        sine, versine = sine_and_versine(rate * (self.remaining - self.after))
         before = self.arm(r)
         after = before + versine * (dot(k, before) * k - before) + sine * cross(k, before)
         return self.drive.center + self.end.shift + after
@@ -188,7 +188,7 @@ class Posed(Framed):
         # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
         # across the axis and 1 along it, with the angle a of the step.
         k = self.drive.turn.axis
-        half = math.sin(0.5 * self.drive.turn.rate * (self.left - self.after))
+        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
         along = dot(k, n) * k
         n = along + (n - along) * (1.0 / (1.0 - half * half))
         return 0.5 * (self.pose.out(n) + self.end.out(n))

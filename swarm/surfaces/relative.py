@@ -12,7 +12,7 @@ class Flight(Record):
     r: Vec
     v: Vec
     pull: Vec
-    left: float
+    remaining: float
     speed: float  # |v|
     weight: float  # |G|
 
@@ -67,6 +67,6 @@ class Seen(Record):
         )
 
 
-def flight_of(r, v, pull, left):
+def flight_of(r, v, pull, remaining):
     """The flight of a particle."""
-    return Flight(r, v, pull, left, norm(v), norm(pull))
+    return Flight(r, v, pull, remaining, norm(v), norm(pull))

@@ -48,11 +48,11 @@ _NOBODY = Nearest(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 # --- Of all walls ----------------------------------------------------------------------------------------
 
 
-def seen_by_walls(chain, flight, t):
+def seen_by_walls(walls, flight, t):
     """(wall, its number, `Seen`) of each wall in no field that is met by safe steps, last to first."""
     found: Any = ()
     seen = None
-    for number, wall in chain.numbered():
+    for number, wall in walls.numbered():
         if isinstance(wall, Field):
             continue
         if not isinstance(wall, Following):
@@ -62,12 +62,12 @@ def seen_by_walls(chain, flight, t):
     return found
 
 
-def _nearest(chain, flight, t, longest):
+def _nearest(walls, flight, t, longest):
     """The `Nearest` of all walls that are met by safe steps."""
     found = _NOBODY
-    for wall, number, seen in seen_by_walls(chain, flight, t):
+    for wall, number, seen in seen_by_walls(walls, flight, t):
         found = _nearer(seen, wall.body, number, found, longest)
-    for number, field in reversed(chain.fields()):
+    for number, field in reversed(walls.fields()):
         if isinstance(field.members, Moving) and not isinstance(field.members, Translated):
             found = _nearest_in_cell(field.members, number, found, flight, t, longest)
     return found
@@ -104,16 +104,16 @@ def _nearer(seen, body, number, rest, longest):
 
 
 @outlined
-def march(chain, flight, longest):
+def march(walls, flight, longest):
     """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
     t, before = 0.0, 0.0
     for i in range(_MARCH):
-        near = _nearest(chain, flight, t, longest - t)
+        near = _nearest(walls, flight, t, longest - t)
         if i > 0 and near.past >= 0.0:
             # By round-off: a wall that bends as is said is not passed by more.
             if near.depth <= _ROUND_OFF * near.room:
                 return Hit(t, near.past)
-            return _last_inside(chain, flight, before, t, near.past)
+            return _last_inside(walls, flight, before, t, near.past)
         # A step that only ends with the longest time is no hit, however short.
         if not near.time < longest - t:
             return Hit(longest, -1.0)
@@ -124,13 +124,13 @@ def march(chain, flight, longest):
 
 
 @outlined
-def _last_inside(chain, flight, low, high, wall):
+def _last_inside(walls, flight, low, high, wall):
     """The last time between two at which no wall is passed: at the second one is, by round-off."""
     for _i in range(_BISECTIONS):
         t = 0.5 * (low + high)
         if not low < t < high:
             break
-        past = _nearest(chain, flight, t, 0.0).past
+        past = _nearest(walls, flight, t, 0.0).past
         if past >= 0.0:
             high, wall = t, past
         else:
@@ -163,13 +163,13 @@ def _is_unknown(wall: Any) -> bool:
 # --- Free time -------------------------------------------------------------------------------------------
 
 
-def free_time(chain, gravity, r, v, left):
+def free_time(walls, gravity, r, v, remaining):
     """A time during which a flight surely stays admissible, with so much of the frame left [s].
 
     0 for a particle that is in contact now.
     """
-    now, time = chain.at(left), math.inf
-    if not isinstance(chain, Marched):
+    now, time = walls.at(remaining), math.inf
+    if not isinstance(walls, Marched):
         return flights.free_time(gravity, now, r, v)
     for wall in reversed(now.walls):
         here = _free_of(wall, gravity, r, v)
@@ -182,7 +182,7 @@ def _free_of(surface, gravity, r, v):
     if not _is_marched(surface):
         return flights.free_time(gravity, Walls((surface,)), r, v)
     # One safe step: of a flight of many steps the next one begins nearer to the wall.
-    step = surface.body.moving_step(_seen_now(surface, gravity, r, v), surface.left)
+    step = surface.body.moving_step(_seen_now(surface, gravity, r, v), surface.remaining)
     return select(step.level > 0.0, 0.0, step.time)
 
 
@@ -193,7 +193,7 @@ def _is_marched(surface):
 
 def _seen_now(surface, gravity, r, v):
     """A particle in the frame of such a wall."""
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), surface.left)
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), surface.remaining)
     return Moving(surface.body, surface.drive).seen(flight, 0.0)
 
 
@@ -201,20 +201,20 @@ def _seen_now(surface, gravity, r, v):
 
 
 @outlined
-def first_hit(chain, gravity, r, v, left):
+def first_hit(walls, gravity, r, v, remaining):
     """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
-    found = closed_hit(chain.at(left), gravity, r, v)
-    longest = select(found.time < left, found.time, left)
-    met = march(chain, flight_of(r, v, accelerated(gravity, ZERO, 1.0), left), longest)
+    found = closed_hit(walls.at(remaining), gravity, r, v)
+    longest = select(found.time < remaining, found.time, remaining)
+    met = march(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
     return found
 
 
-def closed_hit(chain, gravity, r, v):
+def closed_hit(walls, gravity, r, v):
     """The first hit with the walls that have a closed form."""
     found = NEVER
-    for number, wall in reversed(chain.numbered()):
+    for number, wall in reversed(walls.numbered()):
         if isinstance(wall, Field):
             closed = not _is_marched(wall.members)
             found = soonest(wall.members.field_hit(gravity, r, v) if closed else NEVER, number, found)
@@ -227,7 +227,9 @@ def closed_hit(chain, gravity, r, v):
 @outlined
 def _alone(surface, r, v, pull):
     """When a flight leaves the admissible side of this wall: (time, whether it does then)."""
-    found = march(Walls((Moving(surface.body, surface.drive),)), flight_of(r, v, pull, surface.left), surface.left)
+    found = march(
+        Walls((Moving(surface.body, surface.drive),)), flight_of(r, v, pull, surface.remaining), surface.remaining
+    )
     return found.time, found.wall >= 0.0
 
 
@@ -235,7 +237,7 @@ def _alone(surface, r, v, pull):
 def _field_alone(field, r, v, pull):
     """The first hit of a flight with the bodies of a field, or how far it is surely free."""
     alone = Walls((Field(Moving(field.body, field.drive)),))
-    return march(alone, flight_of(r, v, pull, field.left), field.left)
+    return march(alone, flight_of(r, v, pull, field.remaining), field.remaining)
 
 
 def _first_hit_of_field(members, gravity, r, v):
@@ -243,7 +245,7 @@ def _first_hit_of_field(members, gravity, r, v):
 
 
 def _until_next_cell(members, r, v):
-    return until_next_in_frame(members.body.grid, _seen_now(members, None, r, v), members.left)
+    return until_next_in_frame(members.body.grid, _seen_now(members, None, r, v), members.remaining)
 
 
 # What takes safe steps is known only here.

@@ -24,23 +24,23 @@ _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
 _AHEAD = 32.0
 
 
-def begin(chain, gravity, course, lane, r, v, left):
+def begin(walls, gravity, course, lane, r, v, remaining):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
-    found = closed_hit(chain.at(left), gravity, r, v)
+    found = closed_hit(walls.at(remaining), gravity, r, v)
     course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
     course[_CLOSED, lane], course[_OTHER, lane] = found.time, found.wall
 
 
-def stride(chain, gravity, course, lane, r, v, left, is_first):
+def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     """One stride of a lane that has not met a wall."""
     t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
-    longest = select(closed < left, closed, left) - t
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), left)
+    longest = select(closed < remaining, closed, remaining) - t
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining)
     known = tuple(
         (number, Known(wall.body, seen, wall.body.level_along(seen)))
-        for wall, number, seen in seen_by_walls(chain, flight, t)
+        for wall, number, seen in seen_by_walls(walls, flight, t)
     )
-    within, ahead = _first_rise(known), _AHEAD * _pace(chain)
+    within, ahead = _first_rise(known), _AHEAD * _pace(walls)
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
     time, wall, meets = _first_stride(known, within, is_first)
@@ -58,10 +58,10 @@ def end(course, lane):
     return Hit(select(arrives, closed, t), select(arrives, course[_OTHER, lane], met))
 
 
-def _pace(chain):
+def _pace(walls):
     """The shortest pace of all walls that move."""
     shortest = math.inf
-    for wall in reversed(chain.walls):
+    for wall in reversed(walls.each):
         mine = wall.drive.time_scale if isinstance(wall, Moving) else math.inf
         shortest = select(mine < shortest, mine, shortest)
     return shortest

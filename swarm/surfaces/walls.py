@@ -36,17 +36,17 @@ class Walls(Record):
     What is asked of one wall is a method too, with the number of the wall before the other arguments.
     """
 
-    walls: tuple[Any, ...]
+    each: tuple[Any, ...]
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any: ...
 
-    def at(self, left):
+    def at(self, remaining):
         """The walls when so much of the frame is left [s]: themselves, where none moves."""
         return self
 
-    def during(self, left, after):
+    def during(self, remaining, after):
         """The walls over a step, at whose start and end so much of the frame is left [s]."""
         return self
 
@@ -56,7 +56,7 @@ class Walls(Record):
         None where its hit has a closed form, or is asked for as a whole.
         """
         steps = None
-        for wall in self.walls:
+        for wall in self.each:
             steps = wall.in_steps if steps is None else steps
         return steps
 
@@ -66,7 +66,7 @@ class Walls(Record):
         """(number of the first, wall or field) of each."""
         found: tuple[Any, ...] = ()
         number = 0.0
-        for wall in self.walls:
+        for wall in self.each:
             found = (*found, (number, wall))
             number = number + (wall.count() if isinstance(wall, Field) else 1.0)
         return found
@@ -77,16 +77,16 @@ class Walls(Record):
 
     def others(self):
         """The walls that are in no field."""
-        return Walls(tuple(wall for wall in self.walls if not isinstance(wall, Field)))
+        return Walls(tuple(wall for wall in self.each if not isinstance(wall, Field)))
 
     def count_in_fields(self):
         """How many walls its fields have."""
-        return sum((wall.count() for wall in self.walls if isinstance(wall, Field)), 0.0)
+        return sum((wall.count() for wall in self.each if isinstance(wall, Field)), 0.0)
 
     def length(self):
         """How many rows there are, one for a field: a constant for the compiler if none is `Listed`."""
         rows = 0
-        for wall in self.walls:
+        for wall in self.each:
             rows += int(wall.count()) if isinstance(wall, Listed) else 1
         return rows
 
@@ -121,14 +121,14 @@ class Walls(Record):
     def shortest_time_scale(self):
         """The shortest pace of all walls."""
         shortest = math.inf
-        for wall in reversed(self.walls):
+        for wall in reversed(self.each):
             one = wall.members if isinstance(wall, Field) else wall
             shortest = min(one.time_scale(), shortest)
         return shortest
 
     def chord_sweeps(self):
         """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
-        return max((0, *(wall.chord_sweeps for wall in self.walls)))
+        return max((0, *(wall.chord_sweeps for wall in self.each)))
 
     def outside(self, number, r):
         """Whether a point is outside any wall but this one (-1: any at all)."""
@@ -144,7 +144,7 @@ class Walls(Record):
     def pushes(self, number, kappa):
         """Whether this wall can push with kappa: in its direction and short of the pole."""
         found = False
-        for k, wall in enumerate(self.walls):
+        for k, wall in enumerate(self.each):
             farthest = wall.farthest_push()
             here = (kappa == 0.0) | ((kappa * farthest > 0.0) & (abs(kappa) < abs(farthest)))
             found = ((number == k) & here) | found
@@ -153,7 +153,7 @@ class Walls(Record):
     def touched(self, r, p):
         """The walls that a step with free displacement p is in contact with."""
         found = Touched(-1.0, 0.0)
-        for k, wall in reversed(tuple(enumerate(self.walls))):
+        for k, wall in reversed(tuple(enumerate(self.each))):
             before = wall.level_of(wall.inner(r))
             after = wall.level_of(wall.end_inner(r + p))
             contact = (before > 0.0) | (after > 0.0)

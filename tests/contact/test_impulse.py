@@ -132,12 +132,12 @@ def test_careful_finds_the_smallest_root(name, law, **step):
 def test_newton_from_the_guess_finds_the_same_root(name, law, **step):
     """Whenever it says that it is done; and it is, within its sweeps, where dt resolves the contact."""
     step = Contact(name, law, **step, reachable=True)
-    chain = Walls((step.surface,))
+    walls = Walls((step.surface,))
     expected, _ = step.careful()
-    kappa, unsolved = call(impulse.guess, chain, 0, law, step.step()), True
+    kappa, unsolved = call(impulse.guess, walls, 0, law, step.step()), True
     for _ in range(impulse.NEWTON_STEPS):
         if unsolved:
-            newton = call(impulse.improve, chain, 0, law, None, step.step(), kappa)
+            newton = call(impulse.improve, walls, 0, law, None, step.step(), kappa)
             kappa, unsolved = kappa - newton.step, newton.more
     if not unsolved:
         assert kappa == pytest.approx(expected, rel=1e-12, abs=step.slack())

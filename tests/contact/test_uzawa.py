@@ -34,7 +34,7 @@ class Loop:
 
     def __init__(self, surfaces, start, free, acceleration="none", tolerance=1e-28, max_sweeps=300, c=C, exponent=1.0):
         self.law, self.c = regularisation(ALPHA, exponent), c
-        self.chain = all_walls(surfaces)
+        self.walls = all_walls(surfaces)
         self.method = swarm.AugmentedLagrangian(
             1.0, ALPHA, exponent, tolerance=tolerance, max_sweeps=max_sweeps, acceleration=acceleration
         ).numbers(swarm.Scene([swarm.Sphere(1.0)]))
@@ -42,9 +42,9 @@ class Loop:
         self.start, self.free = np.array(start), np.array(free)
 
     def run(self):
-        reactions = np.zeros((self.chain.length(), 4))
+        reactions = np.zeros((self.walls.length(), 4))
         with np.errstate(all="ignore"):
-            loop = uzawa.loop(self.method, self.law, self.chain, self.step, reactions)
+            loop = uzawa.loop(self.method, self.law, self.walls, self.step, reactions)
         self.end, self.sweeps, self.stored, self.converged = np.array(loop.r), loop.sweeps, loop.stored, loop.converged
         assert loop.solved
         self.held = reactions[:, :3].sum(axis=0)
@@ -57,7 +57,7 @@ class Loop:
         with np.errstate(all="ignore"):
             for sweep in range(self.method.max_sweeps):
                 swept = uzawa.sweep_all(
-                    self.method, self.law, self.chain, self.step, multipliers, before, sweep, reactions
+                    self.method, self.law, self.walls, self.step, multipliers, before, sweep, reactions
                 )
                 found.append(float(reactions[0, 3]))
                 if swept.stored <= self.method.tolerance:
@@ -240,8 +240,8 @@ def test_the_reflection_multiplier_is_the_fixed_point():
     for name in ("sphere", "ball", "ellipsoid", "egg", "plane"):
         surface, start, free = state_one(name, [0.4, -0.7, 0.5], np.array([0.3, 0.5, -0.6]), 0.8, 0.03)
         c = stiff(surface, start)
-        chain, law = Walls((surface,)), regularisation(ALPHA, 1.0)
-        kappa, multiplier = call(uzawa.reflection, chain, 0.0, law, step_of(start, free, c))
+        walls, law = Walls((surface,)), regularisation(ALPHA, 1.0)
+        kappa, multiplier = call(uzawa.reflection, walls, 0.0, law, step_of(start, free, c))
         assert kappa == pytest.approx(chord_of(surface, start, free), rel=1e-6)
         loop = Loop([Described(surface)], start, free, c=c).run()
         gradient = call(surface.discrete_gradient, start, loop.end)

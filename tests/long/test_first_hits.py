@@ -133,18 +133,18 @@ def flights(surface, scale, n, falls, seed):
 
 
 @kernel
-def straight_hits(chain, position, velocity, pull, times, index):
+def straight_hits(walls, position, velocity, pull, times, index):
     """`first_hit` of every straight flight."""
     for i in range(times.size):
-        times[i], index[i] = first_hit(chain, None, column(position, 0, i), column(velocity, 0, i))
+        times[i], index[i] = first_hit(walls, None, column(position, 0, i), column(velocity, 0, i))
 
 
 @kernel
-def falling_hits(chain, position, velocity, pull, times, index):
+def falling_hits(walls, position, velocity, pull, times, index):
     """`first_hit` of every falling flight, each with an acceleration of its own."""
     for i in range(times.size):
         gravity = Gravity(pull[0, i], pull[1, i], pull[2, i])
-        times[i], index[i] = first_hit(chain, gravity, column(position, 0, i), column(velocity, 0, i))
+        times[i], index[i] = first_hit(walls, gravity, column(position, 0, i), column(velocity, 0, i))
 
 
 # --- Judgement -------------------------------------------------------------------------------------------
@@ -237,11 +237,11 @@ def test_no_first_hit_is_missed(name, side, falls, capsys):
     tally = Tally()
     for seed, scale in enumerate(SCALES):
         surface = surface_of(name, side, scale)
-        chain = all_walls([surface])
+        walls = all_walls([surface])
         position, velocity, pull = flights(surface, scale, FLIGHTS // len(SCALES), falls, seed)
         for leg in range(LEGS):
             times, index = np.empty(position.shape[1]), np.empty(position.shape[1])
-            (falling_hits if falls else straight_hits)(chain, position, velocity, pull, times, index)
+            (falling_hits if falls else straight_hits)(walls, position, velocity, pull, times, index)
             found = index >= 0.0
             judged(surface, scale, position, velocity, pull, times, found, tally, seed)
             on = ~found & np.isfinite(times)

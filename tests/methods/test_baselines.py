@@ -56,7 +56,7 @@ def test_a_step_is_the_rule(rule, name, point, velocity, depth, mass, stiffness,
     start = wall - depth * np.array(call(numbers.unit_normal, wall))
     before = one_pass(method, scene, start, velocity, 1.0, mass)._replace(position=start, velocity=velocity)
     after = one_pass(method, scene, start, velocity, 1.0, mass)
-    assert after.left == 0.0
+    assert after.remaining == 0.0
     r, v = misses(rule, scene, method, mass, before, after)
     # A step in which the force is h^2 alpha/m times the depth has its round-off as many times.
     size = 1.0 + stiffness * (1.0 + np.abs(after.position).max() + np.abs(after.velocity).max())

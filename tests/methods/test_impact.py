@@ -39,7 +39,7 @@ def test_a_pass_reflects_at_the_wall(name, point, direction, speed):
     assert after.velocity == pytest.approx(velocity - 2 * (velocity @ normal) * normal, abs=8 * EPSILON * speed)
     assert np.linalg.norm(after.velocity) == pytest.approx(np.linalg.norm(velocity), rel=2 * EPSILON)
     assert after.impulse == pytest.approx([2.0 * velocity @ normal], rel=8 * EPSILON)
-    time = 1.0 / speed - after.left
+    time = 1.0 / speed - after.remaining
     assert after.position == pytest.approx(position + time * velocity, abs=8 * EPSILON)
 
 
@@ -50,7 +50,7 @@ def test_a_frame_that_ends_before_the_wall_is_a_flight(name):
     after = one_pass(swarm.Impact(), scene, position, velocity, 0.01)
     assert after.position == pytest.approx(position + 0.01 * velocity, abs=EPSILON)
     assert (after.velocity == velocity).all()
-    assert (after.left, after.surface, after.hits) == (0.0, -1.0, 0.0)
+    assert (after.remaining, after.surface, after.hits) == (0.0, -1.0, 0.0)
 
 
 @every_surface
@@ -61,7 +61,7 @@ def test_a_contact_step_is_a_chord(name, point, direction, h, lean):
     scene = scene_of(name)
     numbers, wall, velocity = approach(scene, point, direction, 0.0, lean)
     after = one_pass(swarm.Impact(contact_step=h), scene, wall, velocity, 1.0)
-    used = 1.0 - after.left
+    used = 1.0 - after.remaining
     assert np.linalg.norm(after.velocity) == pytest.approx(1.0, rel=4 * EPSILON)
     assert abs(gap(numbers, after.position)) <= 200 * EPSILON
     assert after.position - wall == pytest.approx(0.5 * used * (velocity + after.velocity), abs=100 * EPSILON)

@@ -19,7 +19,7 @@ def slack(method, scene, mass, *steps):
     """Round-off of the energy: of its terms, and of the stored energy for positions rounded in their last place."""
     terms = 0.0
     for step in steps:
-        stored = call(contact_energy, method.law(), scene.chain(), 1.0, step.position)
+        stored = call(contact_energy, method.law(), scene.walls(), 1.0, step.position)
         depth = scene.gaps(step.position[:, None]).max()
         # V' = (a + 1) V/g; no gap of the table is steeper than 5.
         force = 5.0 * (method.exponent + 1.0) * stored / depth if depth > 0.0 else 0.0
@@ -55,7 +55,7 @@ def test_a_step_conserves_energy(name, exponent, point, velocity, depth, mass, s
         now = energy_of(method, scene, after.position, after.velocity, mass)
         assert abs(now - first) <= total_slack
         before = after
-    assert before.left == 0.0
+    assert before.remaining == 0.0
 
 
 @pytest.mark.parametrize("pull", [None, (0.0, 0.0, 1.0)], ids=["straight", "falling"])
@@ -107,11 +107,11 @@ def test_a_step_is_the_papers(name, point, velocity, pull):
     normal = np.array(call(numbers.unit_normal, wall))
     start = wall + 2e-3 * normal
     after = one_pass(method, scene, start, velocity, 1.0, mass)
-    assert after.left == 0.0
+    assert after.remaining == 0.0
     assert after.position - start == pytest.approx(0.5 * h * (velocity + after.velocity), abs=256 * EPSILON)
     gravity = np.zeros(3) if pull is None else np.array(scene.gravity)
     q0, q1 = (call(numbers.inner, r) for r in (start, after.position))
-    rise = np.subtract(*(call(contact_energy, method.law(), scene.chain(), 1.0, r) for r in (after.position, start)))
+    rise = np.subtract(*(call(contact_energy, method.law(), scene.walls(), 1.0, r) for r in (after.position, start)))
     discrete = np.array(call(numbers.discrete_gradient, start, after.position))
     force = -rise / (q1 - q0) * discrete
     given_ = mass * (after.velocity - velocity - h * gravity)
@@ -128,7 +128,7 @@ def test_free_steps_are_jumped_over(name, point, velocity, pull):
     wall = wall_point(numbers, point)
     start = wall - 0.05 * np.array(call(numbers.unit_normal, wall))
     after = one_pass(method, scene, start, velocity, 5.0)
-    steps = 5.0 - after.left
+    steps = 5.0 - after.remaining
     assert steps == round(steps) >= 1.0
     if after.impulse[0] == 0.0:
         gravity = np.zeros(3) if scene.gravity is None else np.array(scene.gravity)

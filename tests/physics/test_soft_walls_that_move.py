@@ -278,13 +278,13 @@ def test_free_steps_are_free(name, motion, gravity):
     """What is jumped over is inside at the end of every step."""
     scene, rng = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity), np.random.default_rng(4)
     pull, start, span, some = np.array(gravity or (0.0, 0.0, 0.0)), 0.4, 2.0, 0
-    chain, still = scene.chain(start + span), swarm.Scene(CAVITIES[name](None))
+    walls, still = scene.walls(start + span), swarm.Scene(CAVITIES[name](None))
     for _ in range(40):
         r, v = rng.uniform(-0.5, 0.5, 3), rng.standard_normal(3)
         if not (scene.gaps(r[:, None], start) < 0.0).all():
             continue
         with np.errstate(all="ignore"):
-            free = safe.free_time(chain, scene.pull(), vec(r), vec(v), span)
+            free = safe.free_time(walls, scene.pull(), vec(r), vec(v), span)
         times = np.linspace(0.0, min(free, span), 50)
         poses = [pose(MOTIONS[motion], start + t) for t in times.tolist()]
         places = np.transpose([r + v * t + 0.5 * t * t * pull for t in times])

@@ -149,7 +149,7 @@ def test_the_first_hit_is_found(name, motion, pull):
     made, still = ((CAVITIES | SOLIDS)[name](one) for one in (MOTIONS[motion], None))
     scene, rest = swarm.Scene([made]), swarm.Scene([still])
     rng, found, start, span = np.random.default_rng(5), 0, 0.6, 2.5
-    chain, times = scene.chain(start + span), np.linspace(0.0, span, 500)
+    walls, times = scene.walls(start + span), np.linspace(0.0, span, 500)
     poses = [pose(MOTIONS[motion], start + t) for t in times.tolist()]
     for _ in range(60):
         r, v = rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
@@ -159,7 +159,7 @@ def test_the_first_hit_is_found(name, motion, pull):
             continue
         gravity = swarm.Scene([made], pull).pull()
         with np.errstate(all="ignore"):
-            hit = safe.first_hit(chain, gravity, vec(r), vec(v), span)
+            hit = safe.first_hit(walls, gravity, vec(r), vec(v), span)
         wanted = first_hit_by_scan(scene, rest, r, v, pull, start, times, poses)
         if not hit.time < span:
             # Not within the span, or still under way: never past the hit.
@@ -180,9 +180,9 @@ def test_a_hit_of_a_wall_that_comes_and_goes():
     amplitude, rest = 0.25, Vec(0.0, 0.0, 0.0)
     for gap, hits in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
         floor = swarm.Plane((0, 0, -1), offset=gap * amplitude, motion=swarm.Oscillation((0, 0, amplitude), 1.0))
-        chain = swarm.Scene([floor]).chain(0.6)
+        walls = swarm.Scene([floor]).walls(0.6)
         with np.errstate(all="ignore"):
-            found = safe.first_hit(chain, None, rest, ZERO, 0.6)
+            found = safe.first_hit(walls, None, rest, ZERO, 0.6)
         assert (found.time < 0.6) == hits
         if hits:
             # amplitude sin(2 pi t) = gap amplitude, a little before the top
@@ -420,7 +420,7 @@ def test_threads_and_blocks_change_no_bit(motion):
 
 def test_the_walls_of_a_chain_at_an_instant():
     scene = swarm.Scene([CAVITIES["sphere"](None)])
-    assert scene.chain().at(0.3) == scene.chain()
+    assert scene.walls().at(0.3) == scene.walls()
 
 
 # --- Bad input, and walls that close ---------------------------------------------------------------------
@@ -533,10 +533,10 @@ def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
     """A particle at a wall at rest, and a floor that shakes far below it."""
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.05), 2.0))
     scene = swarm.Scene([swarm.Slab((0.0, 1.0, 0.0), 0.5), floor], DOWN)
-    chain = scene.chain(1.0)
+    walls = scene.walls(1.0)
     gravity = swarm.Scene([floor], DOWN).pull()
     for left in (0.0, 0.5):
         with np.errstate(all="ignore"):
-            hit = safe.first_hit(chain, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left)
+            hit = safe.first_hit(walls, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left)
         assert hit.time == 0.0
         assert scene.owners()[int(hit.wall)] == 0

@@ -61,9 +61,9 @@ def solids_of(field):
 def first_through_cells(scene, gravity, r, v):
     """The first hit as a particle finds it: from cell to cell."""
     pull = np.zeros(3) if gravity is None else np.array(gravity)
-    chain, passed = scene.chain(), 0.0
+    walls, passed = scene.walls(), 0.0
     for _cell in range(10_000):
-        time, wall = flights.first_hit(chain, gravity, vec(r), vec(v))
+        time, wall = flights.first_hit(walls, gravity, vec(r), vec(v))
         if not passed + time < LAST:
             return math.inf, -1
         passed, r, v = passed + time, r + time * (v + 0.5 * time * pull), v + time * pull

@@ -26,17 +26,17 @@ _AFRESH = 32
 
 
 @long_kernel
-def advance_bodies(body, chains, rule, state, ticket, size, halt):
+def advance_bodies(body, walls, rule, state, ticket, size, halt):
     """Advance all bodies that this thread draws: (status, number of the body).
 
-    `chains` are the walls of the scene, and those with the walls of the body's own guides and cavities after them.
+    `walls` are the walls of the scene, and those with the walls of the body's own guides and cavities after them.
     """
     points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
     shapes = shapes_of_lanes(points, rows, rows if rule.loop else 0, count)
     lanes = Lanes(*(scratch(shape, np.float64) for shape in shapes))
     pace = Pace(*(scratch(count, kind) for kind in PACES))
-    held = Held(*(scratch(shape, kind) for shape, kind in arrays_of_held(count, rule.most)))
-    contacts = (HardContacts if rule.walls is None else SoftContacts)(*body, chains[1], rule, lanes, pace, held)
+    active = Held(*(scratch(shape, kind) for shape, kind in arrays_of_held(count, rule.most)))
+    contacts = (HardContacts if rule.walls is None else SoftContacts)(*body, walls[1], rule, lanes, pace, active)
     c = scratch((3, count), np.float64)
     for i in range(count):
         pace.body[i] = -1
@@ -51,11 +51,11 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
             while pace.body[i] < 0 and begin >= 0:
                 if begin == end:
                     begin = next_of(ticket) * size
-                    end = min(begin + size, state.left.size)
+                    end = min(begin + size, state.remaining.size)
                     if begin >= end:
                         begin, end = -1, -1
                         break
-                if state.left[begin] > 0.0:
+                if state.remaining[begin] > 0.0:
                     _load(contacts, state, i, begin)
                 begin += 1
             live += pace.body[i] >= 0
@@ -63,7 +63,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
             return (Status.INTERRUPTED if halted else Status.DONE), 0
         passes += 1
         _try(contacts, state)
-        _look(contacts, chains[0], c)
+        _look(contacts, walls[0], c)
         for i in range(count):
             pace.action[i] = _judge(contacts, i)
             if pace.body[i] >= 0 and (pace.action[i] == impact_time.FAILED or pace.stuck[i] > _STUCK):
@@ -78,7 +78,7 @@ def advance_bodies(body, chains, rule, state, ticket, size, halt):
         for i in range(count):
             if pace.action[i] != impact_time.AGAIN:
                 _finish(contacts, state, i)
-                if pace.left[i] <= 0.0:
+                if pace.remaining[i] <= 0.0:
                     _store(contacts, state, i)
 
 
@@ -92,7 +92,7 @@ def _judge(contacts, i):
     pace.waits[i] = 0
     if pace.loose[i]:
         return impact_time.FAILED if rule.strict else impact_time.COMMIT
-    if pace.held[i] > 0 and pace.solved[i] and not pace.whole[i] and contacts.is_mixed(i):
+    if pace.active[i] > 0 and pace.solved[i] and not pace.whole[i] and contacts.is_mixed(i):
         pace.whole[i] = True
         return impact_time.AGAIN
     if pace.out[i] or pace.wall[i] >= 0 or not pace.solved[i]:
@@ -129,9 +129,9 @@ def _begin_step(pace, i):
 def _load(contacts, state, i, number):
     """Take a body into a lane."""
     lanes, pace = contacts.lanes, contacts.pace
-    pace.body[i], pace.left[i], pace.stuck[i] = number, state.left[number], 0
+    pace.body[i], pace.remaining[i], pace.stuck[i] = number, state.remaining[number], 0
     pace.point[i], pace.waits[i] = -1, 0
-    pace.lasts[i], pace.held[i] = state.lasting[number] == 1, 0
+    pace.lasts[i], pace.active[i] = state.lasting[number] == 1, 0
     _begin_step(pace, i)
     for row in range(lanes.r.shape[0]):
         q, x = row // 3, row % 3
@@ -145,7 +145,7 @@ def _store(contacts, state, i):
     """Give the body of a lane back, as it is at the start of its step: the lane is free."""
     lanes, pace = contacts.lanes, contacts.pace
     number = pace.body[i]
-    state.left[number] = pace.left[i]
+    state.remaining[number] = pace.remaining[i]
     state.lasting[number] = 1 if pace.lasts[i] else 0
     for row in range(lanes.r.shape[0]):
         q, x = row // 3, row % 3
@@ -198,7 +198,7 @@ def _try(contacts, state):
             if not rule.loop or contacts.again() == 0:
                 break
         for i in range(count):
-            if pace.held[i] > 0 and (not pace.whole[i] or ends):
+            if pace.active[i] > 0 and (not pace.whole[i] or ends):
                 contacts.book(i)
         prescribed.book(contacts, ends)
         if not ends:
@@ -212,14 +212,14 @@ def _begin_trial(contacts, state):
     """How long the steps of a trial are, and from where its first stage goes."""
     rule, lanes, pace = contacts.rule, contacts.lanes, contacts.pace
     for i in range(pace.h.size):
-        whole = select(pace.left[i] <= _SAME * rule.dt, pace.left[i], rule.dt)
+        whole = select(pace.remaining[i] <= _SAME * rule.dt, pace.remaining[i], rule.dt)
         step = select(pace.trial[i] > 0.0, pace.trial[i], whole)
         pace.step[i] = select(pace.body[i] >= 0, step, 0.0)
         pace.work[i] = 0.0
     for i in range(pace.h.size):
         if pace.body[i] >= 0 and pace.lasts[i]:
             if (pace.fresh[i] or not pace.solved[i]) and state.steps[pace.body[i]] % _AFRESH == 0:
-                pace.held[i] = 0
+                pace.active[i] = 0
             contacts.begin(i)
             contacts.forget(i)
         pace.solved[i] = True
@@ -253,7 +253,7 @@ def _look(contacts, scene, c):
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):
-            pace.out[i] = pace.out[i] | (contacts.chain.distance(wall, touching.place(r1, k, i)) > 0.0)
+            pace.out[i] = pace.out[i] | (contacts.walls.distance(wall, touching.place(r1, k, i)) > 0.0)
 
 
 def _commit(contacts):
@@ -261,8 +261,8 @@ def _commit(contacts):
     lanes, pace, count = contacts.lanes, contacts.pace, contacts.pace.out.size
     for i in range(count):
         pace.done[i] = (pace.action[i] == impact_time.COMMIT) | (pace.action[i] == impact_time.STRIKE)
-        left = pace.left[i] - pace.step[i]
-        pace.left[i] = select(pace.done[i], select(left > 0.0, left, 0.0), pace.left[i])
+        remaining = pace.remaining[i] - pace.step[i]
+        pace.remaining[i] = select(pace.done[i], select(remaining > 0.0, remaining, 0.0), pace.remaining[i])
     for row in range(lanes.r.shape[0]):
         for i in range(count):
             lanes.r[row, i] = select(pace.done[i], lanes.r1[row, i], lanes.r[row, i])

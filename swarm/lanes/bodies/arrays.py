@@ -97,7 +97,7 @@ class BodyState(NamedTuple):
 
     position: Any  # (3, P, n)
     velocity: Any  # (3, P, n)
-    left: Any  # (n,) of the frame [s]
+    remaining: Any  # (n,) of the frame [s]
     guess: Any  # (3, L + G, n) multipliers of the last three steps, NaN where there is none since the last blow
     path: Any  # (A, 13, n) of led points: start, velocity, cosine, sine, rate
     short: Any  # (n,) short steps between impacts, one after the other
@@ -146,7 +146,7 @@ def shapes_of_lanes(points, rows, offsets, count):
 class Pace(NamedTuple):
     """Numbers of each lane, (B,)."""
 
-    left: Floats  # of the frame [s]
+    remaining: Floats  # of the frame [s]
     step: Floats  # the step that is tried [s]
     h: Floats  # of the stage [s]
     error: Floats
@@ -170,7 +170,7 @@ class Pace(NamedTuple):
     stuck: Counts  # trials since the last step
     action: Counts
     lasts: Flags  # a contact lasts
-    held: Counts  # contacts that do
+    active: Counts  # contacts that do
     fresh: Flags  # the step begins
     whole: Flags  # the step is one stage
     work: Floats  # of led points in the step [J]

@@ -39,11 +39,11 @@ class Constrained(Record):
 
     ties: Ties
     touching: Touching
-    chain: Any
+    walls: Any
     rule: Rule
     lanes: Lanes
     pace: Pace
-    held: Held
+    active: Held
 
     def launch(self):
         """Where the stage would end without ties, p, and D for that."""
@@ -258,7 +258,7 @@ class Constrained(Record):
         for g in range(touching.guides):
             k, row = touching.points + g, self.ties.ends.shape[0] + g
             y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
-            put(self.lanes.d, 3 * row, i, self.chain.step_normal(float(touching.walls + g), y0, y1))
+            put(self.lanes.d, 3 * row, i, self.walls.step_normal(float(touching.walls + g), y0, y1))
 
     @outlined
     def guide(self, i):
@@ -268,9 +268,9 @@ class Constrained(Record):
         for g in range(touching.guides):
             k, row, wall = touching.points + g, ties.ends.shape[0] + g, float(touching.walls + g)
             y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
-            n, d = self.chain.unit_normal(wall, y1), column(lanes.d, 3 * row, i)
+            n, d = self.walls.unit_normal(wall, y1), column(lanes.d, 3 * row, i)
             put(lanes.y1, 3 * row, i, n)
-            lanes.f[row, i] = dot(d, y1 - y0) + self.chain.distance(wall, y0)
+            lanes.f[row, i] = dot(d, y1 - y0) + self.walls.distance(wall, y0)
             for other in range(ties.start[row], row + 1):
                 c = half * ties.couplings[row + touching.points, self.coupling(other)]
                 lanes.a[row, other, i] = c * dot(n, column(lanes.d, 3 * other, i))

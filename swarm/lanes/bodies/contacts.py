@@ -61,26 +61,26 @@ class Contacts(Constrained):
 
     def push(self, i):
         """Add the forces of guides and contacts to the deceleration."""
-        touching, lanes, held = self.touching, self.lanes, self.held
+        touching, lanes, active = self.touching, self.lanes, self.active
         points = lanes.force.shape[0] // 3
         for g in range(touching.guides):
             row = self.ties.ends.shape[0] + g
             for q in range(points):
                 f = lanes.multiplier[row, i] * touching.reach[touching.points + g, q]
                 put(lanes.force, 3 * q, i, column(lanes.force, 3 * q, i) + f * column(lanes.d, 3 * row, i))
-        for a in range(self.pace.held[i]):
-            k = held.name[i, a, 0]
+        for a in range(self.pace.active[i]):
+            k = active.name[i, a, 0]
             for d in range(3):
-                p = held.press[i, 3 * a + d]
+                p = active.press[i, 3 * a + d]
                 if p != 0.0:
                     for q in range(points):
-                        f = p * touching.reach[k, q] * direction(held.frame[i], a, d)
+                        f = p * touching.reach[k, q] * direction(active.frame[i], a, d)
                         put(lanes.force, 3 * q, i, column(lanes.force, 3 * q, i) + f)
 
     def eliminate(self, wide, systems, i):
         """Leave the contacts alone: schur, and gap without what the corrections of ties and guides do to it."""
         along, across, schur, gap = systems
-        ties, lanes, name, frame = self.ties, self.lanes, self.held.name[i], self.held.frame[i]
+        ties, lanes, name, frame = self.ties, self.lanes, self.active.name[i], self.active.frame[i]
         m, rows, count = lanes.f.shape[0], schur.shape[0], ties.ends.shape[0]
         half = 0.5 * self.pace.h[i] * self.pace.h[i]
         for a in range(rows):
@@ -104,42 +104,42 @@ class Contacts(Constrained):
 
     def book(self, i):
         """Book the impulses of the walls, and the work of friction, in the stage."""
-        touching, lanes, held = self.touching, self.lanes, self.held
-        for a in range(self.pace.held[i]):
-            k, press, frame = held.name[i, a, 0], held.press[i, 3 * a], held.frame[i]
-            held.stages[i, a] += 1 if press > 0.0 else 0
-            held.impulse[i, a] += self.pace.h[i] * press * norm(direction(frame, a, 0))
+        touching, lanes, active = self.touching, self.lanes, self.active
+        for a in range(self.pace.active[i]):
+            k, press, frame = active.name[i, a, 0], active.press[i, 3 * a], active.frame[i]
+            active.stages[i, a] += 1 if press > 0.0 else 0
+            active.impulse[i, a] += self.pace.h[i] * press * norm(direction(frame, a, 0))
             away = touching.place(lanes.r1, k, i) - touching.place(lanes.ra, k, i)
             for d in range(1, 3):
-                held.lost[i] += held.press[i, 3 * a + d] * dot(direction(frame, a, d), away)
+                active.lost[i] += active.press[i, 3 * a + d] * dot(direction(frame, a, d), away)
 
     def is_mixed(self, i):
         """Whether a contact pushed in some stages of a composed step only: then energy went with it."""
         mixed = False
-        for a in range(self.pace.held[i]):
-            mixed = mixed or 0 < self.held.stages[i, a] < self.rule.stages.size
+        for a in range(self.pace.active[i]):
+            mixed = mixed or 0 < self.active.stages[i, a] < self.rule.stages.size
         return mixed
 
     def forget(self, i):
         """Forget what was booked in a trial."""
-        held = self.held
-        held.lost[i] = 0.0
-        for a in range(held.name.shape[1]):
-            held.impulse[i, a], held.stages[i, a] = 0.0, 0
+        active = self.active
+        active.lost[i] = 0.0
+        for a in range(active.name.shape[1]):
+            active.impulse[i, a], active.stages[i, a] = 0.0, 0
 
     def near(self, i, name, frame, approaching):
         """Find the contacts at their walls, or those that approach: how many there are.
 
         Their names (point, wall), and a normal and two tangents of each.
         """
-        touching, chain, found = self.touching, self.chain, 0
+        touching, walls, found = self.touching, self.walls, 0
         for k in range(touching.plain.size):
             c, u = touching.place(self.lanes.r, k, i), touching.place(self.lanes.v, k, i)
             met = touching.span(k)
-            for j in range(count_at(chain, met, c)):
-                w = wall_at(chain, met, j, c)
-                if found < MOST_CONTACTS and chain.distance(float(w), c) >= -NEAR * self.rule.room:
-                    n = chain.unit_normal(float(w), c)
+            for j in range(count_at(walls, met, c)):
+                w = wall_at(walls, met, j, c)
+                if found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room:
+                    n = walls.unit_normal(float(w), c)
                     # What is left of an approach by round-off is none.
                     if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
                         name[found, 0], name[found, 1] = k, w
@@ -153,34 +153,34 @@ class Contacts(Constrained):
 # --- Walls that a point may meet -------------------------------------------------------------------------
 
 
-def count_at(chain, span, c):
+def count_at(walls, span, c):
     """How many walls of a span a point may be at: of a field those of its cell."""
     first, last = span
-    fields = chain.fields()
+    fields = walls.fields()
     if len(fields) == 0 or first > 0:
         return last - first
     found = 0
     for _number, field in reversed(fields):
         found = int(field.members.count_in_cell(c)) + found
-    return found + last - int(chain.count_in_fields())
+    return found + last - int(walls.count_in_fields())
 
 
-def wall_at(chain, span, j, c):
+def wall_at(walls, span, j, c):
     """One of these walls."""
-    if len(chain.fields()) == 0 or span[0] > 0:
+    if len(walls.fields()) == 0 or span[0] > 0:
         return span[0] + j
-    return _wall_of_cells(chain, j, c)
+    return _wall_of_cells(walls, j, c)
 
 
 @outlined
-def _wall_of_cells(chain, j, c):
+def _wall_of_cells(walls, j, c):
     """The same of a scene with fields."""
-    for number, field in chain.fields():
+    for number, field in walls.fields():
         here = int(field.members.count_in_cell(c))
         if j < here:
             return int(number) + int(field.members.one_in_cell(j, c))
         j = j - here
-    return int(chain.count_in_fields()) + j
+    return int(walls.count_in_fields()) + j
 
 
 # --- Small arrays of one lane ----------------------------------------------------------------------------

@@ -116,7 +116,7 @@ def _blow(bodies, state, name, frame, found, i):
     for a in range(found):
         w = name[a, 1]
         elastic = elastic and touching.restitution[w] == 1.0 and touching.friction[w] == 0.0
-        state.impulse[bodies.chain.row(float(w)), number] += p[wide * a]
+        state.impulse[bodies.walls.row(float(w)), number] += p[wide * a]
         if p[wide * a] > 0.0:
             state.impacts[number] += 1
     if not elastic:
@@ -168,7 +168,7 @@ class Blow(Record):
         for a in range(system.shape[0]):
             y = self.between(bodies.lanes.r, a, i)
             if a >= ties.links:
-                y = bodies.chain.unit_normal(float(touching.walls + a - ties.links), y)
+                y = bodies.walls.unit_normal(float(touching.walls + a - ties.links), y)
             put(self.across, 0, a, y)
             for b in range(a + 1):
                 s = ties.couplings[self.coupling(a), self.coupling(b)] * dot(y, column(self.across, 0, b))

@@ -30,22 +30,22 @@ def halve(bodies, i):
 @outlined
 def look(bodies, i, larger):
     """Where to cut a step that ends outside; contacts that last may end outside by `larger`."""
-    touching, chain, rule, lanes, pace = bodies.touching, bodies.chain, bodies.rule, bodies.lanes, bodies.pace
+    touching, walls, rule, lanes, pace = bodies.touching, bodies.walls, bodies.rule, bodies.lanes, bodies.pace
     tau = pace.step[i]
     pace.stuck[i] += 1
     if not pace.solved[i]:
         return halve(bodies, i)
     # The forces of contacts that last leave a part of it.
-    room = rule.room if pace.held[i] == 0 else larger
+    room = rule.room if pace.active[i] == 0 else larger
     worst, first, point, wall = -math.inf, tau, -1, -1
     for k in range(touching.plain.size):
         c, met = touching.place(lanes.r1, k, i), touching.span(k)
-        for j in range(count_at(chain, met, c)):
-            w = wall_at(chain, met, j, c)
-            gap = chain.distance(float(w), c)
+        for j in range(count_at(walls, met, c)):
+            w = wall_at(walls, met, j, c)
+            gap = walls.distance(float(w), c)
             worst = max(worst, gap)
             if not gap <= room:
-                rate = dot(chain.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
+                rate = dot(walls.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
                 time = tau - gap / rate if rate > 0.0 else 0.0
                 if wall < 0 or time < first:
                     first, point, wall = time, k, w
@@ -58,7 +58,7 @@ def look(bodies, i, larger):
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
-        start = chain.distance(float(wall), touching.place(lanes.r, point, i))
+        start = walls.distance(float(wall), touching.place(lanes.r, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
     closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]

@@ -28,9 +28,9 @@ def solve(contacts):
     contacts.launch()
     is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
     for i in range(count):
-        brief = is_rigid & (pace.held[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
+        brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
         pace.done[i] = pace.done[i] | brief
-        more += pace.held[i] > 0
+        more += pace.active[i] > 0
         if _is_held(contacts, i):
             _turn(contacts, i, lanes.ra)
     if ties.ends.shape[0] > 1:
@@ -67,7 +67,7 @@ def solve(contacts):
         contacts.correct_ties()
         if alone and turn <= _SOON:
             for i in range(count):
-                late = (turn == _SOON) & (pace.held[i] == 0) & (not pace.done[i])
+                late = (turn == _SOON) & (pace.active[i] == 0) & (not pace.done[i])
                 pace.waits[i] = select(late, pace.waits[i] + 1, select(pace.done[i], 0, pace.waits[i]))
                 pace.done[i] = pace.done[i] | late
         if _all(pace.done):
@@ -84,7 +84,7 @@ def _turn(contacts, i, r1):
 
 def _is_held(contacts, i):
     """Whether more than ties is to be solved in a lane."""
-    return (not contacts.pace.done[i]) and (contacts.touching.guides > 0 or contacts.pace.held[i] > 0)
+    return (not contacts.pace.done[i]) and (contacts.touching.guides > 0 or contacts.pace.active[i] > 0)
 
 
 def _push(contacts, more):
@@ -92,7 +92,7 @@ def _push(contacts, more):
     contacts.accelerate()
     if more > 0:
         for i in range(contacts.pace.h.size):
-            if contacts.touching.guides > 0 or contacts.pace.held[i] > 0:
+            if contacts.touching.guides > 0 or contacts.pace.active[i] > 0:
                 contacts.push(i)
     contacts.move()
 

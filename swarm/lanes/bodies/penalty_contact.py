@@ -39,14 +39,14 @@ def _gap_of(surface, r):
     return surface.gap_of(surface.inner(r))
 
 
-def _normal(chain, wall, r0, r1):
+def _normal(walls, wall, r0, r1):
     """The discrete gradient of the gap of a wall."""
-    return chain.of(wall, ZERO, _normal_of, r0, r1)
+    return walls.of(wall, ZERO, _normal_of, r0, r1)
 
 
-def _gap(chain, wall, r):
+def _gap(walls, wall, r):
     """The gap of a wall."""
-    return chain.of(wall, 0.0, _gap_of, r)
+    return walls.of(wall, 0.0, _gap_of, r)
 
 
 # From this correction on the equations may be worse by the factor, in units of round-off.
@@ -62,17 +62,17 @@ class SoftContacts(Contacts):
 
     def _start(self: Any, wall, y):
         """The gap at the start of a step; in the loop what its tolerance leaves is 0: only State I has a limit."""
-        gap, rule = _gap(self.chain, wall, y), self.rule
+        gap, rule = _gap(self.walls, wall, y), self.rule
         return 0.0 if rule.loop and abs(gap) <= 2.0 * max(rule.walls.deepest, ROOM * rule.room) else gap
 
     def _is_outside(self: Any, r, k, wall, i):
         """Whether a point of a lane is outside a wall."""
-        return _gap(self.chain, float(wall), self.touching.place(r, k, i)) > 0.0
+        return _gap(self.walls, float(wall), self.touching.place(r, k, i)) > 0.0
 
     def _number(self: Any, i, k, wall):
         """The number of a contact of a lane, -1 for none."""
-        index, name = -1, self.held.name[i]
-        for a in range(self.pace.held[i]):
+        index, name = -1, self.active.name[i]
+        for a in range(self.pace.active[i]):
             if name[a, 0] == k and name[a, 1] == wall:
                 index = a
         return index
@@ -80,13 +80,13 @@ class SoftContacts(Contacts):
     @outlined
     def begin(self: Any, i):
         # Those at their walls where steps are cut; else those that are outside, at the start or in the trial before.
-        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
-        name, found, again = held.name[i], 0, not pace.fresh[i]
+        touching, rule, lanes, pace, active = self.touching, self.rule, self.lanes, self.pace, self.active
+        name, found, again = active.name[i], 0, not pace.fresh[i]
         fresh, press = scratch((rule.most, 2), np.int64), scratch(rule.most, np.float64)
         if rule.walls.is_cut:
             if again and pace.solved[i]:
                 return
-            found = self.near(i, fresh, held.frame[i], False)
+            found = self.near(i, fresh, active.frame[i], False)
         else:
             for k in range(touching.plain.size):
                 first, last = touching.span(k)
@@ -99,40 +99,40 @@ class SoftContacts(Contacts):
                         found += 1
         for a in range(found):
             known = self._number(i, fresh[a, 0], fresh[a, 1])
-            press[a] = held.press[i, 3 * known] if known >= 0 and pace.solved[i] else 0.0
-        pace.held[i] = found
+            press[a] = active.press[i, 3 * known] if known >= 0 and pace.solved[i] else 0.0
+        pace.active[i] = found
         for a in range(found):
             name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
-            held.press[i, 3 * a], held.press[i, 3 * a + 1], held.press[i, 3 * a + 2] = press[a], 0.0, 0.0
+            active.press[i, 3 * a], active.press[i, 3 * a + 1], active.press[i, 3 * a + 2] = press[a], 0.0, 0.0
 
     @outlined
     def turn(self: Any, i, r1):
-        touching, pace, held, frame = self.touching, self.pace, self.held, self.held.frame[i]
+        touching, pace, active, frame = self.touching, self.pace, self.active, self.active.frame[i]
         half, ties = 0.5 * pace.h[i] * pace.h[i], self.ties.ends.shape[0]
-        for a in range(pace.held[i]):
-            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
-            n = _normal(self.chain, wall, touching.place(self.lanes.ra, k, i), touching.place(r1, k, i))
+        for a in range(pace.active[i]):
+            k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
+            n = _normal(self.walls, wall, touching.place(self.lanes.ra, k, i), touching.place(r1, k, i))
             # What its force moves the point by, as a change of D turns it.
-            moved = half * self.ties.couplings[ties + k, ties + k] * held.press[i, 3 * a]
+            moved = half * self.ties.couplings[ties + k, ties + k] * active.press[i, 3 * a]
             pace.lag[i] += square(moved * (n - direction(frame, a, 0)))
             put_direction(frame, a, 0, n)
 
     @outlined
     def correct(self: Any, i, number):
-        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
+        touching, rule, lanes, pace, active = self.touching, self.rule, self.lanes, self.pace, self.active
         law = rule.walls.law.stiffened(1.0 / pace.ease[i] if rule.loop else 1.0)
-        found, m = pace.held[i], lanes.f.shape[0]
+        found, m = pace.active[i], lanes.f.shape[0]
         along, across = scratch((found, m), np.float64), scratch((found, m), np.float64)
         system, change = scratch((found, found), np.float64), scratch(found, np.float64)
         self.eliminate(1, (along, across, system, change), i)
         error = pace.residue[i]
         for a in range(found):
-            k, wall, multiplier = held.name[i, a, 0], float(held.name[i, a, 1]), held.multiplier[i, a]
+            k, wall, multiplier = active.name[i, a, 0], float(active.name[i, a, 1]), active.multiplier[i, a]
             g0 = self._start(wall, touching.place(lanes.ra, k, i))
-            g1 = _gap(self.chain, wall, touching.place(lanes.r1, k, i))
+            g1 = _gap(self.walls, wall, touching.place(lanes.r1, k, i))
             # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are
             # not met: then it is what g1 = 0 asks for, as of a rigid wall.
-            force = held.press[i, 3 * a] + g1 / system[a, a]
+            force = active.press[i, 3 * a] + g1 / system[a, a]
             if g0 == 0.0 and 0.0 <= force <= multiplier:
                 error = max(error, abs(g1) / rule.room)
                 change[a] += g1
@@ -141,7 +141,7 @@ class SoftContacts(Contacts):
             if g0 == 0.0 and multiplier > 0.0:
                 end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
             force, stiffness = law.force(multiplier, g0, end)
-            missing = force + stiffness * (g1 - end) - held.press[i, 3 * a]
+            missing = force + stiffness * (g1 - end) - active.press[i, 3 * a]
             # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
             give = system[a, a] / (1.0 + stiffness * system[a, a])
             error = max(error, give * abs(missing) / rule.room)
@@ -151,7 +151,7 @@ class SoftContacts(Contacts):
             system[a, a] += 1.0
         solve_dense(system, change)
         for a in range(found):
-            held.press[i, 3 * a] += change[a]
+            active.press[i, 3 * a] += change[a]
             for row in range(m):
                 lanes.f[row, i] -= across[a, row] * change[a]
         before = pace.unsettled[i] if number > 0 else math.inf
@@ -163,13 +163,13 @@ class SoftContacts(Contacts):
         pace.last[i] = settled or (number >= _PATIENT and error <= _LARGER and error >= 0.5 * before)
 
     def gap_gradient(self: Any, wall, y):
-        return _normal(self.chain, wall, y, y)
+        return _normal(self.walls, wall, y, y)
 
     # --- Uzawa's loop
 
     def begin_loop(self: Any):
         # The multipliers of links are from the steps before, those of walls from 0: above its limit a loop has no step.
-        ties, lanes, pace, held = self.ties, self.lanes, self.pace, self.held
+        ties, lanes, pace, active = self.ties, self.lanes, self.pace, self.active
         for i in range(pace.h.size):
             # A sweep shrinks errors by alpha h^2/m: what the cut of a step leaves would take thousands.
             pace.ease[i] = (pace.h[i] / self.rule.dt) * (pace.h[i] / self.rule.dt)
@@ -178,8 +178,8 @@ class SoftContacts(Contacts):
                 lanes.offset[a, i] = ties.give[a] * pace.ease[i] * lanes.multiplier[a, i]
         for i in range(pace.h.size):
             pace.turns[i], pace.loops[i], pace.loose[i] = 0, not pace.done[i], False
-            for a in range(held.multiplier.shape[1]):
-                held.multiplier[i, a] = 0.0
+            for a in range(active.multiplier.shape[1]):
+                active.multiplier[i, a] = 0.0
 
     def again(self: Any):
         soft, pace = self.rule.walls, self.pace
@@ -211,30 +211,32 @@ class SoftContacts(Contacts):
 
         What is round-off of a length stores nothing.
         """
-        ties, rule, law, held = self.ties, self.rule, self.rule.walls.law, self.held
+        ties, rule, law, active = self.ties, self.rule, self.rule.walls.law, self.active
         stored = 0.0
         for a in range(ties.springs - ties.relaxed, ties.springs):
             _before, after = self._lengths(a, i)
             if abs(after) > _ROUND_OFF * rule.noise * ties.rest[a]:
                 stored += law.alpha * after * after / (8.0 * ties.rest[a])
-        for a in range(self.pace.held[i]):
-            g1 = _gap(self.chain, float(held.name[i, a, 1]), self.touching.place(self.lanes.r1, held.name[i, a, 0], i))
+        for a in range(self.pace.active[i]):
+            g1 = _gap(
+                self.walls, float(active.name[i, a, 1]), self.touching.place(self.lanes.r1, active.name[i, a, 0], i)
+            )
             stored += law.stored_energy(g1) if g1 > NEAR * rule.room else 0.0
         return stored
 
     @outlined
     def _update(self: Any, i):
         """lambda <- lambda + alpha (Phi0 + Phi1)/2 of walls and links"""
-        ties, touching, lanes, law, held = self.ties, self.touching, self.lanes, self.rule.walls.law, self.held
+        ties, touching, lanes, law, active = self.ties, self.touching, self.lanes, self.rule.walls.law, self.active
         for a in range(ties.springs - ties.relaxed, ties.springs):
             before, after = self._lengths(a, i)
             lanes.offset[a, i] += before + after
-        for a in range(self.pace.held[i]):
-            k, wall = held.name[i, a, 0], float(held.name[i, a, 1])
+        for a in range(self.pace.active[i]):
+            k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
             g0 = self._start(wall, touching.place(lanes.ra, k, i))
-            g1 = _gap(self.chain, wall, touching.place(lanes.r1, k, i))
+            g1 = _gap(self.walls, wall, touching.place(lanes.r1, k, i))
             mean = 0.5 * (law.constraint(g0) + law.constraint(g1))
-            held.multiplier[i, a] += law.alpha / self.pace.ease[i] * mean
+            active.multiplier[i, a] += law.alpha / self.pace.ease[i] * mean
 
     # --- After a trial
 
@@ -258,12 +260,12 @@ class SoftContacts(Contacts):
     @outlined
     def end(self: Any, state, i):
         # Where steps are cut a contact lasts as long as it pushes, else as long as its point is outside.
-        lanes, pace, held = self.lanes, self.pace, self.held
+        lanes, pace, active = self.lanes, self.pace, self.active
         number, lasts = pace.body[i], False
-        for a in range(pace.held[i]):
-            k, wall = held.name[i, a, 0], held.name[i, a, 1]
-            pushes = held.press[i, 3 * a] > 0.0
-            state.impulse[wall, number] += held.impulse[i, a]
+        for a in range(pace.active[i]):
+            k, wall = active.name[i, a, 0], active.name[i, a, 1]
+            pushes = active.press[i, 3 * a] > 0.0
+            state.impulse[wall, number] += active.impulse[i, a]
             if self.rule.walls.is_cut:
                 lasts = lasts or pushes
             else:
@@ -271,7 +273,7 @@ class SoftContacts(Contacts):
                 state.impacts[number] += 1 if pushes and not self._is_outside(lanes.ra, k, wall, i) else 0
         pace.lasts[i] = lasts
         if not lasts:
-            pace.held[i] = 0
+            pace.active[i] = 0
 
     @outlined
     def strike(self: Any, state, i):

@@ -33,10 +33,10 @@ class HardContacts(Contacts):
     @outlined
     def begin(self: Any, i):
         # In a step they press as in the step before where they are the same.
-        pace, held = self.pace, self.held
+        pace, active = self.pace, self.active
         if not (pace.fresh[i] or not pace.solved[i]):
             return
-        name, frame, before, found = held.name[i], held.frame[i], pace.held[i], 0
+        name, frame, before, found = active.name[i], active.frame[i], pace.active[i], 0
         fresh = scratch((MOST_CONTACTS, 2), np.int64)
         turned = scratch((MOST_CONTACTS, 3, 3), np.float64)
         if pace.lasts[i]:
@@ -45,26 +45,26 @@ class HardContacts(Contacts):
         same = found == before and pace.solved[i]
         for a in range(found):
             same = same and fresh[a, 0] == name[a, 0] and fresh[a, 1] == name[a, 1]
-        pace.held[i] = found
+        pace.active[i] = found
         for a in range(3 * found):
             # Steadily growing forces are guessed exactly.
-            p, last = held.press[i, a], held.before[i, a]
-            held.press[i, a] = 2.0 * p - last if same and last == last else p
-            held.before[i, a] = p if same else math.nan
+            p, last = active.press[i, a], active.before[i, a]
+            active.press[i, a] = 2.0 * p - last if same and last == last else p
+            active.before[i, a] = p if same else math.nan
         if not same:
             for a in range(found):
                 name[a, 0], name[a, 1] = fresh[a, 0], fresh[a, 1]
                 for d in range(3):
-                    held.press[i, 3 * a + d] = 0.0
+                    active.press[i, 3 * a + d] = 0.0
                     put_direction(frame, a, d, direction(turned, a, d))
 
     @outlined
     def turn(self: Any, i, r1):
-        touching, held, frame = self.touching, self.held, self.held.frame[i]
-        for a in range(self.pace.held[i]):
-            k, wall = held.name[i, a, 0], held.name[i, a, 1]
+        touching, active, frame = self.touching, self.active, self.active.frame[i]
+        for a in range(self.pace.active[i]):
+            k, wall = active.name[i, a, 0], active.name[i, a, 1]
             y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
-            n = self.chain.step_normal(float(wall), y0, y1)
+            n = self.walls.step_normal(float(wall), y0, y1)
             if touching.friction[wall] > 0.0:
                 t = direction(frame, a, 1)
                 t = t - dot(t, n) * n
@@ -74,22 +74,22 @@ class HardContacts(Contacts):
 
     @outlined
     def correct(self: Any, i, number):
-        touching, rule, lanes, pace, held = self.touching, self.rule, self.lanes, self.pace, self.held
-        found, m, wide = pace.held[i], lanes.f.shape[0], touching.width(held.name[i], pace.held[i])
+        touching, rule, lanes, pace, active = self.touching, self.rule, self.lanes, self.pace, self.active
+        found, m, wide = pace.active[i], lanes.f.shape[0], touching.width(active.name[i], pace.active[i])
         rows = wide * found
         along, across = scratch((rows, m), np.float64), scratch((rows, m), np.float64)
         schur = scratch((rows, rows), np.float64)
         gap, change = scratch(rows, np.float64), scratch(rows, np.float64)
         error = pace.residue[i]
         for a in range(found):
-            k, wall = held.name[i, a, 0], held.name[i, a, 1]
+            k, wall = active.name[i, a, 0], active.name[i, a, 1]
             y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
             for d in range(wide):
-                gap[wide * a + d] = dot(direction(held.frame[i], a, d), y1 - y0)
+                gap[wide * a + d] = dot(direction(active.frame[i], a, d), y1 - y0)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
-            away = self.chain.distance(float(wall), y0)
+            away = self.walls.distance(float(wall), y0)
             gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
-            off = abs(gap[wide * a]) if held.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
+            off = abs(gap[wide * a]) if active.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)
         before = pace.unsettled[i] if number > 0 else 1.0
         pace.unsettled[i] = error
@@ -98,14 +98,14 @@ class HardContacts(Contacts):
         # next would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
         last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
         self.eliminate(wide, (along, across, schur, gap), i)
-        creep = _sweep(touching, (held.name[i], held.press[i], found), wide, schur, gap, change)
+        creep = _sweep(touching, (active.name[i], active.press[i], found), wide, schur, gap, change)
         for row in range(m):
             for a in range(rows):
                 lanes.f[row, i] -= across[a, row] * change[a]
         pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
     def gap_gradient(self: Any, wall, y):
-        return self.chain.unit_normal(wall, y)
+        return self.walls.unit_normal(wall, y)
 
     @outlined
     def judge(self: Any, i):
@@ -114,16 +114,16 @@ class HardContacts(Contacts):
     @outlined
     def end(self: Any, state, i):
         # Contacts last as long as one of them pushes.
-        pace, held = self.pace, self.held
+        pace, active = self.pace, self.active
         number, pushes = pace.body[i], False
-        for a in range(pace.held[i]):
-            pushes = pushes or held.press[i, 3 * a] > 0.0
-            state.impulse[self.chain.row(float(held.name[i, a, 1])), number] += held.impulse[i, a]
-        state.dissipated[number] += held.lost[i]
+        for a in range(pace.active[i]):
+            pushes = pushes or active.press[i, 3 * a] > 0.0
+            state.impulse[self.walls.row(float(active.name[i, a, 1])), number] += active.impulse[i, a]
+        state.dissipated[number] += active.lost[i]
         state.sliding[number] += pace.step[i]
         if not pushes:
             pace.lasts[i] = False
-            pace.held[i] = 0
+            pace.active[i] = 0
 
     @outlined
     def strike(self: Any, state, i):

@@ -20,7 +20,7 @@ def lead(bodies, state, elapsed):
                 if pace.body[i] >= 0:
                     n, h = pace.body[i], pace.h[i]
                     part = 1.0 if pace.whole[i] else elapsed
-                    t = bodies.rule.end - (pace.left[i] - part * pace.step[i])
+                    t = bodies.rule.end - (pace.remaining[i] - part * pace.step[i])
                     along, cosines, sines, rate = (
                         column(path, 3, n),
                         column(path, 6, n),
@@ -37,7 +37,7 @@ def lead(bodies, state, elapsed):
 
 def book(bodies, last):
     """Add the work of led points in a stage on ties and contacts: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
-    ties, lanes, pace, held = bodies.ties, bodies.lanes, bodies.pace, bodies.held
+    ties, lanes, pace, active = bodies.ties, bodies.lanes, bodies.pace, bodies.active
     for q in range(ties.led.size):
         if ties.led[q] >= 0:
             for i in range(pace.h.size):
@@ -47,8 +47,8 @@ def book(bodies, last):
                         for a in range(ties.ends.shape[0]):
                             sign = (1.0 if ties.ends[a, 0] == q else 0.0) - (1.0 if ties.ends[a, 1] == q else 0.0)
                             force += sign * lanes.multiplier[a, i] * lanes.d[3 * a + x, i]
-                        for a in range(pace.held[i]):
-                            b = bodies.touching.coefficients[held.name[i, a, 0], q]
+                        for a in range(pace.active[i]):
+                            b = bodies.touching.coefficients[active.name[i, a, 0], q]
                             for d in range(3):
-                                force += b * held.press[i, 3 * a + d] * held.frame[i, a, d, x]
+                                force += b * active.press[i, 3 * a + d] * active.frame[i, a, d, x]
                         pace.work[i] += force * (lanes.r1[3 * q + x, i] - lanes.ra[3 * q + x, i])

@@ -66,8 +66,8 @@ def _of_hdf5(path: Path) -> Floats:
             raise SceneError(f"{path} must hold one dataset with three axes, got {named}")
         (dataset,) = found
         size = _require(path, dataset.shape, dataset.dtype)
-        held = path.stat().st_size * (_DENSEST if dataset.id.get_create_plist().get_nfilters() > 0 else 1)
-        if size > held and not dataset.is_virtual and dataset.external is None:
+        active = path.stat().st_size * (_DENSEST if dataset.id.get_create_plist().get_nfilters() > 0 else 1)
+        if size > active and not dataset.is_virtual and dataset.external is None:
             raise SceneError(
                 f"{path} must hold all samples, got {dataset.name} of shape {dataset.shape}, which takes "
                 f"{checks.in_bytes(size)}, in a file of {checks.in_bytes(path.stat().st_size)}; write all of them"

@@ -94,8 +94,10 @@ class SampledNumbers(CellNumbers):
             before, t = t, t + step
             # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
             # least this.
-            rising, left = half + bent.least * step, (bent.most - bent.least) * step * step
-            arrives = speed * step + 0.5 * g * step * step <= room or left * (speed + g * step) <= 2.0 * room * rising
+            rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
+            arrives = (
+                speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
+            )
             if step < out and arrives and (i > 0 or rising > 0.0 or step == 0.0):
                 return t, True
         return t, False

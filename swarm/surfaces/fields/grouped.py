@@ -18,14 +18,14 @@ _FEW = 6
 
 
 class Order(NamedTuple):
-    """The surfaces of a scene, by their numbers, in the order of its chain: by their kinds, not as they are listed."""
+    """The surfaces of a scene, by their numbers, in the order of its walls: by their kinds, not as they are listed."""
 
     fields: tuple[int, ...]  # each many bodies
     groups: tuple[tuple[int, ...], ...]  # each taken as one field
     others: tuple[int, ...]
 
     def owners(self, surfaces: Sequence[Surface]) -> list[int]:
-        """The surface that each row of the chain belongs to: one for a field, else one for each wall."""
+        """The surface that each row of the scene belongs to: one for a field, else one for each wall."""
         walls = [i for i in self.others for _wall in surfaces[i].walls()]
         return [*self.fields, *(i for group in self.groups for i in group), *walls]
 
@@ -36,7 +36,7 @@ class Order(NamedTuple):
         return [*many, *((group[0], len(group)) for group in self.groups), *walls]
 
     def members(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
-        """The surface that each wall of the chain belongs to, and its number in the field that this is, or -1."""
+        """The surface that each wall of the scene belongs to, and its number in the field that this is, or -1."""
         walls = [(i, -1) for i in self.others for _wall in surfaces[i].walls()]
         many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], Many) for m in field.numbers()]
         return [*many, *((i, -1) for group in self.groups for i in group), *walls]
@@ -47,7 +47,7 @@ class Order(NamedTuple):
 
 
 def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
-    """The order of the chain of a scene; where a surface moves, or not `together`, all are walls of their own."""
+    """The order of the walls of a scene; where a surface moves, or not `together`, all are walls of their own."""
     fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, Many)]
     rest = [i for i in range(len(surfaces)) if i not in fields]
     of_kind: dict[Any, list[int]] = defaultdict(list)
