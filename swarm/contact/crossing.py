@@ -36,7 +36,7 @@ def meets(walls, ends, active, path, near):
     `ends` are the walls at its end, which are others where they move.
     """
     found = False
-    for (number, wall), end in zip(walls.numbered(), ends.walls, strict=True):
+    for (number, wall), end in zip(walls.numbered(), ends.each, strict=True):
         if isinstance(wall, Field):
             here = _meets_one(wall.members, end.members, number, active, path, near)
         else:

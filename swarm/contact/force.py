@@ -46,7 +46,7 @@ def work(moving, walls, now, law, r):
     found = 0.0
     if moving is None:
         return found
-    for over, wall in reversed(tuple(zip(walls.each, now.walls, strict=True))):
+    for over, wall in reversed(tuple(zip(walls.each, now.each, strict=True))):
         found = dot(_added(ZERO, wall, law, r), over.displacement()) + found
     return found
 
@@ -58,7 +58,7 @@ def add_works(moving, walls, now, law, factor, r, impulse, lane):
     if moving is None:
         return found
     count = walls.length()
-    for k, (over, wall) in reversed(tuple(enumerate(zip(walls.each, now.walls, strict=True)))):
+    for k, (over, wall) in reversed(tuple(enumerate(zip(walls.each, now.each, strict=True)))):
         here = factor * dot(_added(ZERO, wall, law, r), over.displacement())
         impulse[count + k, lane] += here
         found = here + found

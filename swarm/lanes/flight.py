@@ -39,13 +39,13 @@ def _search(met, walls, gravity, lanes, live):
         seek(walls, gravity, lanes, live)
     elif isinstance(met, Strided):
         _stride(walls, gravity, lanes, live)
-    elif met.walls and not isinstance(met, Marched) and not _is_closed(gravity, walls):
+    elif met.each and not isinstance(met, Marched) and not _is_closed(gravity, walls):
         _go_by_steps(walls, gravity, lanes, live)
 
 
 def _first_hit(met, walls, gravity, lane, lanes, i):
     """The first hit of a lane with the walls that the method lands on."""
-    if met is None or not met.walls:
+    if met is None or not met.each:
         return flights.NEVER
     if _has_fields(met):
         return hit_of_lane(lanes, i)

@@ -151,6 +151,6 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
 
 def walls_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
-    given = iter(scenery.given.at(0.0).walls)
+    given = iter(scenery.given.at(0.0).each)
     reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
     return Walls(tuple(next(reacting if scene.surfaces[i].reacts() else given) for i in scene.owners()))

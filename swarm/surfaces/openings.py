@@ -165,7 +165,7 @@ def outside(volume, r):
     if not isinstance(volume, Walls):
         return -volume.distance(r)
     farthest = -math.inf
-    for wall in reversed(volume.walls):
+    for wall in reversed(volume.each):
         here = wall.distance(r)
         farthest = select(here <= farthest, farthest, here)
     return farthest

@@ -171,7 +171,7 @@ def free_time(walls, gravity, r, v, remaining):
     now, time = walls.at(remaining), math.inf
     if not isinstance(walls, Marched):
         return flights.free_time(gravity, now, r, v)
-    for wall in reversed(now.walls):
+    for wall in reversed(now.each):
         here = _free_of(wall, gravity, r, v)
         time = select(time < here, time, here)
     return time

@@ -88,7 +88,7 @@ def walls_in(
     fields = (Field(taken(surfaces[i].walls()[0])) for i in order.fields)
     listed = (Listed(taken(group)) for group in groups)
     others = all_walls([*(surfaces[i] for i in order.others), *own])
-    return Walls((*fields, *listed, *others.walls))
+    return Walls((*fields, *listed, *others.each))
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:
