@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, reject, settings
 from hypothesis import strategies as st
+from hypothesis.internal.conjecture import providers
 
 import swarm
 from swarm.contact import reflection
@@ -27,6 +28,10 @@ from swarm.surfaces.walls import Walls
 # Tests start Python a hundred times. Each start reads the bytecode that an earlier one kept, which saves 0.2 s of it.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# Hypothesis draws numbers that stand in the source of whatever modules are loaded: what a test draws would depend on
+# the tests before it in its process, and on every other change of the package.
+providers._get_local_constants = providers.Constants
 
 settings.register_profile(
     "swarm",
