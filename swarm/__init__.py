@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         Torus,
     )  # fmt: skip
     from .surfaces.data.mesh import from_mesh
+    from .surfaces.wall_law import WallLaw
 
 __version__ = VERSION
 
@@ -79,6 +80,7 @@ _HOMES = {
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
         "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
     ),
+    "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -87,7 +89,7 @@ __all__ = [
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
     "Impact", "ImpactLog", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty",
     "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres",
-    "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallTimeError",
+    "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallLaw", "WallTimeError",
     "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts",
     "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks, notebook
 from . import motion as motions
-from .contact.laws import Laws, Moves, Span, Thermal
+from .contact.laws import NONE, Laws, Moves, Owned, Span, Thermal
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
@@ -201,8 +201,27 @@ class Scene(Volume):
             self._of_walls([surface.friction for surface in self.surfaces], 0.0),
             self._of_walls([_thermal(surface) for surface in self.surfaces], _NO_HEAT),
             Moves(0.0) if self.moves() else None,
+            self._own_laws(),
         )
-        return None if laws == (None, None, None, None) else laws
+        return None if laws == NONE else laws
+
+    def _own_laws(self) -> tuple[Owned, ...] | None:
+        """`Owned` of every surface that has laws of one's own, None where there is none."""
+        owned: list[Owned] = []
+        first = 0
+        for i, walls in self.order.spans(self._pieces):
+            laws = self.surfaces[self.owners_of_pieces[i]].laws
+            if any(isinstance(law, str) for law in laws):
+                raise SceneError(
+                    f"surfaces[{self.owners_of_pieces[i]}].laws: {laws[0]!r} is Python, of which a file holds the "
+                    "name; build the scene in Python, as the run's script does"
+                )
+            if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
+                owned[-1] = owned[-1]._replace(after=float(first + walls))
+            elif laws:
+                owned.append(Owned(laws, float(first), float(first + walls)))
+            first += walls
+        return tuple(owned) or None
 
     def openings(self) -> tuple[Opening, ...] | None:
         """The openings of every wall of the scene as kernels take them, None where there are none."""

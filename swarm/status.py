@@ -17,6 +17,7 @@ class Status(IntEnum):
     LEASE_ENDED = 8
     LOG_FULL = 9
     TIMELESS = 10
+    SENT_WRONG = 11
 
     @property
     def sentence(self) -> str:
@@ -36,6 +37,8 @@ _SENTENCES = {
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
+    Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall; leave must return "
+    "one with n.(v - u) > 0",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
     "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
 }

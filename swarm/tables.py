@@ -66,9 +66,11 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
 
 
 def _with_openings(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
-    """The table of a surface, with those of its openings if it has any."""
+    """The table of a surface, with those of its openings if it has any, and the names of laws of one's own."""
     if isinstance(described, Surface):
-        del table["openings"]
+        del table["openings"], table["laws"]
+        if described.laws:
+            table["laws"] = [law if isinstance(law, str) else repr(law) for law in described.laws]
         if described.openings:
             table["openings"] = [table_of(opening, arrays) for opening in described.openings]
     return table

@@ -106,6 +106,8 @@ def _smooth(name: str, surface: Any) -> Surface:
         )
     if surface.temperature is not None:
         raise SceneError(f"{name}.temperature must be None with bodies, got {surface.temperature:g}")
+    if surface.laws:
+        raise SceneError(f"{name}.laws must be left out with bodies, got {surface.laws}")
     if surface.motion is not None or surface.reacts() or surface.openings:
         raise SceneError(
             f"{name} must have no motion, mass, inertia or openings, got {surface!r}; a cavity moves with its carrier, "

@@ -1,9 +1,10 @@
-"""The laws of walls: restitution, Coulomb's friction, thermal walls. What no wall of a scene has is None."""
+"""The laws of walls: restitution, Coulomb's friction, thermal walls, one's own. What no wall has is None."""
 
 from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
+from ..kernel.vector import dot
 
 
 class Laws(Record):
@@ -13,6 +14,7 @@ class Laws(Record):
     friction: Any  # None, or mu of each wall
     thermal: Any  # None, or `Thermal` of each wall
     moving: Any  # None, or `Moves` where a wall moves
+    own: Any = None  # None, or `Owned` of each surface that has laws of one's own
 
     @property
     def loses(self):
@@ -22,7 +24,12 @@ class Laws(Record):
     @property
     def change_energy(self):
         """Whether an impact may change the energy of a particle: a constant for the compiler."""
-        return self.loses or self.thermal is not None or self.moving is not None
+        return self.loses or self.give_heat or self.moving is not None
+
+    @property
+    def give_heat(self):
+        """Whether a wall may send a particle off by a law that gives or takes heat: a constant for the compiler."""
+        return self.thermal is not None or self.own is not None
 
     def restitution_of(self, wall):
         """e of a wall."""
@@ -46,6 +53,25 @@ class Span(Record):
 
     value: Any
     walls: float
+
+
+class Owned(Record):
+    """The laws of the walls from number `first` on, before number `after`."""
+
+    laws: Any
+    first: float
+    after: float
+
+    def has(self, wall):
+        """Whether a wall is one of these."""
+        return (wall >= self.first) & (wall < self.after)
+
+    def leave(self, v, n, u, random, mass):
+        """The velocity after all laws: each takes what a mirror would turn into what the one before sends."""
+        for k, law in enumerate(self.laws):
+            v = v if k == 0 else v - 2.0 * dot(v - u, n) * n
+            v = law.leave(v, n, u, random, mass)
+        return v
 
 
 class Moves(Record):

@@ -8,6 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from .jit import select
+from .record import Record
 from .vector import Vec
 
 # Philox4x32-10 of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
@@ -15,6 +16,9 @@ _ROUNDS = 10
 _MULTIPLIERS = 0xD2511F53, 0xCD9E8D57
 _WEYL = 0x9E3779B9, 0xBB67AE85  # what is added to the key from round to round
 _WORD = 0xFFFFFFFF
+
+# The blocks of an event's counter that `uniforms` takes.
+_BLOCKS = 2
 
 _HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
 # ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
@@ -71,6 +75,33 @@ def uniforms(seed, particle, number):
     a, b, c, d = philox((low, high, who, 0), key)
     e, f, g, h = philox((low, high, who, 1), key)
     return Uniforms(_fraction(a, b), _fraction(c, d), _fraction(e, f), _fraction(g, h))
+
+
+class Stream(Record):
+    """The random numbers of one event of a particle: of a seed, the particle, and the number of the event.
+
+    They have numbers of their own, so that a branch that needs none changes no others.
+    """
+
+    seed: Any
+    particle: Any
+    number: Any
+
+    def uniform(self, k):
+        """The k-th uniform number in (0, 1); k from 0 on."""
+        seed, particle, number = int(self.seed), int(self.particle), int(self.number)
+        counter = number & _WORD, (number >> 32) & _WORD, particle & _WORD, k + _BLOCKS
+        a, b, _c, _d = philox(counter, (seed & _WORD, (seed >> 32) & _WORD))
+        return _fraction(a, b)
+
+    def exponential(self, k):
+        """-ln of the k-th uniform number: of mean 1."""
+        return -logarithm(self.uniform(k))
+
+    def normal(self, k):
+        """A normal number of variance 1 (Box and Muller), of the uniform numbers k and k + 1."""
+        cosine, _sine = circle(self.uniform(k + 1))
+        return math.sqrt(-2.0 * logarithm(self.uniform(k))) * cosine
 
 
 def logarithm(u):

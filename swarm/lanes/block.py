@@ -5,13 +5,16 @@ that reached the frame time retire, and the next particle, or the last live lane
 depend on which lane or block a particle is in.
 """
 
+import math
+
 import numpy as np
 
 from ..contact.events import FLYING
-from ..contact.heat import Draw, exchange
+from ..contact.heat import exchange
 from ..kernel.arrays import index
 from ..kernel.gravity import potential
 from ..kernel.jit import kernel, outlined, select
+from ..kernel.random import Stream
 from ..kernel.record import Record
 from ..kernel.vector import put, square
 from ..methods import contract as methods
@@ -117,7 +120,9 @@ def _look(method, walls, state, lanes, live):
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
-        if method.holds and lane.hits > most_hits:
+        if method.laws.own is not None and math.isnan(lane.v.x):
+            status = Status.SENT_WRONG.value
+        elif method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
         elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
@@ -159,7 +164,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
         solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if method.laws.thermal is not None:
+    if method.laws.give_heat:
         _exchange_heat(method, walls, gravity, share, lanes, live)
     pick(walls, lanes, picked, live)
     some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
@@ -186,26 +191,26 @@ def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
 
 
 def _exchange_heat(method, walls, gravity, share, lanes, live):
-    """The impacts on thermal walls that accommodate their particles."""
+    """The impacts on walls that send particles off by a law of their own: a temperature's, or the user's."""
     state = share.state
     for i in range(index(live)):
         lane, wall, p = lanes.lane(i), lanes.wall[i], index(lanes.particle[i])
         if wall >= 0.0:
             r, v = lane.r, lane.v
-            draw = Draw(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
+            random = Stream(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
             now, laws = walls.at(lane.remaining), method.laws
-            remaining = exchange(laws, now, wall, (r, v), state.mass[p], draw)
-            if remaining.happens:
-                before, after = lane.twice, square(remaining.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, walls.row(wall), before, after - remaining.work)
-                _add_work(walls, lanes.impulse, i, wall, 0.5 * remaining.work)
-                lane.v, lane.twice = remaining.v, after
+            sent = exchange(laws, now, wall, (r, v, method.least_speed(v)), state.mass[p], random)
+            if sent.happens:
+                before, after = lane.twice, square(sent.v) + 2.0 * potential(gravity, r)
+                book_heat(state, p, walls.row(wall), before, after - sent.work)
+                _add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
+                lane.v, lane.twice = sent.v, after
                 lane.hits += 1.0
-                lanes.impulse[walls.row(wall), i] += remaining.impulse
+                lanes.impulse[walls.row(wall), i] += sent.impulse
                 for watch in share.watches():
-                    watch.note(lanes, i, remaining.impulse)
+                    watch.note(lanes, i, sent.impulse)
                 # The contact is done, unless a wall at 0 K holds the particle.
-                lanes.wall[i] = select(square(remaining.v) > 0.0, -1.0, wall)
+                lanes.wall[i] = select(square(sent.v) > 0.0, -1.0, wall)
 
 
 def _put_contact(method, lanes, i, contact):

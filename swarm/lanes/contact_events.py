@@ -4,13 +4,14 @@ import numpy as np
 
 from ..contact import crossing, events, touching
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
-from ..contact.heat import Draw, exchange
+from ..contact.heat import exchange
 from ..contact.hold import One, Two, drift
 from ..contact.passing import hit_wall, open_wall_at
 from ..contact.reflection import given, wall_velocity
 from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
+from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
@@ -74,7 +75,7 @@ def _decide(method, walls, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = remaining, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    if method.laws.thermal is not None and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
+    if method.laws.give_heat and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
     moving, settles = method.laws.moving, _settles(method, carried, gravity, p)
     if again > _OFTEN or settles:
@@ -142,24 +143,23 @@ def _leave(share, i, wall, r, v, remaining):
 
 @outlined
 def _exchange_heat(method, walls, gravity, share, i):
-    """Whether a thermal wall accommodates a sliding particle: then it flies."""
+    """Whether a law of the wall that a sliding particle meets sends it off: then it flies."""
     state, contacts = share.state, share.state.contacts
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     now = walls.at(contacts.remaining[i])
-    remaining = exchange(
-        method.laws, now, wall, (r, v), state.mass[i], Draw(share.seed, share.first + i, state.impacts[i])
-    )
-    if not remaining.happens:
+    random = Stream(share.seed, share.first + i, state.impacts[i])
+    sent = exchange(method.laws, now, wall, (r, v, method.least_speed(v)), state.mass[i], random)
+    if not sent.happens:
         return False
-    before, after = 2.0 * state.energy[i], square(remaining.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, walls.row(wall), before, after - remaining.work)
-    book_work(walls, state, i, wall, remaining.work)
+    before, after = 2.0 * state.energy[i], square(sent.v) + 2.0 * potential(gravity, r)
+    book_heat(state, i, walls.row(wall), before, after - sent.work)
+    book_work(walls, state, i, wall, sent.work)
     state.energy[i] = 0.5 * after
-    put(state.velocity, 0, i, remaining.v)
+    put(state.velocity, 0, i, sent.v)
     state.impacts[i] += 1
-    struck = impact_log.Struck(r, v, remaining.v, wall, contacts.remaining[i], remaining.impulse)
+    struck = impact_log.Struck(r, v, sent.v, wall, contacts.remaining[i], sent.impulse)
     share.note_impact(method, walls, i, struck)
-    state.impulse[walls.row(wall), i] += remaining.impulse * state.mass[i]
+    state.impulse[walls.row(wall), i] += sent.impulse * state.mass[i]
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True

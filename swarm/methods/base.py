@@ -13,7 +13,15 @@ from ..surfaces.drive import drive_of
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 # The laws of a surface, and their values where there is none.
-_WITHOUT_LAWS = {"restitution": 1, "friction": 0, "temperature": None, "mass": None, "inertia": None, "openings": ()}
+_WITHOUT_LAWS = {
+    "restitution": 1,
+    "friction": 0,
+    "temperature": None,
+    "laws": (),
+    "mass": None,
+    "inertia": None,
+    "openings": (),
+}
 
 
 @dataclass(frozen=True)

@@ -144,6 +144,11 @@ def _require_reacting(scene: Scene) -> None:
                 f"surfaces[{i}].temperature must be None where a wall has a mass, got {surface.temperature:g}; heat "
                 "the particles at the start, or give the wall a motion instead of a mass"
             )
+        if surface.laws:
+            raise SceneError(
+                f"surfaces[{i}].laws must be left out where a wall has a mass, got {surface.laws}; give that wall a "
+                "motion instead of a mass"
+            )
         if surface.openings:
             raise SceneError(
                 f"surfaces[{i}].openings must be left out where a wall has a mass, got {len(surface.openings)}; give "
@@ -244,10 +249,18 @@ class Reflection(contract.MethodNumbers):
         """
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow
-        # By the velocity with which it comes: such walls change that. One of both is 0.
-        speed2 = (square(lane.v) + self.fall2) / (self.size * self.size)
+        # By the velocity with which it comes: such walls change that.
+        return speed * speed <= (part * part) * self._slow2(lane.v)
+
+    def _slow2(self, v):
+        # One of both is 0.
+        speed2 = (square(v) + self.fall2) / (self.size * self.size)
         by_time, by_length = self.shortest_flight * self.size * speed2, self.shortest_length
-        return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
+        return by_time * by_time + by_length * by_length * speed2
+
+    def least_speed(self, v):
+        """Speed [m/s] towards a wall below which a particle that comes with v may not leave it: contact may last."""
+        return 0.5 * math.sqrt(self._slow2(v))
 
 
 class Chord(Reflection):

@@ -97,7 +97,7 @@ def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
     lines = []
     for i, shape in enumerate(shapes):
         surface, name = scene.surfaces[i], shape.name
-        if surface.temperature is not None:
+        if surface.temperature is not None or surface.laws:
             lines.append(Line(f"/heat/{name}", name, "wall_heat", i, per=1.0))
         if surface.reacts():
             lines.append(Line(f"/energy/{name}", f"energy of {name}", "wall_energy", i))

@@ -109,6 +109,8 @@ def _require_walls_of_bodies(scene: Scene) -> None:
     for i, surface in enumerate(scene.surfaces):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
+        if surface.laws:
+            raise SceneError(f"surfaces[{i}].laws must be left out with bodies, got {surface.laws}")
         if surface.motion is not None:
             raise SceneError(
                 f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "

@@ -37,7 +37,7 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         np.zeros(0 if laws is None else n),
         _no_sweeps(n) if method.has_multipliers() else None,
         _no_contacts(surfaces, n) if method.may_slide() else None,
-        None if laws is None or laws.thermal is None else np.zeros((surfaces, n)),
+        None if laws is None or not laws.give_heat else np.zeros((surfaces, n)),
         particles.image,
         None if period is None or period.fall is None else np.zeros(n),
         period,

@@ -13,6 +13,7 @@ from ..checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import rotation as rotations
+from .wall_law import checked_laws
 
 # A tilt of an axis this small is the round-off of a rotation.
 TILT = 1e-15
@@ -35,6 +36,7 @@ class Surface:
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
         accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
             temperature (diffusely), instead of specularly.
+        laws: `WallLaw`s of one's own, which say with which velocity a particle leaves, in their order.
         motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
             the wall is before it moves. Its laws act on the velocity relative to the wall.
         mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
@@ -51,6 +53,7 @@ class Surface:
     friction: float = field(default=0.0, kw_only=True)
     temperature: float | None = field(default=None, kw_only=True)
     accommodation: float = field(default=1.0, kw_only=True)
+    laws: Any = field(default=(), kw_only=True)
     motion: Any = field(default=None, kw_only=True)
     mass: float | None = field(default=None, kw_only=True)
     inertia: float | None = field(default=None, kw_only=True)
@@ -68,6 +71,7 @@ class Surface:
                 f"accommodation must go with a temperature, got {self.accommodation:g} and none; give temperature= "
                 "(k_B T in joule), or leave accommodation out"
             )
+        object.__setattr__(self, "laws", checked_laws(self.laws))
         if hasattr(self, "center"):
             object.__setattr__(self, "center", vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))

@@ -52,7 +52,7 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.scene.owners()
     if task.bodies is None:
         laws = task.scene.laws()
-        has_heat = laws is not None and laws.thermal is not None
+        has_heat = laws is not None and laws.give_heat
         added = observables.summed(sums, owners, booked(task.scene.walls()), has_heat)
     else:
         added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))

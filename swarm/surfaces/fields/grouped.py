@@ -92,4 +92,11 @@ def walls_in(
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:
-    return surface.restitution, surface.friction, surface.temperature, surface.accommodation, surface.openings
+    return (
+        surface.restitution,
+        surface.friction,
+        surface.temperature,
+        surface.accommodation,
+        surface.laws,
+        surface.openings,
+    )

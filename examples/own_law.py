@@ -1,0 +1,27 @@
+"""A wall law of your own: balls of a viscoelastic material rebound the less the faster they hit.
+
+A record derived from `WallLaw` is what kernels take: numbers, and `leave`, the velocity after an impact. The same
+method runs in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays.
+"""
+
+import swarm
+from swarm.kernel.vector import dot
+
+
+class Viscoelastic(swarm.WallLaw):
+    """e = 1/(1 + (b/slow)^(1/5)) for the normal speed b: Brilliantov and Poschel (2004), to first order."""
+
+    slow: float  # the normal speed [m/s] at which e is 1/2
+
+    def leave(self, v, n, u, random, mass):
+        """v1 = v0 + (1 + e) b n, b = -n.(v0 - u)."""
+        b = -dot(v - u, n)
+        return v + (1.0 + 1.0 / (1.0 + (b / self.slow) ** 0.2)) * b * n
+
+
+if __name__ == "__main__":
+    # `restitution` and `friction` are of the last, smallest hops, after which a ball does not leave the floor.
+    floor = swarm.Cylinder(0.2, (0, 0, 1), 0.4, laws=[Viscoelastic(2.0)], restitution=0.8, friction=0.3)
+    scene = swarm.Scene([floor], gravity=(0, 0, -9.81))
+    result = swarm.simulate(scene, swarm.fill(scene, 1000, speed=1.0, mass=1e-3, seed=1), swarm.Impact(), until=5.0)
+    print(result)

@@ -1,0 +1,93 @@
+"""The law of a wall as users write it."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..checks import shown
+from ..errors import SceneError
+from ..kernel.random import Stream
+from ..kernel.record import Record
+from ..kernel.vector import Vec, dot
+
+# Impacts with which a law is tried before a run.
+_TRIED = 64
+
+
+class WallLaw(Record):
+    """A law of a wall: the velocity with which a particle leaves it.
+
+    Derive a record from it, whose fields are numbers, and give it as `laws=[...]` of a surface. Kernels call `leave`:
+    numbers in, numbers out, no lists and no arrays. It takes the place of the elastic reflection at every impact but
+    those after which a particle would not leave the wall (`shortest_flight` of `Impact`): these are rigid, with the
+    restitution and the friction of the surface, so that particles come to rest, and slide. A thermal wall asks it of
+    the particles that it does not accommodate. What it changes of the energy is heat that the wall gives.
+
+    Example:
+        >>> import swarm
+        >>> from swarm.kernel.vector import dot
+        >>> class Damped(swarm.WallLaw):
+        ...     e: float
+        ...     def leave(self, v, n, u, random, mass):
+        ...         return v - (1.0 + self.e) * dot(v - u, n) * n
+        >>> swarm.Sphere(1.0, laws=[Damped(0.9)])
+        Sphere(radius=1.0, laws=(Damped(e=0.9),))
+    """
+
+    def leave(self, v, n, u, random, mass):
+        """The velocity after an impact [m/s], away from the wall.
+
+        Args:
+            v: the velocity before it [m/s].
+            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) > 0.
+            u: the velocity of the wall [m/s].
+            random: random numbers of this impact: `random.uniform(k)` in (0, 1), `random.normal(k)`, which takes k and
+                k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any resume.
+            mass: of the particle [kg].
+        """
+        raise NotImplementedError
+
+
+def checked_laws(given: Any) -> tuple[Any, ...]:
+    """Laws as kernels take them, their fields as floats; a str is the name that a file has of a law."""
+    if isinstance(given, (WallLaw, str)) or not isinstance(given, (tuple, list)):
+        raise SceneError(f"laws must be a list of WallLaw, got {shown(given)}")
+    return tuple(law if isinstance(law, str) else _checked(f"laws[{k}]", law) for k, law in enumerate(given))
+
+
+def _checked(name: str, law: Any) -> Any:
+    if not isinstance(law, WallLaw):
+        raise SceneError(f"{name} must be a WallLaw, a record derived from swarm.WallLaw, got {shown(law)}")
+    if type(law).leave is WallLaw.leave:
+        raise SceneError(f"{name} must have a method leave(self, v, n, u, random, mass), {type(law).__name__} has none")
+    numbers = []
+    for field, value in zip(law._fields, law, strict=True):
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
+            raise SceneError(f"{name}.{field} must be a finite number, got {shown(value)}")
+        numbers.append(float(value))
+    law = type(law)(*numbers)
+    _try(name, law)
+    return law
+
+
+def _try(name: str, law: Any) -> None:
+    """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
+    rng = np.random.default_rng(0)
+    for k in range(_TRIED):
+        n, v = (Vec(*map(np.float64, row)) for row in rng.normal(size=(2, 3)))
+        n = n / math.sqrt(dot(n, n))
+        v = v - (dot(v, n) + abs(dot(v, n))) * n
+        with np.errstate(all="ignore"):
+            after = law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), Stream(0, 0, k), np.float64(1.0))
+        if not (
+            isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after)) and dot(after, n) > 0.0
+        ):
+            raise SceneError(
+                f"{name} must send particles away from the wall: n.v > 0 of the velocity that leave returns; "
+                f"{law} returned {shown(after)} for v = {_said(v)}, n = {_said(n)} and u = 0"
+            )
+
+
+def _said(vector: Vec) -> str:
+    return f"({', '.join(f'{part:.3g}' for part in vector)})"

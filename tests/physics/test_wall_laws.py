@@ -1,0 +1,266 @@
+"""Laws of walls of one's own, against the laws that swarm has, closed forms and distributions."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import rarely
+from test_examples import lines_of
+from test_sessions import require_resumed_is_whole
+
+import swarm
+from examples import own_law
+from examples.own_law import Viscoelastic
+from swarm.kernel.jit import select
+from swarm.kernel.random import Stream
+from swarm.kernel.vector import dot, norm, vec
+
+pytestmark = pytest.mark.physics
+G = (0.0, 0.0, -9.81)
+# Kolmogorov's limit: sqrt(n) D is below it with the probability of three standard errors.
+KOLMOGOROV = 1.82
+
+
+class Restitution(swarm.WallLaw):
+    e: float
+
+    def leave(self, v, n, u, random, mass):
+        return v - (1.0 + self.e) * dot(v - u, n) * n
+
+
+class Lambert(swarm.WallLaw):
+    """With a probability diffuse, |v| kept: the direction of n + a point of the unit sphere."""
+
+    probability: float
+
+    def leave(self, v, n, u, random, mass):
+        w = v - u
+        along = vec((random.normal(0), random.normal(2), random.normal(4)))
+        way = n + along * (1.0 / norm(along))
+        diffuse = way * (norm(w) / norm(way))
+        return u + select(random.uniform(6) < self.probability, diffuse, w - 2.0 * dot(w, n) * n)
+
+
+class Rough(swarm.WallLaw):
+    """It branches, and draws in one branch alone."""
+
+    share: float
+
+    def leave(self, v, n, u, random, mass):
+        b = dot(v - u, n)
+        if random.uniform(0) < self.share:
+            return v - (1.0 + 0.5 * random.uniform(1)) * b * n
+        if mass > 1.0:
+            return v - 1.5 * b * n
+        return v - 2.0 * b * n
+
+
+def run(walls, gravity=None, until=3.0, n=40, **options):
+    scene = swarm.Scene(walls, gravity)
+    start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=2)
+    return swarm.simulate(scene, start, swarm.Impact(), until=until, **options)
+
+
+def same_bits(one, other):
+    pairs = [(one.observables[name], other.observables[name]) for name in one.observables]
+    pairs += [(getattr(one.particles, name), getattr(other.particles, name)) for name in ("position", "velocity")]
+    return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+
+def balance(result):
+    """The energy of all particles, with what walls took."""
+    seen = result.observables
+    return seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum(axis=1)
+
+
+WALLS = {
+    "sphere": lambda **law: [swarm.Sphere(0.5, **law)],
+    "box": lambda **law: [swarm.Box((0.5, 0.4, 0.6), rotation=(1, 2, 3, 4), **law)],
+    "capped cylinder": lambda **law: [swarm.Cylinder(0.4, (0, 1, 1), 1.0, **law)],
+    "torus": lambda **law: [swarm.Torus(0.6, 0.3, **law)],
+    "balls": lambda **law: [
+        swarm.Sphere(1.0, **law),
+        swarm.Spheres([(x, y, 0.0) for x in (-0.4, 0.0, 0.4) for y in (-0.4, 0.0, 0.4)], 0.1, **law),
+    ],
+    "floor that moves": lambda **law: [
+        swarm.Box((0.5, 0.4, 0.6), **law),
+        swarm.Plane((0, 0, -1), 0.2, motion=swarm.Oscillation((0, 0, 0.05), 2.0), **law),
+    ],
+}
+
+
+@pytest.mark.parametrize("gravity", [None, G], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", WALLS)
+def test_a_restitution_of_ones_own_is_that_of_the_package(name, gravity):
+    """Impact for impact, as long as round-off is not multiplied; what one calls heat the other calls dissipated."""
+    until = 0.5 if gravity else 1.2
+    own = run(WALLS[name](laws=[Restitution(0.9)]), gravity, until, compile="never")
+    known = run(WALLS[name](restitution=0.9), gravity, until, compile="never")
+    assert own.observables["impacts"][-1] == known.observables["impacts"][-1] > 20
+    assert own.particles.position == pytest.approx(known.particles.position, abs=1e-10)
+    lost = known.observables["dissipated_energy"][-1]
+    assert -own.observables["wall_heat"][-1].sum() == pytest.approx(lost, rel=1e-9)
+    assert own.observables["impulse"][-1] == pytest.approx(known.observables["impulse"][-1], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "laws", "gravity"),
+    [
+        ("sphere", [Rough(0.3)], None), ("capped cylinder", [Viscoelastic(0.1)], G),
+        rarely("balls", [Lambert(0.5), Restitution(0.9)], None), rarely("floor that moves", [Rough(0.3)], G),
+    ],
+)  # fmt: skip
+def test_the_same_bits_compiled_in_plain_python_and_in_any_threads(name, laws, gravity):
+    one, two, plain = (
+        run(WALLS[name](laws=laws), gravity, 1.0, **how)
+        for how in ({"compile": "always", "threads": 1}, {"compile": "always", "threads": 2}, {"compile": "never"})
+    )
+    assert one.observables["impacts"][-1] > 50
+    assert same_bits(one, two)
+    assert same_bits(one, plain)
+
+
+def test_a_resumed_run_is_a_whole_one(tmp_path):
+    scene = swarm.Scene([swarm.Sphere(0.5, laws=[Lambert(0.5)])])
+    assert require_resumed_is_whole(tmp_path, scene, swarm.Impact(), every=10.0) > 0
+
+
+def test_two_laws_in_turn():
+    one = run(WALLS["sphere"](laws=[Restitution(0.9), Restitution(0.8)]), until=1.0, compile="never")
+    product = run(WALLS["sphere"](laws=[Restitution(0.72)]), until=1.0, compile="never")
+    assert one.particles.position == pytest.approx(product.particles.position, abs=1e-11)
+
+
+def kolmogorov(sample):
+    """sqrt(n) D of a sample that should be uniform in (0, 1)."""
+    n, below = sample.size, np.sort(sample)
+    return math.sqrt(n) * max((np.arange(1, n + 1) / n - below).max(), (below - np.arange(n) / n).max())
+
+
+def test_a_lambert_law_keeps_the_speed_and_gives_the_cosine_law():
+    n, normal = 20_000, np.array([0.6, -0.48, 0.64])
+    before = -0.8 * normal + np.array([0.8, 0.36, -0.48])
+    start = swarm.Particles(np.outer(normal, np.full(n, 1e-6)), np.outer(before, np.ones(n)))
+    wall = swarm.Plane(tuple(-normal), 0.0, laws=[Lambert(1.0)])
+    result = swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(), until=1e-3, compile="always", seed=5)
+    assert (result.impacts_per_particle == 1).all()
+    v = result.particles.velocity
+    speed = np.linalg.norm(v, axis=0)
+    assert speed == pytest.approx(np.linalg.norm(before), rel=4 * np.finfo(float).eps)
+    cosine = normal @ v / speed
+    assert kolmogorov(cosine**2) < KOLMOGOROV
+    across = np.cross(before, normal)
+    angle = np.arctan2(across @ v / np.linalg.norm(across), v.T @ np.cross(normal, across) / np.linalg.norm(across))
+    assert kolmogorov(angle / (2.0 * math.pi) + 0.5) < KOLMOGOROV
+
+
+def test_a_share_of_the_particles_by_the_other_law():
+    """A thermal wall asks the law of those that it does not accommodate."""
+    n = 20_000
+    start = swarm.Particles(np.tile([[0.0], [0.0], [1e-6]], n), np.tile([[0.0], [0.0], [-1.0]], n))
+    wall = swarm.Plane((0, 0, -1), 0.0, temperature=0.1, accommodation=0.25, laws=[Restitution(0.5)])
+    result = swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(), until=1e-3, compile="always", seed=5)
+    by_law = result.particles.velocity[2] == 0.5
+    assert by_law.mean() == pytest.approx(0.75, abs=3.0 * math.sqrt(0.25 * 0.75 / n))
+
+
+def test_what_a_law_gives_and_takes_is_booked():
+    result = run(WALLS["sphere"](laws=[Rough(0.3)]), until=30.0, every=10.0, compile="always")
+    assert balance(result) == pytest.approx(balance(result)[0], rel=1e-13)
+    assert result.observables["wall_heat"][-1].sum() < -0.5 * result.observables["kinetic_energy"][0]
+
+
+def test_balls_come_to_rest_under_a_law_of_their_own():
+    """The last hops are those of the surface: a bounce is not divided without end."""
+    floor = swarm.Cylinder(0.2, (0, 0, 1), 0.4, laws=[Viscoelastic(2.0)], restitution=0.8, friction=0.3)
+    result = run([floor], G, until=6.0, n=100, compile="always")
+    assert result.observables["kinetic_energy"][-1] < 1e-12 * result.observables["kinetic_energy"][0]
+    assert result.particles.position[2] == pytest.approx(-0.2, abs=1e-15)
+    assert (result.impacts_per_particle < 2000).all()
+    assert balance(result) == pytest.approx(balance(result)[0], rel=1e-12)
+
+
+def test_the_numbers_of_an_impact_are_independent():
+    """Of each other, of those of other impacts and particles, and of those of thermal walls."""
+    streams = [Stream(7, particle, number) for particle in range(50) for number in range(50)]
+    rows = np.array([[stream.uniform(k) for k in range(4)] for stream in streams])
+    for k in range(4):
+        assert kolmogorov(rows[:, k]) < KOLMOGOROV
+    assert abs(np.corrcoef(rows.T) - np.eye(4)).max() < 4.0 / math.sqrt(len(streams))
+    normal = np.array([stream.normal(0) for stream in streams])
+    assert kolmogorov(0.5 * (1.0 + np.array([math.erf(x / math.sqrt(2.0)) for x in normal]))) < KOLMOGOROV
+    assert kolmogorov(np.exp([-stream.exponential(1) for stream in streams])) < KOLMOGOROV
+
+
+def test_the_example_is_short():
+    assert len(lines_of(Path(own_law.__file__))) <= 20
+
+
+class Into(swarm.WallLaw):
+    """Into the wall, from a speed on that no trial has."""
+
+    def leave(self, v, n, u, random, mass):
+        return v - 2.0 * select(dot(v, v) > 1e4, 0.25, 1.0) * dot(v - u, n) * n
+
+
+class Through(swarm.WallLaw):
+    def leave(self, v, n, u, random, mass):
+        return v
+
+
+class Nothing(swarm.WallLaw):
+    e: float
+
+
+@pytest.mark.parametrize("tier", ["never", "always"])
+def test_a_law_that_sends_a_particle_into_the_wall_ends_the_run(tier):
+    scene = swarm.Scene([swarm.Sphere(0.5, laws=[Into()])])
+    start = swarm.fill(scene, 5, speed=200.0, seed=1)
+    with pytest.raises(swarm.RunError, match=r"particle \d+.*law"):
+        swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile=tier)
+
+
+@pytest.mark.parametrize(
+    ("laws", "sentence"),
+    [
+        (Restitution(0.9), "laws must be a list of WallLaw, got Restitution"),
+        ([0.5], r"laws\[0\] must be a WallLaw, .* got 0.5"),
+        ([Restitution(0.9), Nothing(1.0)], r"laws\[1\] must have a method leave\(self, v, n, u, random, mass\)"),
+        ([Restitution(math.nan)], r"laws\[0\].e must be a finite number, got nan"),
+        ([Through()], r"laws\[0\] must send particles away from the wall: .*Through\(\) returned"),
+    ],
+)
+def test_bad_laws_are_refused_in_one_sentence(laws, sentence):
+    with pytest.raises(swarm.SceneError, match=sentence):
+        swarm.Sphere(1.0, laws=laws)
+
+
+def test_what_knows_no_laws_says_so():
+    wall = swarm.Sphere(1.0, laws=[Restitution(0.9)])
+    start = swarm.Particles((0, 0, 0), (1, 0, 0))
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be .* with Penalty"):
+        swarm.simulate(swarm.Scene([wall]), start, swarm.Penalty(dt=1e-3, penalty=1e6), until=1.0)
+    with pytest.raises(swarm.SceneError, match="contact_step must be 0 where"):
+        swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(contact_step=1e-3), until=1.0)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be left out where a wall has a mass"):
+        swarm.simulate(
+            swarm.Scene([wall, swarm.Sphere(0.2, side="outside", mass=1.0)]),
+            swarm.Particles((0.5, 0, 0), (1, 0, 0)), swarm.Impact(), until=1.0,
+        )  # fmt: skip
+    scene = swarm.Scene([wall])
+    bodies = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 2, speed=1.0, seed=1)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be left out with bodies"):
+        swarm.simulate(scene, bodies, swarm.Impact(dt=1e-3), until=1.0)
+
+
+def test_a_file_has_the_name_of_a_law(tmp_path):
+    """Enough for pictures, and not to run it."""
+    scene = swarm.Scene([swarm.Sphere(0.5, laws=[Restitution(0.9)])])
+    start = swarm.fill(scene, 5, speed=1.0, seed=1)
+    swarm.simulate(scene, start, swarm.Impact(), until=1.0, trajectory=tmp_path / "run.h5")
+    read = swarm.load(tmp_path / "run.h5").scene
+    assert read.surfaces[0].laws == ("Restitution(e=0.9)",)
+    assert swarm.fill(read, 5, speed=1.0, seed=1).position == pytest.approx(start.position)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws: 'Restitution\(e=0.9\)' is Python"):
+        swarm.simulate(read, start, swarm.Impact(), until=1.0)
