@@ -34,7 +34,9 @@ class Wall(NamedTuple):
     def of(surface):
         sign = -1.0 if getattr(surface, "side", "inside") == "outside" else 1.0
         rest = dataclasses.replace(surface, motion=None)
-        return Wall(rest, parts_of(surface.motion), sign, surface.restitution, surface.friction)
+        # A law of one's own is a pair of both.
+        e, mu = surface.laws[0] if surface.laws else (surface.restitution, surface.friction)
+        return Wall(rest, parts_of(surface.motion), sign, e, mu)
 
     def shift(self, t):
         """Displacements (3, T) and their rates at times (T,)."""

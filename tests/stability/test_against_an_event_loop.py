@@ -8,6 +8,7 @@ from bounded import bounded
 from physics.event_loop import follow
 
 import swarm
+from swarm.kernel.vector import dot, norm
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 4
 # Coarse steps while it slides: the event loop says nothing of those.
@@ -18,6 +19,8 @@ PASSES = 5_000
 SEEDS = range(16)
 # What 1e-9 m at the start grows to by a time, an error of round-off grows to in proportion.
 NUDGE, SPARE, LEAST = 1e-9, 1e-3, 1e-11
+# Of so many surfaces restitution and friction are a law of the user's.
+OWN = 0.3
 # [m], and of the largest energy.
 OUTSIDE, UNBOOKED = 1e-12, 1e-11
 BOOKS = ("wall_work", "wall_heat")
@@ -53,6 +56,20 @@ SOLIDS = {
 }
 
 
+class Rubbing(swarm.WallLaw):
+    """Restitution and Coulomb's friction, as a user may write them."""
+
+    e: float
+    mu: float
+
+    def leave(self, v, n, u, random, mass):
+        b = -dot(v - u, n)
+        slip = v - u + b * n
+        speed = norm(slip)
+        share = min(self.mu * (1.0 + self.e) * b / speed, 1.0) if speed > 0.0 else 0.0
+        return u + (1.0 - share) * slip + self.e * b * n
+
+
 def a_motion(random):
     """A motion, or none; displacements of some centimetres."""
     spot = tuple(random.uniform(-0.1, 0.1, 3).tolist())
@@ -76,13 +93,15 @@ def a_motion(random):
 
 def a_scene(seed):
     """(scene, particles): kinds, motions, laws and gravity, all drawn."""
-    random = np.random.default_rng([39, seed])
+    random, own = np.random.default_rng([39, seed]), np.random.default_rng([41, seed])
     vessel, solid = (str(random.choice(sorted(kinds))) for kinds in (VESSELS, SOLIDS))
     if vessel == "torus":
         solid = "nothing"
     surfaces = []
     for make in (VESSELS[vessel], SOLIDS[solid]):
         law = {"restitution": float(random.choice([1.0, 0.9, 0.5])), "friction": float(random.choice([0.0, 0.3, 1.0]))}
+        if own.random() < OWN:
+            law = {"laws": [Rubbing(law["restitution"], law["friction"])]}
         surfaces += make(motion=a_motion(random), **law)
     gravity = [None, (0.0, 0.0, -9.81), (-1.0, 2.0, -3.0)][random.integers(3)]
     scene = swarm.Scene(surfaces, gravity)
