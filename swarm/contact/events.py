@@ -134,7 +134,8 @@ def enter(rules, walls, gravity, wall, p):
             return Next(CAREFUL, v, 0.0, twice, wall, impulse=impulse)
         return flies
     if not _loses(rules, wall):
-        return Next(HELD, along, _kept(away, p), twice, wall, impulse=impulse)
+        keep = _kept(away, p)
+        return Next(HELD, along, keep, _twice_held(u, v, twice, along, keep), wall, impulse=impulse)
     # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
     # the particle than to one that slides, which the caller books, and friction as much less.
     slip = relative(u, along)
@@ -149,6 +150,14 @@ def enter(rules, walls, gravity, wall, p):
 def _kept(across, p):
     """The speed across its walls that a particle keeps while it slides."""
     return across if across > _NO_HOP * math.sqrt(own_speed2(p)) else 0.0
+
+
+def _twice_held(drift, v, twice, along, keep):
+    """Twice the energy per mass of a particle that keeps a speed across its walls instead of all of v.
+
+    In the frame of walls that move that is the energy it had: the rest is their work.
+    """
+    return twice if drift is None else twice + square(along) + keep * keep - square(v)
 
 
 @outlined
@@ -166,7 +175,9 @@ def _on_edge(rules, walls, gravity, two, p):
         return stays
     if _loses(rules, two.first) or _loses(rules, two.second):
         return Next(EDGE, taken.along, 0.0, p.twice - across2, two.first, two.second)
-    return Next(EDGE, taken.along, _kept(math.sqrt(kept2), p), p.twice, two.first, two.second)
+    keep = _kept(math.sqrt(kept2), p)
+    twice = _twice_held(drift, p.v, p.twice, taken.along, keep)
+    return Next(EDGE, taken.along, keep, twice, two.first, two.second)
 
 
 def _across2(drift, v, taken):
@@ -198,7 +209,8 @@ def meet(rules, active, walls, gravity, wall, p):
         if found.phase != FLYING:
             return Next(found.phase, found.v, found.keep, found.twice, found.wall, found.other, impulse)
     across2, kept2 = _across2(drift, p.v, taken)
-    keep, twice = _kept(math.sqrt(kept2), p), p.twice
+    keep = _kept(math.sqrt(kept2), p)
+    twice = _twice_held(drift, p.v, p.twice, taken.along, keep)
     if _loses(rules, active.first):
         keep, twice = 0.0, p.twice - across2
     return Next(EDGE if active.second >= 0.0 else HELD, taken.along, keep, twice, active.first, active.second, impulse)
@@ -213,14 +225,16 @@ def _at_rest_there(active, rules, walls, gravity, wall, p):
         return edge
     pull, n = accelerated(gravity, ZERO, 1.0), _normal(walls, wall, p.r)
     moving = rules.laws.moving
-    away = -dot(n, relative(wall_velocity(moving, walls, wall, p.r), p.v))
+    u = wall_velocity(moving, walls, wall, p.r)
+    away = -dot(n, relative(u, p.v))
     along = p.v + away * n
     if not _press(walls, wall, p.r, along, pull) > weightless(rules, gravity, p):
         return edge
     drawn = sliding.force(NONE, One(wall), walls, gravity, p.r, along).acceleration
     if dot(_normal(walls, active.first, p.r), drawn) > 0.0:
         return edge
-    keep, twice = _kept(away, p), p.twice
+    keep = _kept(away, p)
+    twice = _twice_held(u, p.v, p.twice, along, keep)
     if _loses(rules, wall):
         keep, twice = 0.0, p.twice - (away * away if moving is None else square(p.v) - square(along))
     return Next(HELD, along, keep, twice, wall)

@@ -12,7 +12,7 @@ from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
-from ..kernel.vector import column, put
+from ..kernel.vector import column, put, square
 from ..status import Status
 from .arrays import Place, speed2_scale
 from .periodic import return_particle, return_sliding
@@ -116,7 +116,10 @@ def _load(slide, share, i, p):
     if begins:
         active, now = slide.active(lane), slide.walls.at(remaining)
         # Frames show the speed that is kept across the walls too.
-        v = active.split_at(now, hold.drift(slide.moving(), active, now, r), r, v).along
+        along = active.split_at(now, hold.drift(slide.moving(), active, now, r), r, v).along
+        if slide.moves() and lane.keep > 0.0:
+            slide.cross(i, square(along) + lane.keep * lane.keep - square(v))
+        v = along
     lane.r, lane.v = r, v
     phase = set_going(slide, i)
     if phase != slide.phase():
@@ -137,6 +140,8 @@ def _retire(slide, share, i, phase):
     slid = phase != FLYING and phase != CAREFUL
     if not (slid and lane.remaining > 0.0):
         v = slide.with_kept(now, lane)
+        if slide.moves() and keep > 0.0:
+            slide.cross(i, square(v) - square(lane.v) - keep * keep)
     if phase == FLYING:
         u = wall_velocity(slide.moving(), now, lane.first, lane.r)
         v = events.off_the_wall(now, lane.first, lane.r, v, u)

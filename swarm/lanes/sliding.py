@@ -156,6 +156,12 @@ class Slide(Record):
         if lane.second >= 0.0:
             state.impulse[behind + self.walls.row(lane.second), p] += 0.5 * second * state.mass[p]
 
+    def cross(self, i, twice):
+        """Book the work of walls where the speed that a lane keeps across them joins its velocity, or leaves it."""
+        lane = self.lanes.lane(i)
+        lane.twice += twice
+        self.work(i, twice, 0.0)
+
     def lose(self, i, twice):
         """Book twice the energy per mass that a lane has lost; its row knows what is left."""
         state, p = self.state, self.lanes.particle[i]

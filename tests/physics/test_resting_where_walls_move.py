@@ -124,6 +124,28 @@ def test_a_ceiling_that_closes_on_what_rests_is_told(tmp_path):
 
 
 @pytest.mark.physics
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        swarm.Translation((0.0, 0.0, 0.1)),
+        swarm.Oscillation((0.0, 0.0, 0.01), 1.0),
+        swarm.Rotation((0, 1, 0), 0.3, (0, 0, 0)),
+    ],
+    ids=lambda motion: type(motion).__name__,
+)
+def test_the_speed_across_a_floor_that_is_kept_on_it_is_work_of_the_floor(motion, friction):
+    """An elastic floor gives it back, at another speed of its own: in the frame of the floor it is the same."""
+    scene = swarm.Scene([swarm.Box((1, 1, 1), (0, 0, 1), motion=motion, friction=friction)], (0.3, 0.0, -9.81))
+    floor = motion.velocity[2] if isinstance(motion, swarm.Translation) else 0.0
+    floor = 0.01 * 2.0 * math.pi if isinstance(motion, swarm.Oscillation) else floor
+    start = swarm.Particles((0.0, 0.0, 1e-9), (1.0, 0.0, floor - 1e-5))
+    seen = swarm.simulate(scene, start, swarm.Impact(), until=0.2, every=0.02, compile="never").observables
+    assert seen["sliding"][1:].all()
+    books = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum(axis=1)
+    assert books == pytest.approx(books[0], rel=1e-14)
+
+
 def test_threads_change_no_bit():
     """Sixty grains on a floor, and a ball that goes through them."""
     places = np.random.default_rng(3).uniform(-0.4, 0.4, (3, 60))
