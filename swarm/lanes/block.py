@@ -199,7 +199,7 @@ def _exchange_heat(method, walls, gravity, share, lanes, live):
             r, v = lane.r, lane.v
             random = Stream(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
             now, laws = walls.at(lane.remaining), method.laws
-            sent = exchange(laws, now, wall, (r, v, method.least_speed(v)), state.mass[p], random)
+            sent = exchange(laws, now, wall, (r, v, 0.0), state.mass[p], random)
             if sent.happens:
                 before, after = lane.twice, square(sent.v) + 2.0 * potential(gravity, r)
                 book_heat(state, p, walls.row(wall), before, after - sent.work)
@@ -209,8 +209,11 @@ def _exchange_heat(method, walls, gravity, share, lanes, live):
                 lanes.impulse[walls.row(wall), i] += sent.impulse
                 for watch in share.watches():
                     watch.note(lanes, i, sent.impulse)
-                # The contact is done, unless a wall at 0 K holds the particle.
-                lanes.wall[i] = select(square(sent.v) > 0.0, -1.0, wall)
+                # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
+                holds = not square(sent.v) > 0.0
+                if laws.own is not None:
+                    holds = holds | method.is_within(lanes.given(method, i), 2.0 * sent.away, 1.0)
+                lanes.wall[i] = select(holds, wall, -1.0)
 
 
 def _put_contact(method, lanes, i, contact):

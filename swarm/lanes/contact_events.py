@@ -148,7 +148,9 @@ def _exchange_heat(method, walls, gravity, share, i):
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     now = walls.at(contacts.remaining[i])
     random = Stream(share.seed, share.first + i, state.impacts[i])
-    sent = exchange(method.laws, now, wall, (r, v, method.least_speed(v)), state.mass[i], random)
+    # What slides along another wall meets it without end: the surface's restitution and an edge are for slow impacts.
+    slow = events.GRAZING * np.sqrt(max(speed2_scale(state, i), square(v)))
+    sent = exchange(method.laws, now, wall, (r, v, slow), state.mass[i], random)
     if not sent.happens:
         return False
     before, after = 2.0 * state.energy[i], square(sent.v) + 2.0 * potential(gravity, r)

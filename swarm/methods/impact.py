@@ -249,18 +249,10 @@ class Reflection(contract.MethodNumbers):
         """
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow
-        # By the velocity with which it comes: such walls change that.
-        return speed * speed <= (part * part) * self._slow2(lane.v)
-
-    def _slow2(self, v):
-        # One of both is 0.
-        speed2 = (square(v) + self.fall2) / (self.size * self.size)
+        # By the velocity with which it comes: such walls change that. One of both is 0.
+        speed2 = (square(lane.v) + self.fall2) / (self.size * self.size)
         by_time, by_length = self.shortest_flight * self.size * speed2, self.shortest_length
-        return by_time * by_time + by_length * by_length * speed2
-
-    def least_speed(self, v):
-        """Speed [m/s] towards a wall below which a particle that comes with v may not leave it: contact may last."""
-        return 0.5 * math.sqrt(self._slow2(v))
+        return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
 
 
 class Chord(Reflection):

@@ -13,16 +13,17 @@ from ..kernel.vector import Vec, dot
 
 # Impacts with which a law is tried before a run.
 _TRIED = 64
+_ROUND_OFF = 1e-15
 
 
 class WallLaw(Record):
     """A law of a wall: the velocity with which a particle leaves it.
 
     Derive a record from it, whose fields are numbers, and give it as `laws=[...]` of a surface. Kernels call `leave`:
-    numbers in, numbers out, no lists and no arrays. It takes the place of the elastic reflection at every impact but
-    those after which a particle would not leave the wall (`shortest_flight` of `Impact`): these are rigid, with the
-    restitution and the friction of the surface, so that particles come to rest, and slide. A thermal wall asks it of
-    the particles that it does not accommodate. What it changes of the energy is heat that the wall gives.
+    numbers in, numbers out, no lists and no arrays. It takes the place of the elastic reflection at every impact, on a
+    thermal wall of the particles that this does not accommodate. A particle that it leaves so slowly that it is back at
+    once (`shortest_flight` of `Impact`) slides or rests, by the restitution and the friction of the surface. What it
+    changes of the energy is heat that the wall gives.
 
     Example:
         >>> import swarm
@@ -40,7 +41,7 @@ class WallLaw(Record):
 
         Args:
             v: the velocity before it [m/s].
-            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) > 0.
+            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) >= 0.
             u: the velocity of the wall [m/s].
             random: random numbers of this impact: `random.uniform(k)` in (0, 1), `random.normal(k)`, which takes k and
                 k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any resume.
@@ -80,11 +81,10 @@ def _try(name: str, law: Any) -> None:
         v = v - (dot(v, n) + abs(dot(v, n))) * n
         with np.errstate(all="ignore"):
             after = law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), Stream(0, 0, k), np.float64(1.0))
-        if not (
-            isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after)) and dot(after, n) > 0.0
-        ):
+        is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
+        if not (is_finite and dot(after, n) >= -_ROUND_OFF * math.sqrt(dot(v, v))):
             raise SceneError(
-                f"{name} must send particles away from the wall: n.v > 0 of the velocity that leave returns; "
+                f"{name} must send particles away from the wall: n.v >= 0 of the velocity that leave returns; "
                 f"{law} returned {shown(after)} for v = {_said(v)}, n = {_said(n)} and u = 0"
             )
 
