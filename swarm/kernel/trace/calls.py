@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
+from numba.extending import lower_builtin, type_callable
 
 from .frame import Frame, Range
 from .notes import taken
@@ -84,10 +85,11 @@ _ARRAY_FUNCTION = type(np.sum)
 _IN_PLACE = (list, dict, set)
 
 
-def operation(function: Any) -> Any:
-    """Of a function that has a type and a lowering of its own for Numba: traces note it."""
+def operation(function: Any, typed: Callable[..., Any], *kinds: Any) -> Any:
+    """A decorator of the instructions of a function for arguments of such types; `typed` is the type of its result."""
     OPERATIONS.add(function)
-    return function
+    type_callable(function)(lambda _context: typed)
+    return lower_builtin(function, *kinds)
 
 
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
