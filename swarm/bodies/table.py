@@ -19,11 +19,10 @@ from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
 from . import room, shapes
-from .body import Body
+from .body import Body, Strain
 from .elastic import block, elastic
 from .placing import place
 from .state import Bodies
-from .strain import Strain
 
 T = TypeVar("T")
 _MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation}

@@ -209,15 +209,10 @@ class Shifted(Freedom):
         if self.axis is not None:
             change = (self.lightness * dot(impulse, self.axis)) * self.axis
         k, here = index(self.row), self.pose(walls, t)
-        more = change + column(walls.rest, 0, k)
-        x, y, z = (
-            exact_sum(here.velocity.x, more.x),
-            exact_sum(here.velocity.y, more.y),
-            exact_sum(here.velocity.z, more.z),
-        )
+        velocity, rest = exact_sum(here.velocity, change + column(walls.rest, 0, k))
         put(walls.shift, 0, k, here.shift)
-        put(walls.velocity, 0, k, Vec(x[0], y[0], z[0]))
-        put(walls.rest, 0, k, Vec(x[1], y[1], z[1]))
+        put(walls.velocity, 0, k, velocity)
+        put(walls.rest, 0, k, rest)
         walls.time[k] = t
 
     def hardest(self, walls):

@@ -15,10 +15,9 @@ from numba.extending import lower_builtin, type_callable
 
 from .frame import Frame, Range
 from .notes import taken
-from .selection import select, traced_select
 from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
-from .ways import unified
+from .ways import select, traced_select, unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
 OPERATIONS: set[Any] = {
