@@ -247,21 +247,21 @@ class Pose(NamedTuple):
 
     def position(self) -> Floats:
         """The place (3,) of the origin of the frame in which the wall is given."""
-        return np.asarray(self.center + self.shift - _product(self.turn, self.center))
+        return np.asarray(self.center + self.shift - product(self.turn, self.center))
 
     def placed(self, points: Floats) -> Floats:
         """Points (3, N) of the wall as it is given, where they are now."""
         middle = self.center[:, None]
-        return np.asarray(middle + self.shift[:, None] + _product(self.turn, points - middle))
+        return np.asarray(middle + self.shift[:, None] + product(self.turn, points - middle))
 
     def turned(self, vectors: Floats) -> Floats:
         """Vectors (3, N) of the frame of the wall in the scene."""
-        return _product(self.turn, vectors)
+        return product(self.turn, vectors)
 
     def given(self, points: Floats) -> Floats:
         """Points (3, N) of the scene in the frame in which the wall is given."""
         middle = self.center[:, None]
-        return np.asarray(middle + _product(self.turn.T, points - self.shift[:, None] - middle))
+        return np.asarray(middle + product(self.turn.T, points - self.shift[:, None] - middle))
 
 
 def pose(motion: WallMotion | None, time: float) -> Pose:
@@ -290,6 +290,7 @@ def _turned_by(rotation: Rotation, angle: float) -> Floats:
     return np.asarray((1.0 - versine) * np.eye(3) + versine * np.multiply.outer(k, k) + math.sin(angle) * across)
 
 
-def _product(matrix: Floats, rows: Floats) -> Floats:
-    """(3, 3) times (3, N), rounded term by term: the last bit of BLAS depends on the processor."""
+def product(matrix: Floats, other: ArrayLike) -> Floats:
+    """(3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
+    rows = np.asarray(other)
     return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))

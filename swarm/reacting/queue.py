@@ -77,17 +77,13 @@ class Rule(NamedTuple):
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-def _given_hit(walls, gravity, r, v, remaining):
-    """The first hit with the walls that do not react."""
-    if isinstance(walls, Marched):
-        return safe.first_hit(walls, gravity, r, v, remaining)
-    return flights.first_hit(walls.at(remaining), gravity, r, v)
-
-
 def _aim(scenery, queue, i, end):
     """Find when particle i meets a wall that does not react, from where it is."""
-    t, r, v = queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
-    hit = _given_hit(scenery.given, scenery.pull, r, v, end - t)
+    walls, t, r, v = scenery.given, queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
+    if isinstance(walls, Marched):
+        hit = safe.first_hit(walls, scenery.pull, r, v, end - t)
+    else:
+        hit = flights.first_hit(walls.at(end - t), scenery.pull, r, v)
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 

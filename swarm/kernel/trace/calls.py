@@ -13,6 +13,7 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.extending import lower_builtin, type_callable
 
+from ..entries import is_own
 from .frame import Frame, Range
 from .notes import taken
 from .twins import twin_of
@@ -109,15 +110,11 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
     if any(one is UNDEFINED for one in given):
         bool(UNDEFINED)
     if isinstance(function, python_types.FunctionType):
-        return traced(function, given, named) if _is_own(function) else _foreign(function, given, named)
+        return traced(function, given, named) if is_own(function) else _foreign(function, given, named)
     is_python = getattr(function, "__module__", None) == "builtins"
     if function in _IN_PLACE or (is_python and any(isinstance(one, Value) for one in given)):
         raise TraceError(f"it asks {name_of(function)} about a number that is known in the kernel only")
     return function(*given, **named)
-
-
-def _is_own(function: Any) -> bool:
-    return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 
 def _refused(function: Any, error: Exception) -> None:

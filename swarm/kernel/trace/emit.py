@@ -258,10 +258,8 @@ def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
     function = module.globals.get(name)
     if function is not None:
         return function, result
-    status, (_place, error) = (
-        context.call_conv.get_function_type(types.none, ()).return_type,
-        (context.call_conv.get_function_type(types.none, ()).args[:2]),
-    )
+    numbas = context.call_conv.get_function_type(types.none, ())
+    status, error = numbas.return_type, numbas.args[1]
     kinds = [context.get_value_type(one.kind) for one in part.arguments]
     function = ir.Function(module, ir.FunctionType(status, [result.as_pointer(), error, *kinds]), name)
     function.linkage = "internal"
