@@ -167,26 +167,25 @@ class Shifted(Freedom):
         t = t - walls.time[k]
         if self.rate is not None:
             # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
-            rate, rest, (away, speed) = self.rate, self.rest(), self.swing(walls)
+            rate, (away, speed) = self.rate, self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
             c, s = math.cos(rate * t), math.sin(rate * t)
             here = c * away + s * speed
-            return Pose(rest + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+            return Pose(self.equilibrium() + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
         # s = s0 + V t + a t^2/2
         v, pull = column(walls.velocity, 0, k), self.pull
         return Pose(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
 
-    def rest(self):
+    def equilibrium(self):
         """The displacement at which the spring holds it."""
         return self.pull / (self.rate * self.rate)
 
-    def swing(self, walls):
-        """How far it is from there, and its speed over the rate."""
-        k = index(self.row)
-        return column(walls.shift, 0, k) - self.rest(), column(walls.velocity, 0, k) / self.rate
+    def swing(self, shift, velocity):
+        """How far it is from there, and its velocity over the rate."""
+        return shift - self.equilibrium(), velocity / self.rate
 
     def drive(self, walls, t):
         found, rate = self.pose(walls, t), self.rate
-        away, speed = found.shift - self.rest(), found.velocity / rate
+        away, speed = self.swing(found.shift, found.velocity)
         most = math.sqrt(square(away) + square(speed))
         bounds = rate * most, rate * rate * most, rate * rate * rate * most
         swings, jerks = (Swing(away, speed, rate),), Vec(bounds[2], bounds[2], bounds[2])
@@ -219,7 +218,8 @@ class Shifted(Freedom):
         """A bound of the wall's acceleration between impacts [m/s^2]."""
         if self.rate is None:
             return norm(self.pull)
-        away, speed = self.swing(walls)
+        k = index(self.row)
+        away, speed = self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
         return self.rate * self.rate * math.sqrt(square(away) + square(speed))
 
     def begin_lease(self, walls, t):

@@ -199,7 +199,7 @@ class Smooth(AtRest):
         return self.clearance(r)
 
     def far(self, r):
-        """`clearance`, which frames and solids know too."""
+        """Lower bound of the distance to the wall: `clearance`, also in a frame, and of the parts of a solid."""
         return self.clearance(r)
 
     def reach(self, lease):
