@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
-    from .bodies.body import Body
+    from .bodies.body import Body, Strain
     from .bodies.elastic import elastic
     from .bodies.placing import place
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
     from .bodies.state import Bodies
-    from .bodies.strain import Strain
     from .ensemble.sweeping import sweep
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
@@ -56,12 +55,11 @@ __version__ = VERSION
 
 # A module of the package and the public names that it defines.
 _HOMES = {
-    "bodies.body": ("Body",),
+    "bodies.body": ("Body", "Strain"),
     "bodies.elastic": ("elastic",),
     "bodies.placing": ("place",),
     "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
     "bodies.state": ("Bodies",),
-    "bodies.strain": ("Strain",),
     "ensemble.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),

@@ -16,9 +16,8 @@ from .. import checks
 from ..errors import SceneError
 from ..particles import Floats
 from . import checked, room
-from .body import Body
+from .body import Body, Strain
 from .checked import Pairs
-from .strain import Strain
 
 _EDGES = np.array(list(itertools.combinations(range(4), 2)))
 # The sides of a positively oriented tetrahedron, anticlockwise seen from outside.

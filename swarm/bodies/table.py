@@ -4,6 +4,7 @@ A table of the kind "points" has the arguments of `Body`, every number exactly; 
 """
 
 import dataclasses
+import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -19,11 +20,10 @@ from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import ALL_SURFACES
 from . import room, shapes
-from .body import Body
+from .body import Body, Strain
 from .elastic import block, elastic
 from .placing import place
 from .state import Bodies
-from .strain import Strain
 
 T = TypeVar("T")
 _MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation}
@@ -65,32 +65,11 @@ class Made:
         return place(scene, body, self.count, speed=self.speed or 0.0, spin=self.spin or 0.0, seed=self.seed or 0)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Dumbbell(Made):
-    """Arguments of `dumbbell`."""
-
-    maker = shapes.dumbbell
-    length: float
-    mass: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tetrahedron(Made):
-    """Arguments of `tetrahedron`."""
-
-    maker = shapes.tetrahedron
-    edge: float
-    mass: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Chain(Made):
-    """Arguments of `chain`."""
-
-    maker = shapes.chain
-    n: int
-    length: float
-    mass: float
+def _made_by(maker: Callable[..., Body]) -> type[Made]:
+    """The keys of a kind whose own are the arguments of a function."""
+    own = [(one.name, one.annotation) for one in inspect.signature(maker).parameters.values()]
+    name, known = maker.__name__, {"maker": maker}
+    return dataclasses.make_dataclass(name, own, bases=(Made,), namespace=known, frozen=True, kw_only=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,8 +152,8 @@ class Points(Made):
 
 
 KINDS: dict[str, type[Made]] = {
-    "dumbbell": Dumbbell, "tetrahedron": Tetrahedron, "chain": Chain, "rigid": Rigid, "elastic": Elastic,
-    "points": Points,
+    "dumbbell": _made_by(shapes.dumbbell), "tetrahedron": _made_by(shapes.tetrahedron),
+    "chain": _made_by(shapes.chain), "rigid": Rigid, "elastic": Elastic, "points": Points,
 }  # fmt: skip
 
 

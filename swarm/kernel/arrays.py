@@ -15,10 +15,9 @@ from llvmlite.ir.instructions import InsertValue
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
-from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
-from .trace import calls
+from .trace.calls import INTRINSIC, operation
 
 
 def spaced(stride: int) -> Callable[[Any], Any]:
@@ -32,13 +31,7 @@ def spaced(stride: int) -> Callable[[Any], Any]:
     def known(tables: Any) -> Any:
         return tables
 
-    calls.operation(known)
-
-    @type_callable(known)
-    def _type_of_tables(_context):
-        return lambda tables: tables
-
-    @lower_builtin(known, types.BaseNamedTuple)
+    @operation(known, lambda tables: tables, types.BaseNamedTuple)
     def _emit_tables(context, builder, signature, args):
         (tables,) = args
         columns, item = (context.get_constant(types.intp, k) for k in (stride, np.dtype(float).itemsize))
@@ -69,23 +62,8 @@ def unwritten(shape: Any, dtype: Any) -> Any:
     return np.zeros(shape, dtype)
 
 
-calls.INTRINSIC.update((scratch, unwritten))
-
-
-@type_callable(scratch)
-@type_callable(unwritten)
-def _type_of_scratch(_context):
-    return lambda shape, dtype: types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
-
-
-@lower_builtin(scratch, types.Any, types.Any)
-def _emit_scratch(context, builder, signature, args):
-    return _on_stack(context, builder, signature, args, True)
-
-
-@lower_builtin(unwritten, types.Any, types.Any)
-def _emit_unwritten(context, builder, signature, args):
-    return _on_stack(context, builder, signature, args, False)
+def _type_of_scratch(shape, dtype):
+    return types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
 
 
 def _part(builder: Any, made: Any, k: int) -> Any:
@@ -97,7 +75,7 @@ def _part(builder: Any, made: Any, k: int) -> Any:
     return builder.extract_value(made, k)
 
 
-def _on_stack(context: Any, builder: Any, signature: Any, args: Any, zeros: bool) -> Any:
+def _on_stack(zeros: bool, context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kind, asked = signature.return_type, signature.args[0]
     shape = [_part(builder, args[0], k) for k in range(len(asked))] if isinstance(asked, types.BaseTuple) else [args[0]]
     number = context.get_data_type(kind.dtype)
@@ -120,6 +98,11 @@ def _on_stack(context: Any, builder: Any, signature: Any, args: Any, zeros: bool
     return table._getvalue()
 
 
+INTRINSIC.update((scratch, unwritten))
+operation(scratch, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, True))
+operation(unwritten, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, False))
+
+
 def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     """target[i, :count] = source[m, :count], of tables in C order.
 
@@ -129,15 +112,9 @@ def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     target[int(i), :count] = source[int(m), :count]
 
 
-calls.operation(copy_row)
-
-
-@type_callable(copy_row)
-def _type_of_copy_row(_context):
-    return lambda target, i, source, m, count: types.none
-
-
-@lower_builtin(copy_row, types.Array, types.Any, types.Array, types.Any, types.Any)
+@operation(
+    copy_row, lambda target, i, source, m, count: types.none, types.Array, types.Any, types.Array, types.Any, types.Any
+)
 def _emit_copy_row(context, builder, signature, args):
     places = []
     for k in (0, 2):
@@ -160,15 +137,7 @@ def next_of(ticket: Any) -> int:
         return int(ticket[0]) - 1
 
 
-calls.operation(next_of)
-
-
-@type_callable(next_of)
-def _type_of_next(_context):
-    return lambda ticket: types.int64
-
-
-@lower_builtin(next_of, types.Array)
+@operation(next_of, lambda ticket: types.int64, types.Array)
 def _emit_next(context, builder, signature, args):
     counter = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.atomic_rmw("add", counter, context.get_constant(types.int64, 1), "monotonic")
@@ -185,15 +154,7 @@ def index(value: Any) -> Any:
     return value
 
 
-calls.operation(index)
-
-
-@type_callable(index)
-def _type_of_index(_context):
-    return lambda value: types.uintp
-
-
-@lower_builtin(index, types.Any)
+@operation(index, lambda value: types.uintp, types.Any)
 def _emit_index(context, builder, signature, args):
     return context.cast(builder, *args, *signature.args, signature.return_type)
 

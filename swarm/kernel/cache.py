@@ -18,7 +18,7 @@ import numba
 from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
 
-from .entries import File, Key, key_of
+from .entries import File, Key, is_own, key_of
 from .once import held, is_held
 
 _CONFIG: Any = numba.config
@@ -117,7 +117,7 @@ def kept(function: Callable[..., Any], flags: dict[str, Any], compiled: Callable
         _CONFIG.CACHE_DIR = previous
     disk = made._cache
     name, stamp = disk._impl.filename_base, disk._impl.locator.get_source_stamp()
-    if _is_own(function):
+    if is_own(function):
         # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
         # every comment.
         name, stamp = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}", ""
@@ -138,15 +138,11 @@ def calling(function: Callable[..., Any]) -> Callable[..., Any]:
     return functools.update_wrapper(scope[function.__name__], function, ("__module__", "__name__", "__qualname__"), ())
 
 
-def _is_own(function: Callable[..., Any]) -> bool:
-    return function.__module__.partition(".")[0] == __name__.partition(".")[0]
-
-
 class _Cache(FunctionCache):  # type: ignore[misc]
     """A kernel that has code from outside of this package is found only if that code is unchanged."""
 
     def _index_key(self, kinds: Any, codegen: Any) -> Key:
-        outside = () if _is_own(self._py_func) else (self._py_func,)
+        outside = () if is_own(self._py_func) else (self._py_func,)
         return key_of(kinds, *super()._index_key((), codegen), *outside)
 
     def save_overload(self, kinds: Any, made: Any) -> None:

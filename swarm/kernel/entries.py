@@ -60,6 +60,11 @@ def python_class(kind: Any) -> Any:
     return float if isinstance(kind, types.Float) else object
 
 
+def is_own(function: Any) -> bool:
+    """Whether a function is one of this package, by whose code the folder of kernels is named."""
+    return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
+
+
 class File(IndexDataCacheFile):  # type: ignore[misc]
     """The index and the kernels of one function, by `Key`."""
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import lower_builtin, type_callable
 
 from .trace.calls import operation
 
@@ -27,7 +26,6 @@ def sum_of(w, c):
     return (w.a * c.a + w.b * c.b) + (w.c * c.c + w.d * c.d)
 
 
-@operation
 def over_block(table: Any, place: Any, x: Any, y: Any) -> Four:
     """Along the third axis, the sums with the weights x and y over the first two, of the block that begins at a place.
 
@@ -45,12 +43,11 @@ def _weighted(w: Any, rows: Any) -> list[Any]:
     return [(w.a * p + w.b * q) + (w.c * s + w.d * t) for p, q, s, t in zip(*rows, strict=True)]
 
 
-@type_callable(over_block)
-def _type_of_sums(_context):
-    return lambda table, place, x, y: types.NamedUniTuple(types.float64, 4, Four)
+def _type_of_sums(table, place, x, y):
+    return types.NamedUniTuple(types.float64, 4, Four)
 
 
-@lower_builtin(over_block, types.Array, types.BaseNamedTuple, types.BaseNamedTuple, types.BaseNamedTuple)
+@operation(over_block, _type_of_sums, types.Array, *3 * (types.BaseNamedTuple,))
 def _emit_sums(context, builder, signature, args):
     kind = signature.args[0]
     table, four = context.make_array(kind)(context, builder, args[0]), ir.VectorType(ir.DoubleType(), 4)

@@ -2,8 +2,6 @@
 
 from .vector import Vec, absolute, dot
 
-Nothing = type(None)
-
 
 class Gravity(Vec):
     """Acceleration G [m/s^2]. A scene without gravity has None, which compiles to nothing."""

@@ -18,7 +18,7 @@ from . import cache
 from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler
 from .trace import calls
 from .trace.helpers import leaving, prepare
-from .trace.selection import select as select
+from .trace.ways import select as select
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.extending import lower_builtin, type_callable
 
 from .jit import Array, inlined, select
+from .trace.calls import operation
 
 
 class Vec(NamedTuple):
@@ -73,15 +73,11 @@ def _emitted(symbol: Any, instruction: str, first: Any, second: Any) -> None:
     """
     vectors = [kind is types.BaseNamedTuple for kind in (first, second)]
 
-    @type_callable(symbol)
-    def _type(_context):
-        def typed(a, b):
-            good = (_is_vector(k) if v else isinstance(k, types.Float) for k, v in zip((a, b), vectors, strict=True))
-            return _KIND if all(good) else None
+    def typed(a, b):
+        good = (_is_vector(k) if v else isinstance(k, types.Float) for k, v in zip((a, b), vectors, strict=True))
+        return _KIND if all(good) else None
 
-        return typed
-
-    @lower_builtin(symbol, first, second)
+    @operation(symbol, typed, first, second)
     def _emit(context, builder, signature, args):
         one, two = (
             [builder.extract_value(arg, k) for k in range(3)] if v else 3 * [arg]

@@ -77,7 +77,11 @@ def _decide(method, walls, gravity, share, i):
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
     if method.laws.give_heat and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
         return True
-    moving, settles = method.laws.moving, _settles(method, carried, gravity, p)
+    moving = method.laws.moving
+    if moving is not None:
+        settles = is_carried(method, carried, gravity, p)
+    else:
+        settles = events.settles(method, walls, gravity, p, scratch((2, walls.length()), np.float64))
     if again > _OFTEN or settles:
         found = events.Next(CAREFUL, v, 0.0, p.twice, wall, -1.0, 0.0, 0.0)
     elif first < 0.0:
@@ -109,13 +113,6 @@ def _decide(method, walls, gravity, share, i):
     contacts.phase[i] = phase if phase in (HELD, EDGE) else FLYING
     share.hand_over(i, phase)
     return again < _MOST
-
-
-def _settles(method, walls, gravity, p):
-    """Whether the walls around a particle hold it."""
-    if method.laws.moving is not None:
-        return is_carried(method, walls, gravity, p)
-    return events.settles(method, walls, gravity, p, scratch((2, walls.length()), np.float64))
 
 
 @outlined

@@ -85,14 +85,11 @@ class Log(NamedTuple):
             struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.remaining, before.impulse)
             self._add(state, lanes.particle[i], struck, self._slip_of(method, walls, struck))
 
+    @outlined
     def add_row(self, method, walls, state, particle, struck):
         """A row for an impact of a particle."""
         if self.has(particle):
-            self._add_impact(method, walls, state, particle, struck)
-
-    @outlined
-    def _add_impact(self, method, walls, state, particle, struck):
-        self._add(state, particle, struck, self._slip_of(method, walls, struck))
+            self._add(state, particle, struck, self._slip_of(method, walls, struck))
 
     @outlined
     def add_escape(self, state, particle, struck):

@@ -73,16 +73,8 @@ class Lanes(Record):
 
 def empty(period: Any = None, openings: Any = None) -> Lanes:
     """Lanes for one block."""
-    return Lanes(
-        table(Sliding.ALL),
-        np.zeros(STRIDE, np.int64),
-        np.zeros(STRIDE, np.bool_),
-        np.zeros(STRIDE, np.int64),
-        table(1)[0],
-        table(1)[0],
-        period,
-        openings,
-    )
+    particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
+    return Lanes(table(Sliding.ALL), particle, unsolved, event, *table(2), period, openings)
 
 
 class Slide(Record):

@@ -49,11 +49,7 @@ def stay(slide, i):
         if not (_rests_later(slide, lane, middle) and _rests_later(slide, lane, high)):
             break
         # Simpson's rule for what presses
-        one, two, three = (
-            _press_later(slide, lane, low),
-            _press_later(slide, lane, middle),
-            _press_later(slide, lane, high),
-        )
+        one, two, three = tuple(_press_later(slide, lane, t) for t in (low, middle, high))
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
         low, met, paces = high, clear.wall, paces + 1.0
@@ -101,12 +97,8 @@ def _rubs(slide, now, lane, slowest):
 @outlined
 def _clear(slide, lane, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
-    walls, remaining, active, near = (
-        slide.walls,
-        lane.remaining,
-        slide.active(lane),
-        crossing.near(slide.method, lane.r),
-    )
+    walls, remaining, active = slide.walls, lane.remaining, slide.active(lane)
+    near = crossing.near(slide.method, lane.r)
     time, step, met = low, high - low, -1.0
     for _k in range(_MOST_STEPS):
         end = high if time + step >= high else time + step

@@ -1,8 +1,7 @@
 """Motions of led points and of walls: those that a user gives, and the poses of walls that follow."""
 
 from .given import Led, Motion, Oscillation, Rotation, Sum, Translation, led, parts_of, unit_axis
-from .poses import Pose, pose
-from .wall import Guide, Path, Placed, WallMotion, parts_of_wall, require_freedom, table_of
+from .wall import Guide, Path, Placed, Pose, WallMotion, parts_of_wall, pose, require_freedom, table_of
 
 __all__ = [
     "Guide", "Led", "Motion", "Oscillation", "Path", "Placed", "Pose", "Rotation", "Sum", "Translation", "WallMotion",

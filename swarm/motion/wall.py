@@ -1,9 +1,15 @@
-"""Motions of walls: along a path, of several at once, along a guide; and what a scene file says of them."""
+"""Motions of walls: along a path, of several at once, along a guide; what a scene file says of them; and poses.
+
+A wall that is given at rest as the points xi is at time t where
+    x(t) = c + d(t) + A(t) (xi - c),
+with the displacement d, and the rotation A about the centre c, both of one motion or of the sum of several.
+"""
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +18,20 @@ from .. import checks
 from ..checks import Vector
 from ..errors import SceneError
 from ..notebook import shortened
-from .given import Floats, Given, Led, Oscillation, Rotation, Sum, Translation, axis_of, parts_of, point_of, vector_of
+from .given import (
+    Floats,
+    Given,
+    Led,
+    Oscillation,
+    Rotation,
+    Sum,
+    Translation,
+    axis_of,
+    parts_of,
+    point_of,
+    unit_axis,
+    vector_of,
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -213,3 +232,65 @@ def table_of(motion: "WallMotion") -> Any:
     names = {cls: kind for kind, cls in KINDS.items()}
     tables = [{"kind": names[type(one)], **asdict(one)} for one in parts_of(motion)]
     return tables[0] if len(tables) == 1 else tables
+
+
+# --- Poses -----------------------------------------------------------------------------------------------
+
+
+class Pose(NamedTuple):
+    """The place and orientation of a wall: x = center + shift + turn (xi - center)."""
+
+    shift: Floats  # (3,) [m]
+    turn: Floats  # (3, 3)
+    center: Floats  # (3,) [m]
+    quaternion: tuple[float, float, float, float]  # of the turn, (w, x, y, z)
+
+    def position(self) -> Floats:
+        """The place (3,) of the origin of the frame in which the wall is given."""
+        return np.asarray(self.center + self.shift - product(self.turn, self.center))
+
+    def placed(self, points: Floats) -> Floats:
+        """Points (3, N) of the wall as it is given, where they are now."""
+        middle = self.center[:, None]
+        return np.asarray(middle + self.shift[:, None] + product(self.turn, points - middle))
+
+    def turned(self, vectors: Floats) -> Floats:
+        """Vectors (3, N) of the frame of the wall in the scene."""
+        return product(self.turn, vectors)
+
+    def given(self, points: Floats) -> Floats:
+        """Points (3, N) of the scene in the frame in which the wall is given."""
+        middle = self.center[:, None]
+        return np.asarray(middle + product(self.turn.T, points - self.shift[:, None] - middle))
+
+
+def pose(motion: WallMotion | None, time: float) -> Pose:
+    """The pose of a wall with this motion at a time [s]."""
+    found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
+    for one in parts_of(motion):
+        if isinstance(one, Placed):
+            found, quaternion, turn = np.array(one.position), one.orientation, np.array(one.turn)
+        elif isinstance(one, Rotation):
+            center, turn, half = np.array(one.center), _turned_by(one, one.rate * time), 0.5 * one.rate * time
+            x, y, z = (math.sin(half) * unit_axis(one)).tolist()
+            quaternion = (math.cos(half), x, y, z)
+        elif isinstance(one, Path):
+            found = found + one.displacement(time)
+        else:
+            found = found + one.harmonic((0.0, 0.0, 0.0)).position(time)
+    return Pose(found, turn, center, quaternion)
+
+
+def _turned_by(rotation: Rotation, angle: float) -> Floats:
+    """The matrix (3, 3) of a rotation by an angle [rad]."""
+    # Rodrigues: cos a + (1 - cos a) k k^T + sin a [k], where 1 - cos a = 2 sin^2(a/2)
+    k, half = unit_axis(rotation), math.sin(0.5 * angle)
+    across = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    versine = 2.0 * half * half
+    return np.asarray((1.0 - versine) * np.eye(3) + versine * np.multiply.outer(k, k) + math.sin(angle) * across)
+
+
+def product(matrix: Floats, other: ArrayLike) -> Floats:
+    """(3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
+    rows = np.asarray(other)
+    return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))

@@ -12,7 +12,7 @@ from ..motion import Guide, Rotation, Translation, pose, unit_axis
 from ..scene import Scene
 from ..surfaces.surface import Surface
 from ..surfaces.walls import Walls
-from .freedoms import Free, Freedoms, Guided, Sprung
+from .freedoms import Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import Scenery
 from .walls import Reacting
@@ -56,12 +56,11 @@ def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) ->
     assert surface.mass is not None
     lightness = 1.0 / surface.mass
     if not isinstance(motion, Guide):
-        return Free(row, lightness, vec(gravity))
+        return Shifted(row, lightness, vec(gravity), None, None)
     axis = unit_axis(motion)
     pull = _vector(float((axis * gravity).sum()) * axis)
-    if motion.stiffness > 0.0:
-        return Sprung(row, lightness, pull, _vector(axis), math.sqrt(motion.stiffness * lightness))
-    return Guided(row, lightness, pull, _vector(axis))
+    rate = math.sqrt(motion.stiffness * lightness) if motion.stiffness > 0.0 else None
+    return Shifted(row, lightness, pull, _vector(axis), rate)
 
 
 def _turning(surface: Surface, row: int, gravity: Floats) -> Hinged | Pendulum:

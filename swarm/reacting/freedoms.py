@@ -5,7 +5,7 @@ the velocity stays within a width of a middle one, so that what was said of far 
 """
 
 import math
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, select
@@ -17,7 +17,6 @@ from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
 from ..surfaces.relative import flight_of
 from ..surfaces.walls import Walls
-from .reach import Seen, reach_of
 
 
 class Freedoms(NamedTuple):
@@ -45,6 +44,25 @@ class Flight(NamedTuple):
     pull: Vec
     time: float
     longest: float
+
+
+class Lease(Record):
+    """A particle in the frame that moves with the middle velocity of a lease, which the wall leaves by little.
+
+    There the wall stays within the width times the time of where it is: for a plane and a ball the first time at which
+    a flight is as near as that is the root of a parabola.
+    """
+
+    r: Vec
+    v: Vec
+    a: Vec
+    width: float
+    axis: Any  # along which the wall may leave it, or None
+    longest: float
+
+    def width_along(self, n):
+        """The width along a unit vector."""
+        return self.width if self.axis is None else self.width * abs(dot(self.axis, n))
 
 
 class Falling(Posed):
@@ -90,13 +108,29 @@ class Freedom(Record):
         """Give the wall an impulse at a time, at the end of an arm from its centre."""
         raise NotImplementedError
 
+    def begin_lease(self, walls, t):
+        """Make the velocity at a time the middle of a lease."""
+        raise NotImplementedError
+
+    def away(self, walls):
+        """How far the velocity is from the middle of its lease."""
+        raise NotImplementedError
+
+    def keeps(self, walls, more):
+        """How long the wall stays in its lease [s] by what pulls it, while its velocity may change by so much more."""
+        raise NotImplementedError
+
     def renew(self, walls, t):
         """A new lease from a time on, about the velocity that the wall has."""
-        raise NotImplementedError
+        k = index(self.row)
+        self.begin_lease(walls, t)
+        walls.until[k] = t + self.keeps(walls, walls.width[k])
 
     def stays(self, walls):
         """Whether a wall that was just struck is within its lease; says until when."""
-        raise NotImplementedError
+        k, away = index(self.row), self.away(walls)
+        walls.until[k] = walls.time[k] + self.keeps(walls, walls.width[k] - away)
+        return away < walls.width[k]
 
     def reach(self, body, walls, flight):
         """A time during which the flight surely does not meet this wall, at most the longest that matters."""
@@ -117,120 +151,97 @@ def march(wall, flight, longest):
 
 
 class Shifted(Freedom):
-    """A wall that does not turn, pulled by its weight: in any direction, or along the `axis` of a guide."""
+    """A wall that does not turn, pulled by its weight: in any direction, or along a guide, where it may have a spring.
 
-    axis = cast(Any, None)
+    The spring is relaxed where the wall is given.
+    """
 
-    def pose(self: Any, walls, t):
-        # s = s0 + V t + a t^2/2
+    row: int
+    lightness: float
+    pull: Vec  # along the axis, if there is one
+    axis: Any  # of the guide, or None
+    rate: Any  # of the vibration on the spring [rad/s], or None
+
+    def pose(self, walls, t):
         k = index(self.row)
         t = t - walls.time[k]
+        if self.rate is not None:
+            # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
+            rate, (away, speed) = self.rate, self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
+            c, s = math.cos(rate * t), math.sin(rate * t)
+            here = c * away + s * speed
+            return Pose(self.equilibrium() + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+        # s = s0 + V t + a t^2/2
         v, pull = column(walls.velocity, 0, k), self.pull
         return Pose(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
 
-    def posed(self: Any, body, walls, t):
-        here = self.pose(walls, t)
-        return Falling(body, here, here, _AT_REST, 0.0, 0.0)
+    def equilibrium(self):
+        """The displacement at which the spring holds it."""
+        return self.pull / (self.rate * self.rate)
 
-    def mobility(self: Any, n, arm):
-        if self.axis is None:
-            return self.lightness * square(n)
-        along = dot(n, self.axis)
-        return self.lightness * along * along
-
-    def push(self: Any, walls, t, impulse, arm):
-        change = self.lightness * impulse
-        if self.axis is not None:
-            change = (self.lightness * dot(impulse, self.axis)) * self.axis
-        k, here = index(self.row), self.pose(walls, t)
-        more = change + column(walls.rest, 0, k)
-        x, y, z = (
-            exact_sum(here.velocity.x, more.x),
-            exact_sum(here.velocity.y, more.y),
-            exact_sum(here.velocity.z, more.z),
-        )
-        put(walls.shift, 0, k, here.shift)
-        put(walls.velocity, 0, k, Vec(x[0], y[0], z[0]))
-        put(walls.rest, 0, k, Vec(x[1], y[1], z[1]))
-        walls.time[k] = t
-
-    def hardest(self: Any, walls):
-        """A bound of the wall's acceleration between impacts [m/s^2]."""
-        return norm(self.pull)
-
-    def renew(self: Any, walls, t):
-        put(walls.middle, 0, index(self.row), self.pose(walls, t).velocity)
-        self._extend(walls, t, 0.0)
-
-    def stays(self: Any, walls):
-        k = index(self.row)
-        away = norm(column(walls.velocity, 0, k) - column(walls.middle, 0, k))
-        self._extend(walls, walls.time[k], away)
-        return away < walls.width[k]
-
-    def _extend(self: Any, walls, t, away):
-        k, most = index(self.row), self.hardest(walls)
-        walls.until[k] = select(most > 0.0, t + (walls.width[k] - away) / select(most > 0.0, most, 1.0), math.inf)
-
-    def reach(self: Any, body, walls, flight):
-        k = index(self.row)
-        r, v = flight.r - self.pose(walls, flight.time).shift, flight.v - column(walls.middle, 0, k)
-        return reach_of(body, Seen(r, v, flight.pull, walls.width[k], self.axis, flight.longest))
-
-    def hit(self: Any, body, gravity, walls, flight):
-        return flights.hit(gravity, self.posed(body, walls, flight.time), flight.r, flight.v)
-
-
-class Free(Shifted):
-    """A wall that moves in any direction."""
-
-    row: int
-    lightness: float
-    pull: Vec
-
-
-class Guided(Shifted):
-    """A wall that moves along a guide."""
-
-    row: int
-    lightness: float
-    pull: Vec  # along the axis
-    axis: Vec
-
-
-class Sprung(Shifted):
-    """A wall on a guide with a spring, which is relaxed where the wall is given."""
-
-    row: int
-    lightness: float
-    pull: Vec
-    axis: Vec
-    rate: float  # of its vibration [rad/s]
-
-    def pose(self, walls, t):
-        # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
-        k, rate = index(self.row), self.rate
-        angle = rate * (t - walls.time[k])
-        rest = self.pull / (rate * rate)
-        c, s = math.cos(angle), math.sin(angle)
-        away, speed = column(walls.shift, 0, k) - rest, column(walls.velocity, 0, k) / rate
-        here = c * away + s * speed
-        return Pose(rest + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+    def swing(self, shift, velocity):
+        """How far it is from there, and its velocity over the rate."""
+        return shift - self.equilibrium(), velocity / self.rate
 
     def drive(self, walls, t):
         found, rate = self.pose(walls, t), self.rate
-        away, speed = found.shift - self.pull / (rate * rate), found.velocity / rate
+        away, speed = self.swing(found.shift, found.velocity)
         most = math.sqrt(square(away) + square(speed))
         bounds = rate * most, rate * rate * most, rate * rate * rate * most
         swings, jerks = (Swing(away, speed, rate),), Vec(bounds[2], bounds[2], bounds[2])
         return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
 
-    def hardest(self, walls):
-        k, rate = index(self.row), self.rate
-        away, speed = column(walls.shift, 0, k) - self.pull / (rate * rate), column(walls.velocity, 0, k) / rate
-        return rate * rate * math.sqrt(square(away) + square(speed))
+    def posed(self, body, walls, t):
+        if self.rate is not None:
+            return super().posed(body, walls, t)
+        here = self.pose(walls, t)
+        return Falling(body, here, here, _AT_REST, 0.0, 0.0)
 
-    posed, hit = Freedom.posed, Freedom.hit
+    def mobility(self, n, arm):
+        if self.axis is None:
+            return self.lightness * square(n)
+        along = dot(n, self.axis)
+        return self.lightness * along * along
+
+    def push(self, walls, t, impulse, arm):
+        change = self.lightness * impulse
+        if self.axis is not None:
+            change = (self.lightness * dot(impulse, self.axis)) * self.axis
+        k, here = index(self.row), self.pose(walls, t)
+        velocity, rest = exact_sum(here.velocity, change + column(walls.rest, 0, k))
+        put(walls.shift, 0, k, here.shift)
+        put(walls.velocity, 0, k, velocity)
+        put(walls.rest, 0, k, rest)
+        walls.time[k] = t
+
+    def hardest(self, walls):
+        """A bound of the wall's acceleration between impacts [m/s^2]."""
+        if self.rate is None:
+            return norm(self.pull)
+        k = index(self.row)
+        away, speed = self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
+        return self.rate * self.rate * math.sqrt(square(away) + square(speed))
+
+    def begin_lease(self, walls, t):
+        put(walls.middle, 0, index(self.row), self.pose(walls, t).velocity)
+
+    def away(self, walls):
+        k = index(self.row)
+        return norm(column(walls.velocity, 0, k) - column(walls.middle, 0, k))
+
+    def keeps(self, walls, more):
+        most = self.hardest(walls)
+        return select(most > 0.0, more / select(most > 0.0, most, 1.0), math.inf)
+
+    def reach(self, body, walls, flight):
+        k = index(self.row)
+        r, v = flight.r - self.pose(walls, flight.time).shift, flight.v - column(walls.middle, 0, k)
+        return body.reach(Lease(r, v, flight.pull, walls.width[k], self.axis, flight.longest))
+
+    def hit(self, body, gravity, walls, flight):
+        if self.rate is not None:
+            return super().hit(body, gravity, walls, flight)
+        return flights.hit(gravity, self.posed(body, walls, flight.time), flight.r, flight.v)
 
 
 def exact_sum(a, b):

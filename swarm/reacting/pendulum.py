@@ -14,7 +14,6 @@ from ..surfaces.drive import Drive, Pose, Rows, Turn
 from ..surfaces.moving import Driven
 from ..surfaces.posed import Posed
 from .freedoms import Freedom, exact_sum, march
-from .reach import clear_of
 
 # Terms of the polynomial, and the part of the radius that it is for.
 TERMS, _PART = 17, 0.1
@@ -34,16 +33,20 @@ class Turning(Freedom):
         lever = self.lever(n, arm)
         return self.lightness * lever * lever
 
-    def stays(self: Any, walls):
+    def begin_lease(self: Any, walls, t):
         k = index(self.row)
-        return abs(walls.rate[k] - walls.turning[k]) < walls.width[k]
+        walls.turning[k] = walls.rate[k]
+
+    def away(self: Any, walls):
+        k = index(self.row)
+        return abs(walls.rate[k] - walls.turning[k])
 
     def reach(self: Any, body, walls, flight):
         # No point of the wall within the arm and the clearance is faster than the rate says.
         k = index(self.row)
         arm, turn = self.arm(flight.r), self.pose(walls, flight.time).turn
         own = self.center + turn.x * arm.x + turn.y * arm.y + turn.z * arm.z
-        clear = max(clear_of(body, own), 0.0)
+        clear = max(body.far(own), 0.0)
         fastest = (abs(walls.turning[k]) + walls.width[k]) * (norm(arm) + clear) + norm(flight.v)
         return rise_time(-clear, 0.5 * fastest, 0.5 * norm(flight.pull))
 
@@ -73,9 +76,8 @@ class Hinged(Turning):
         walls.rate[k], walls.rate_rest[k] = exact_sum(walls.rate[k], change + walls.rate_rest[k])
         walls.time[k] = t
 
-    def renew(self, walls, t):
-        k = index(self.row)
-        walls.turning[k], walls.until[k] = walls.rate[k], math.inf
+    def keeps(self, walls, more):
+        return math.inf
 
 
 def rows_about(axis, angle):
@@ -170,21 +172,14 @@ class Pendulum(Turning):
         walls.time[k] = t
         self.expand(walls)
 
-    def renew(self, walls, t):
+    def begin_lease(self, walls, t):
         self.push(walls, t, ZERO, ZERO)
-        k = index(self.row)
-        walls.turning[k] = walls.rate[k]
-        self._extend(walls)
+        super().begin_lease(walls, t)
 
-    def stays(self, walls):
-        self._extend(walls)
-        return Turning.stays(self, walls)
-
-    def _extend(self, walls):
-        """The lease lasts as long as the weight leaves the rate in it, and the polynomial is good."""
-        k, most = index(self.row), self.stiffness
-        remaining = (walls.width[k] - abs(walls.rate[k] - walls.turning[k])) / most
-        walls.until[k] = walls.time[k] + min(remaining, _PART / (math.sqrt(most) + abs(walls.rate[k])))
+    def keeps(self, walls, more):
+        # As long as the weight leaves the rate in it, and the polynomial is good
+        most, rate = self.stiffness, walls.rate[index(self.row)]
+        return min(more / most, _PART / (math.sqrt(most) + abs(rate)))
 
     def hit(self, body, gravity, walls, flight):
         # What comes after the lease is asked again then.

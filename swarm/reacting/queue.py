@@ -8,8 +8,6 @@ heap, not a prediction for every particle.
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..contact.laws import Laws
 from ..contact.reflection import Energy, exact
 from ..kernel.arrays import index
@@ -21,7 +19,7 @@ from ..status import Status
 from ..surfaces import flights, safe
 from ..surfaces.moving import Marched
 from .freedoms import Flight
-from .walls import all_stay, first_hit, reach_of_all, renew_all, settle_all, strike
+from .walls import all_stay, first_hit, reach_of_all, strike
 
 # What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
 # found, so that it is looked at again.
@@ -79,17 +77,13 @@ class Rule(NamedTuple):
 # --- Of one particle -------------------------------------------------------------------------------------
 
 
-def _given_hit(walls, gravity, r, v, remaining):
-    """The first hit with the walls that do not react."""
-    if isinstance(walls, Marched):
-        return safe.first_hit(walls, gravity, r, v, remaining)
-    return flights.first_hit(walls.at(remaining), gravity, r, v)
-
-
 def _aim(scenery, queue, i, end):
     """Find when particle i meets a wall that does not react, from where it is."""
-    t, r, v = queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
-    hit = _given_hit(scenery.given, scenery.pull, r, v, end - t)
+    walls, t, r, v = scenery.given, queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
+    if isinstance(walls, Marched):
+        hit = safe.first_hit(walls, scenery.pull, r, v, end - t)
+    else:
+        hit = flights.first_hit(walls.at(end - t), scenery.pull, r, v)
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 
@@ -194,22 +188,16 @@ def arrive(scenery, queue, rule, first, last):
 @long_kernel
 def lease(scenery, freedoms, clock):
     """New leases of the walls, from the time of the clock on."""
-    renew_all(scenery.reacting, freedoms, clock[NOW])
+    for wall in scenery.reacting:
+        wall.freedom.renew(freedoms, clock[NOW])
     clock[TAKEN] = 0.0
 
 
 @long_kernel
 def settle(scenery, freedoms, t):
-    """Bring the walls to a time of the frame."""
-    settle_all(scenery.reacting, freedoms, t)
-
-
-def _until(freedoms):
-    """When the first lease may end without a strike."""
-    first = np.inf
-    for k in range(freedoms.until.size):
-        first = min(first, freedoms.until[k])
-    return first
+    """Bring the walls to a time of the frame, which their motions are counted from."""
+    for wall in scenery.reacting:
+        wall.freedom.push(freedoms, t, ZERO, ZERO)
 
 
 def _list(queue, close, i):
@@ -268,7 +256,9 @@ def take(scenery, freedoms, queue, clock, rule):
     """
     heap, end, taken = queue.heap, rule.end, 0
     build(heap)
-    close, until = _listed(queue), _until(freedoms)
+    close = _listed(queue)
+    # When the first lease may end without a strike
+    until = min(freedoms.until)
     while True:
         item = heap.item[0]
         i = index(item)
@@ -287,7 +277,7 @@ def take(scenery, freedoms, queue, clock, rule):
             clock[STRIKES] += 1.0
             if not all_stay(scenery.reacting, wall, freedoms):
                 return Status.LEASE_ENDED.value, 0
-            until = _until(freedoms)
+            until = min(freedoms.until)
             close = _look_again(scenery, freedoms, queue, clock, rule, close)
         change(heap, item, _next(scenery, freedoms, queue, i, now, end, _soon(clock)))
         close = _list(queue, close, i)

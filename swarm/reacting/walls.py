@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, square
+from ..kernel.vector import Vec, dot, square
 from ..surfaces.flights import NEVER, sooner
 
 
@@ -75,24 +75,9 @@ def strike(reacting, wall, walls, flight, mass):
     return Blow(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
 
 
-# --- Leases ----------------------------------------------------------------------------------------------
-
-
-def renew_all(reacting, walls, t):
-    """New leases of all walls, from this time on."""
-    for wall in reacting:
-        wall.freedom.renew(walls, t)
-
-
 def all_stay(reacting, wall, walls):
     """Whether the wall with this number, which was just struck, is within its lease."""
     for k, one in enumerate(reacting):
         if wall == k:
             return one.freedom.stays(walls)
     return True
-
-
-def settle_all(reacting, walls, t):
-    """Bring every wall to a time, which its motion is counted from."""
-    for wall in reacting:
-        wall.freedom.push(walls, t, ZERO, ZERO)

@@ -15,7 +15,7 @@ from ..kernel.jit import select
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
 from . import approach, flights, march, newton
 from .at_rest import AtRest
-from .course import first_rise, safe_rise_time
+from .course import first_rise, rise_time, safe_rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
@@ -193,6 +193,20 @@ class Smooth(AtRest):
     def clearance(self, r):
         """Lower bound of the distance to the wall; 0 if unknown."""
         return 0.0
+
+    def out_of(self, r):
+        """Lower bound of the distance of a point from a part of a solid; below 0 in it."""
+        return self.clearance(r)
+
+    def far(self, r):
+        """Lower bound of the distance to the wall: `clearance`, also in a frame, and of the parts of a solid."""
+        return self.clearance(r)
+
+    def reach(self, lease):
+        """A time during which a particle surely does not meet the wall, which keeps a `Lease` and does not turn."""
+        # The distance is all that is known.
+        clear = max(self.far(lease.r), 0.0)
+        return rise_time(-clear, 0.5 * (norm(lease.v) + lease.width), 0.5 * norm(lease.a))
 
     def may_reach(self, low, high):
         """Whether a solid may have a point in common with a box with these corners; its bounds do."""

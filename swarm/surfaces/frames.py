@@ -22,6 +22,9 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("inner_gradient", ("place",), "vector"),
     ("unit_normal", ("place",), "vector"),
     ("project", ("place",), "place"),
+    ("out_of", ("place",), None),
+    ("far", ("place",), None),
+    ("reach", ("lease",), None),
     ("farthest_push", (), None),
     ("first_hit", ("place", "velocity"), None),
     ("falling_hit", ("place", "velocity", "vector"), None),
@@ -63,6 +66,10 @@ class Framed(Smooth):
     def seen_in(self, seen):
         """A particle as the wall sees it, in the frame of the body."""
         return seen._replace(r=self.place_in(seen.r), v=self.vector_in(seen.v), a=self.vector_in(seen.a))
+
+    def lease_in(self, lease):
+        """A `Lease` in the frame of the body."""
+        return self.seen_in(lease)._replace(axis=None if lease.axis is None else self.vector_in(lease.axis))
 
 
 def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> Any:

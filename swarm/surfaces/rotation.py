@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..checks import Vector, number, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.vector import Vec, dot, vec
+from ..motion.wall import product as product
 from .frames import Framed
 
 Quaternion = tuple[float, float, float, float]
@@ -82,12 +83,6 @@ def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ]
     )
-
-
-def product(matrix: NDArray[np.float64], other: ArrayLike) -> NDArray[np.float64]:
-    """(3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
-    rows = np.asarray(other)
-    return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))
 
 
 def onto(axis: Vector) -> Quaternion | None:

@@ -16,11 +16,11 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.registry import default_manager
 from numba.core.typing.templates import Signature
+from numba_internals import ALL
 from test_helpers import loop_with_else
 
 import swarm
 from swarm.kernel import cache, compilers, jit
-from swarm.kernel.internals import ALL
 
 pytestmark = compiled_only
 PACKAGE = Path(swarm.__file__).parent
@@ -64,7 +64,7 @@ def test_the_list_is_complete():
     for path, name in found:
         name = name.removeprefix("numba.")
         known = name in ALL or pkgutil.resolve_name(f"numba.{name}") is numba.np.linalg
-        assert known, f"{path} takes {name}, which swarm/kernel/internals.py does not have"
+        assert known, f"{path} takes {name}, which numba_internals.py does not have"
 
 
 # --- Types -----------------------------------------------------------------------------------------------

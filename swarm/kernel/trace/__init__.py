@@ -13,15 +13,13 @@ all of its users, would have to be written so, and plain Python would pay for th
 
     values      proxies: numbers and arrays that are known in the kernel only
     notes       what is noted
-    part        a helper as a function of its own in a kernel
-    ways        one value of a variable where several ways meet
+    ways        one value of a variable where several ways meet; `select`
     decisions   branches and returns of one call
     frame       its loops
     source      the syntax tree of a function
     expressions, twins   the same function, whose calls and control flow go through a frame
-    selection   `select`
     calls       what a call means: an operation, or a function that is traced in its turn
-    emit        the notes as instructions
+    emit        a helper as a function of its own in a kernel, and notes as instructions
     helpers     the bridge to Numba
 
 What cannot be traced (`try`, `with`, lists, a function whose source is not known) is compiled by Numba as before;

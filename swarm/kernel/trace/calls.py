@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
+from numba.extending import lower_builtin, type_callable
 
+from ..entries import is_own
 from .frame import Frame, Range
 from .notes import taken
-from .selection import select, traced_select
 from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
-from .ways import unified
+from .ways import select, traced_select, unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
 OPERATIONS: set[Any] = {
@@ -84,10 +85,11 @@ _ARRAY_FUNCTION = type(np.sum)
 _IN_PLACE = (list, dict, set)
 
 
-def operation(function: Any) -> Any:
-    """Of a function that has a type and a lowering of its own for Numba: traces note it."""
+def operation(function: Any, typed: Callable[..., Any], *kinds: Any) -> Any:
+    """A decorator of the instructions of a function for arguments of such types; `typed` is the type of its result."""
     OPERATIONS.add(function)
-    return function
+    type_callable(function)(lambda _context: typed)
+    return lower_builtin(function, *kinds)
 
 
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
@@ -108,15 +110,11 @@ def called(function: Any, /, *given: Any, **named: Any) -> Any:
     if any(one is UNDEFINED for one in given):
         bool(UNDEFINED)
     if isinstance(function, python_types.FunctionType):
-        return traced(function, given, named) if _is_own(function) else _foreign(function, given, named)
+        return traced(function, given, named) if is_own(function) else _foreign(function, given, named)
     is_python = getattr(function, "__module__", None) == "builtins"
     if function in _IN_PLACE or (is_python and any(isinstance(one, Value) for one in given)):
         raise TraceError(f"it asks {name_of(function)} about a number that is known in the kernel only")
     return function(*given, **named)
-
-
-def _is_own(function: Any) -> bool:
-    return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 
 def _refused(function: Any, error: Exception) -> None:

@@ -1,17 +1,76 @@
-"""The notes of a trace as instructions of LLVM, each operation by Numba's own lowering."""
+"""Parts of a kernel, helpers as functions of their own for some types of arguments, and their notes as instructions.
+
+Each operation is emitted by Numba's own lowering.
+"""
 
 import functools
+import itertools
 from typing import Any, ClassVar
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.registry import default_manager
 from numba.np.arrayobj import load_item, store_item
 
-from .notes import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, PartCall, Slot
-from .part import Part
-from .values import Value, kind_of
+from .notes import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, PartCall, Slot, add
+from .values import TraceError, Value, is_defined, kind_of, leaves, made_of, opened
+
+_part_numbers = itertools.count()
+
+
+class Part:
+    """A function of a kernel: the notes of a helper, its arguments and its result, a number each."""
+
+    def __init__(self, name: str, inlined: bool) -> None:
+        self.name, self.inlined, self.number = name, inlined, next(_part_numbers)
+        self.arguments: list[Argument] = []
+        self.notes: list[Any] = []
+        self.result: Any = None
+        self.kind: Any = None
+        self.numbers: list[Value] = []
+
+    def take(self, given: Any) -> Any:
+        """The same with an argument in the place of every number that is not a type of its own."""
+        if isinstance(given, tuple):
+            return made_of(given, map(self.take, given))
+        if not _is_argument(given):
+            return given
+        self.arguments.append(Argument(kind_of(given), len(self.arguments)))
+        return opened(self.arguments[-1].kind, self.arguments[-1])
+
+    def give(self, result: Any) -> None:
+        """Its result: a constant of it stays one for who calls it."""
+        self.result, self.numbers = result, [one for one in leaves(result) if isinstance(one, Value)]
+        if not is_defined(result):
+            raise TraceError("its result has values of several kinds")
+
+    def called(self, given: Any) -> Any:
+        """Note a call of it; what it gives."""
+        note, numbers = add(PartCall(self, [one for one in leaves(given) if _is_argument(one)])), itertools.count()
+
+        def again(result: Any) -> Any:
+            if isinstance(result, tuple):
+                return made_of(result, map(again, result))
+            return opened(result.kind, note, (next(numbers),)) if isinstance(result, Value) else result
+
+        return again(self.result)
+
+
+def _is_argument(given: Any) -> bool:
+    """Whether a part takes it as an argument: a whole number or a truth that is known makes another part."""
+    return isinstance(given, (Value, float, np.generic))
+
+
+def key_of(given: Any) -> Any:
+    """What tells one part of a helper from another: the types of its arguments, and what is known of them."""
+    if isinstance(given, tuple):
+        return (type(given), *map(key_of, given))
+    return ("a number", kind_of(given)) if _is_argument(given) else (type(given), given)
+
+
+# --- Instructions ----------------------------------------------------------------------------------------
 
 
 def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
@@ -199,10 +258,8 @@ def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
     function = module.globals.get(name)
     if function is not None:
         return function, result
-    status, (_place, error) = (
-        context.call_conv.get_function_type(types.none, ()).return_type,
-        (context.call_conv.get_function_type(types.none, ()).args[:2]),
-    )
+    numbas = context.call_conv.get_function_type(types.none, ())
+    status, error = numbas.return_type, numbas.args[1]
     kinds = [context.get_value_type(one.kind) for one in part.arguments]
     function = ir.Function(module, ir.FunctionType(status, [result.as_pointer(), error, *kinds]), name)
     function.linkage = "internal"

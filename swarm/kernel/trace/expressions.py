@@ -5,7 +5,7 @@ import copy
 from types import CodeType
 from typing import Any
 
-from .source import FRAME
+from .source import FRAME, arguments
 
 
 def load(name: str) -> ast.Name:
@@ -20,7 +20,7 @@ def of_frame(name: str, *given: ast.expr) -> ast.Call:
 
 def without_arguments(body: Any) -> ast.Lambda:
     """An expression as a function."""
-    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), body)
+    return ast.Lambda(arguments(), body)
 
 
 class Expressions(ast.NodeTransformer):

@@ -17,9 +17,8 @@ from numba.extending import lower_builtin
 from ..cache import is_disabled
 from . import calls, values
 from .calls import traced
-from .emit import emit
+from .emit import Part, emit, key_of
 from .notes import Argument, context, noting, taken
-from .part import Part, key_of
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent

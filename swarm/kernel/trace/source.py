@@ -28,6 +28,11 @@ def node_of(code: types.CodeType) -> Any:
     return None
 
 
+def arguments(*names: str) -> ast.arguments:
+    """Arguments without defaults."""
+    return ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+
+
 def definition(name: str, arguments: ast.arguments, body: list[Any]) -> ast.FunctionDef:
     """The syntax of a function."""
     made = ast.FunctionDef(name, arguments, body, [], None, None)
@@ -37,10 +42,8 @@ def definition(name: str, arguments: ast.arguments, body: list[Any]) -> ast.Func
 
 def compiled(node: Any, code: types.CodeType) -> types.CodeType:
     """A function inside one of its frame and its free variables."""
-    names = [FRAME, *code.co_freevars]
-    arguments = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
     result = ast.Return(ast.Name(node.name, ast.Load()))
-    outer = definition("make", arguments, [node, result])
+    outer = definition("make", arguments(FRAME, *code.co_freevars), [node, result])
     tree = ast.fix_missing_locations(ast.Module([ast.copy_location(outer, node)], []))
     whole = compile(tree, code.co_filename, "exec", dont_inherit=True)
     return _inner(whole)

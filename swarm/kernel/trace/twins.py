@@ -22,7 +22,7 @@ import numpy as np
 
 from .expressions import Expressions, load, of_frame, without_arguments
 from .frame import Frame
-from .source import FRAME, compiled, definition, node_of
+from .source import FRAME, arguments, compiled, definition, node_of
 from .values import UNDEFINED, TraceError
 
 
@@ -132,12 +132,12 @@ class _Writer(Expressions, ast.NodeTransformer):
             ast.Assign([ast.Name(name, ast.Store())], ast.Attribute(load(FRAME), "UNDEFINED", ast.Load()))
             for name in _assigned(node.body) if name not in names
         ]  # fmt: skip
-        arguments = ast.arguments(
+        given = ast.arguments(
             [ast.arg(one.arg) for one in parameters.posonlyargs], [ast.arg(one.arg) for one in parameters.args],
             parameters.vararg and ast.arg(parameters.vararg.arg), [ast.arg(one.arg) for one in parameters.kwonlyargs],
             [None] * len(parameters.kwonlyargs), parameters.kwarg and ast.arg(parameters.kwarg.arg), [],
         )  # fmt: skip
-        made = definition(node.name, arguments, [*undefined, *self._block(node.body, last=True)])
+        made = definition(node.name, given, [*undefined, *self._block(node.body, last=True)])
         return ast.copy_location(made, node)
 
     def _refused(self, node: Any, what: str) -> TraceError:
@@ -165,29 +165,24 @@ class _Writer(Expressions, ast.NodeTransformer):
             made.append(ast.Expr(of_frame("give", ast.Constant(None))))
         return made
 
-    def _as_function(self, name: str, statements: Any, *arguments: str) -> ast.FunctionDef:
+    def _as_function(self, name: str, statements: Any) -> ast.FunctionDef:
         """A block of statements as a function."""
         names = [one for one in _assigned(statements) if one in self._locals]
         body = self._block(statements)
         body.append(ast.Return(ast.Attribute(load(FRAME), "NEXT", ast.Load())))
         if names:
             body.insert(0, ast.Nonlocal(names))
-        given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
-        return definition(name, given, body)
+        return definition(name, arguments(), body)
 
     def _variables(self, number: int, names: list[str]) -> list[Any]:
         """The functions that get and put variables."""
         values = ast.Tuple([load(name) for name in names], ast.Load())
-        get = self._plain(f".get{number}", [ast.Return(values)])
+        get = definition(f".get{number}", arguments(), [ast.Return(values)])
         body: list[Any] = [ast.Pass()]
         if names:
             target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
             body = [ast.Nonlocal(names), ast.Assign([target], load(".values"))]
-        return [get, self._plain(f".put{number}", body, ".values")]
-
-    def _plain(self, name: str, body: list[Any], *arguments: str) -> ast.FunctionDef:
-        given = ast.arguments([], [ast.arg(one) for one in arguments], None, [], [], None, [])
-        return definition(name, given, body)
+        return [get, definition(f".put{number}", arguments(".values"), body)]
 
     def _goes_on(self, call: ast.expr) -> ast.If:
         """What follows is reached only where the call says so."""
@@ -222,7 +217,8 @@ class _Writer(Expressions, ast.NodeTransformer):
         number = next(self._numbers)
         names = [one for one in _assigned([node]) if one in self._locals]
         taken = [one for one in _names(node.target) if one in self._locals]
-        take = self._plain(f".take{number}", [ast.Nonlocal(taken), ast.Assign([node.target], load(".value"))], ".value")
+        assign = [ast.Nonlocal(taken), ast.Assign([node.target], load(".value"))]
+        take = definition(f".take{number}", arguments(".value"), assign)
         body = self._as_function(f".body{number}", node.body)
         names_of = [f"{one}{number}" for one in (".take", ".body", ".get", ".put")]
         call = of_frame("each", self.visit(node.iter), *map(load, names_of))

@@ -66,18 +66,6 @@ class Value:
     def __rpow__(self, base: Any) -> Any:
         return noted(operator.pow, base, self)
 
-    def __neg__(self) -> Any:
-        return noted(operator.neg, self)
-
-    def __pos__(self) -> Any:
-        return noted(operator.pos, self)
-
-    def __invert__(self) -> Any:
-        return noted(operator.invert, self)
-
-    def __abs__(self) -> Any:
-        return noted(abs, self)
-
 
 def _is_element(kind: Any, place: Any) -> bool:
     """Whether a place in an array is that of one number."""
@@ -133,16 +121,15 @@ def _two_sided(name: str, symbol: Any) -> None:
     setattr(Value, f"__r{name}__", reflected)
 
 
-def _comparison(name: str, symbol: Any) -> None:
-    setattr(Value, f"__{name}__", lambda a, b: noted(symbol, a, b))
+def _one_sided(name: str, symbol: Any) -> None:
+    setattr(Value, f"__{name}__", lambda *given: noted(symbol, *given))
 
 
-for _name in ("add", "sub", "mul", "truediv", "floordiv", "mod", "lshift", "rshift", "xor"):
-    _two_sided(_name, getattr(operator, _name))
-_two_sided("and", operator.and_)
-_two_sided("or", operator.or_)
-for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    _comparison(_name, getattr(operator, _name))
+for _name in ("add", "sub", "mul", "truediv", "floordiv", "mod", "lshift", "rshift", "xor", "and_", "or_"):
+    _two_sided(_name.rstrip("_"), getattr(operator, _name))
+for _name in ("lt", "le", "gt", "ge", "eq", "ne", "neg", "pos", "invert"):
+    _one_sided(_name, getattr(operator, _name))
+_one_sided("abs", abs)
 
 
 class _Undefined:

@@ -219,6 +219,34 @@ def rubbing(system, j, errors, forces, most):
     return within * one, within * other
 
 
+def sweep(touching, contacts, system, wanted, change, limits):
+    """Find the forces of contacts by projected Gauss-Seidel.
+
+    No contact ends outside, none pulls, and one with friction stays or slides within its cone. What the forces change
+    by solves the system; it may be the forces themselves. The contacts are (their names, their forces, how many numbers
+    each has of these, and of the system); the limits are the most sweeps, and the part of the forces that ends them.
+    """
+    name, force, stride, wide = contacts
+    most, small = limits
+    for _sweep in range(most):
+        moved, size = 0.0, 0.0
+        for a in range(wanted.size // wide):
+            j, k, mu = wide * a, stride * a, touching.friction[name[a, 1]]
+            new = max(0.0, force[k] + missing(system, j, wanted[j], change) / system[j, j])
+            moved, size = max(moved, abs(new - force[k])), max(size, new)
+            change[j] += new - force[k]
+            force[k] = new
+            if mu > 0.0:
+                errors = missing(system, j + 1, wanted[j + 1], change), missing(system, j + 2, wanted[j + 2], change)
+                one, other = rubbing(system, j, errors, (force[k + 1], force[k + 2]), mu * new)
+                moved = max(moved, abs(one - force[k + 1]), abs(other - force[k + 2]))
+                change[j + 1] += one - force[k + 1]
+                change[j + 2] += other - force[k + 2]
+                force[k + 1], force[k + 2] = one, other
+        if moved <= small * size:
+            break
+
+
 def solve_dense(a, f):
     """f = a^-1 f of a system whose symmetric part, but for factors of rows, is positive."""
     rows = f.shape[0]

@@ -9,10 +9,10 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import Array, outlined
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
-from .contacts import MOST_CONTACTS, direction, missing, rubbing
+from .contacts import MOST_CONTACTS, direction, missing, sweep
 
-# Blows at one instant, sweeps over the contacts of one, and the change of an impulse that ends them.
-_BLOWS, _SWEEPS, _SMALL = 200, 2000, 1e-17
+# Blows at one instant; sweeps over the contacts of one, and the change of their impulses that ends them.
+_BLOWS, _SWEEPS = 200, (2000, 1e-17)
 # After so many short steps from impact to impact a wall that takes energy takes all of the approach.
 _CHATTER = 12
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
@@ -98,7 +98,7 @@ def _blow(bodies, state, name, frame, found, i):
         bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
     )  # fmt: skip
-    rate, p = scratch(rows, np.float64), scratch(rows, np.float64)
+    rate, wanted, p = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
     blow.hold(i)
     blow.respond()
     for a in range(rows):
@@ -106,7 +106,10 @@ def _blow(bodies, state, name, frame, found, i):
         # Without what links take of it: the velocity has a part across them, of the order of the scheme.
         for row in range(m):
             rate[a] -= blow.answer[a, row] * dot(column(blow.across, 0, row), blow.between(v, row, i))
-    blow.find(rate, p, bounces)
+        # w+ = -e w- where a wall pushes
+        bounced = bounces * touching.restitution[name[a // wide, 1]] if a % wide == 0 else 0.0
+        wanted[a] = (1.0 + bounced) * rate[a]
+    sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, _SWEEPS)
     if max(p) == 0.0:
         return False
     is_led = max(ties.led) >= 0
@@ -197,29 +200,6 @@ class Blow(Record):
                 for j in range(row + 1, m):
                     answer[a, row] -= system[j, row] * answer[a, j]
                 answer[a, row] /= system[row, row]
-
-    def find(self, rate, p, bounces):
-        """Find the impulses by Gauss-Seidel.
-
-        w+ = -e w- where a wall pushes; friction within its cone, or the point sticks.
-        """
-        touching, schur, wide = self.bodies.touching, self.schur, self.wide
-        for _sweep in range(_SWEEPS):
-            moved, size = 0.0, 0.0
-            for a in range(p.size // wide):
-                j, wall = wide * a, self.name[a, 1]
-                wanted = missing(schur, j, (1.0 + bounces * touching.restitution[wall]) * rate[j], p)
-                new = max(0.0, p[j] + wanted / schur[j, j])
-                moved, size = max(moved, abs(new - p[j])), max(size, new)
-                p[j] = new
-                mu = touching.friction[wall]
-                if mu > 0.0:
-                    errors = missing(schur, j + 1, rate[j + 1], p), missing(schur, j + 2, rate[j + 2], p)
-                    one, other = rubbing(schur, j, errors, (p[j + 1], p[j + 2]), mu * new)
-                    moved = max(moved, abs(one - p[j + 1]), abs(other - p[j + 2]))
-                    p[j + 1], p[j + 2] = one, other
-            if moved <= _SMALL * size:
-                break
 
     def give(self, p, i):
         """v -= W sum p (b d - sum x J)"""

@@ -14,13 +14,13 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import dot, norm
 from . import impact, impact_time
-from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, missing, put_direction, put_frame, rubbing
+from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, put_frame, sweep
 
 # From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
 # contacts than three hold a rigid body, their forces converge slowly.
 _PATIENT, _LARGER = 20, 1e3
-# Sweeps over the contacts in one correction.
-_SWEEPS = 60
+# Sweeps over the contacts in one correction, and the change of their forces that ends them.
+_SWEEPS = 60, 1e-16
 # The most that an error of friction moves a contact [m/s].
 _CREEP = 1e-7
 # After so many blows without a step the contacts last.
@@ -98,7 +98,13 @@ class HardContacts(Contacts):
         # next would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
         last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
         self.eliminate(wide, (along, across, schur, gap), i)
-        creep = _sweep(touching, (active.name[i], active.press[i], found), wide, schur, gap, change)
+        sweep(touching, (active.name[i], active.press[i], 3, wide), schur, gap, change, _SWEEPS)
+        # How far friction moves a contact by its change: which way a point creeps is less exact, since what it loses is
+        # booked whatever it is.
+        creep = 0.0
+        for a in range(found):
+            for d in range(1, wide):
+                creep = max(creep, abs(change[wide * a + d]) * schur[wide * a, wide * a])
         for row in range(m):
             for a in range(rows):
                 lanes.f[row, i] -= across[a, row] * change[a]
@@ -137,34 +143,3 @@ class HardContacts(Contacts):
             impact.restore(self, state, i)
         stays = impact.chatters(self.touching, state, number) or pace.stuck[i] > _LASTS
         pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
-
-
-def _sweep(touching, contacts, wide, schur, gap, change):
-    """Gauss-Seidel: no contact ends outside, none pulls, and one with friction stays or slides within its cone.
-
-    How far friction moves a contact by its change is returned: which way a point creeps is less exact, since what it
-    loses is booked whatever it is.
-    """
-    name, press, found = contacts
-    creep = 0.0
-    for _turn in range(_SWEEPS):
-        largest, size = 0.0, 0.0
-        for a in range(found):
-            j, mu = wide * a, touching.friction[name[a, 1]]
-            new = max(0.0, press[3 * a] + missing(schur, j, gap[j], change) / schur[j, j])
-            largest, size = max(largest, abs(new - press[3 * a])), max(size, new)
-            change[j] += new - press[3 * a]
-            press[3 * a] = new
-            if mu > 0.0:
-                errors = missing(schur, j + 1, gap[j + 1], change), missing(schur, j + 2, gap[j + 2], change)
-                one, other = rubbing(schur, j, errors, (press[3 * a + 1], press[3 * a + 2]), mu * new)
-                largest = max(largest, abs(one - press[3 * a + 1]), abs(other - press[3 * a + 2]))
-                change[j + 1] += one - press[3 * a + 1]
-                change[j + 2] += other - press[3 * a + 2]
-                press[3 * a + 1], press[3 * a + 2] = one, other
-        if largest <= 1e-16 * size:
-            break
-    for a in range(found):
-        for d in range(1, wide):
-            creep = max(creep, abs(change[wide * a + d]) * schur[wide * a, wide * a])
-    return creep

@@ -21,12 +21,8 @@ def lead(bodies, state, elapsed):
                     n, h = pace.body[i], pace.h[i]
                     part = 1.0 if pace.whole[i] else elapsed
                     t = bodies.rule.end - (pace.remaining[i] - part * pace.step[i])
-                    along, cosines, sines, rate = (
-                        column(path, 3, n),
-                        column(path, 6, n),
-                        column(path, 9, n),
-                        path[12, n],
-                    )
+                    along, cosines, sines = column(path, 3, n), column(path, 6, n), column(path, 9, n)
+                    rate = path[12, n]
                     middle, chord = rate * (t - 0.5 * h), 2.0 * math.sin(0.5 * rate * h)
                     ahead, down = chord * math.cos(middle), chord * math.sin(middle)
                     sine, cosine = math.sin(rate * t), math.cos(rate * t)

@@ -110,6 +110,14 @@ class PlaneNumbers(ExactChord):
         time, _found = self.falling_hit(r, v, pull)
         return select(self.inner(r) > self.offset, 0.0, time)
 
+    def out_of(self, r):
+        return -self.gap_of(self.inner(r))
+
+    def reach(self, lease):
+        n = self.normal
+        rise = 0.5 * (dot(n, lease.v) + lease.width_along(n))
+        return rise_time(dot(n, lease.r) - self.offset, rise, 0.5 * dot(n, lease.a))
+
     def discrete_gradient(self, r0, r1):
         return self.normal
 

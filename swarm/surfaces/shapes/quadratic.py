@@ -141,6 +141,13 @@ class QuadricNumbers(contract.Smooth):
         curved = side * select(window < math.inf, 1.0, 0.0)
         return Quartic(side * c, side * b, side * a2, curved * a3, curved * a4, window)
 
+    def out_of(self, r):
+        # phi over its gradient is no more than the distance where phi is convex.
+        convex = min(self.a.x, self.a.y, self.a.z) >= 0.0
+        steepness = norm(self.gradient(r))
+        out = -self.gap_of(self.inner(r)) / select(steepness > 0.0, steepness, 1.0)
+        return select(convex, out, 0.0)
+
     def gap_slope(self, q0, q1):
         return (self.side, 0.0)
 

@@ -206,6 +206,15 @@ class SlabNumbers(Distance, ExactChord):
         time, _found = self.falling_hit(r, v, pull)
         return select(self.distance(r) > 0.0, 0.0, time)
 
+    def reach(self, lease):
+        x, u, a = self.off(lease.r), self.along(lease.v), 0.5 * self.along(lease.a)
+        width = lease.width if lease.axis is None else lease.width * abs(self.along(lease.axis))
+        # To the wall on the one side and on the other; of a plate the particle is on one side.
+        up = rise_time(self.side * (x - self.radius), 0.5 * (self.side * u + width), self.side * a)
+        down = rise_time(self.side * (-x - self.radius), 0.5 * (-self.side * u + width), -self.side * a)
+        outside = select(x > 0.0, up, down)
+        return select(self.side > 0.0, min(up, down), outside)
+
     def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return self.scaled(self.off(r0) + self.off(r1))

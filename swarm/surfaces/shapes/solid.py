@@ -71,6 +71,13 @@ class SolidNumbers(contract.Smooth):
                 least, normal = depth, part.unit_normal(r)
         return normal
 
+    def far(self, r):
+        # How far the point is out of the part that it is farthest from.
+        clear = 0.0
+        for part in reversed(self.parts):
+            clear = max(part.out_of(r), clear)
+        return clear
+
     def farthest_push(self):
         # phi is about the distance, whose faces are flat or wide: no pole within a push.
         return -math.inf

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from ...checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
-from ..course import Quartic, ball_rise_time, level_and_window, rise_time_inside
+from ..course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
 from ..levels import Level
 from ..relative import Bounds
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from .common import Distance, ExactChord
+
+# Trials of a time for which the fall is bounded.
+_TRIALS = 3
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,6 +114,20 @@ class SphereNumbers(Distance, ExactChord):
         size = self.radius2 + select(c > 0.0, c, 0.0)
         c, window = level_and_window(c, self.radius2, size, a, gg)
         return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
+
+    def reach(self, lease):
+        # |d + v t| = R -+ width t, with the fall up to a time in the width
+        d, side, weight = lease.r - self.center, self.side, norm(lease.a)
+        c, b, a = side * (square(d) - self.radius2), side * dot(d, lease.v), square(lease.v)
+        time, within = 0.0, lease.longest
+        for _k in range(_TRIALS):
+            width = lease.width + 0.5 * weight * within
+            found = rise_time(c, b + self.radius * width, side * (a - width * width))
+            time = max(time, min(found, within))
+            if not time < within or weight == 0.0:
+                break
+            within = math.sqrt(time * within)
+        return time
 
     def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.

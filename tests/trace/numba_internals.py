@@ -1,7 +1,7 @@
 """The undocumented parts of Numba that kernels take: where another version of it may break them.
 
-Each name is here with the parameters by which this package calls it, or None for what it is not called by itself; what
-is taken from them is held by tests/trace/test_internals.py.
+Each name is here with the parameters by which the package calls it, or None for what it is not called by itself; what
+is taken from them is held by test_internals.py.
 """
 
 # Types of functions and operations, and their implementations: trace/values.py, trace/emit.py
