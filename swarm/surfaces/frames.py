@@ -30,8 +30,8 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("level_along", ("seen",), None),
     ("moving_step", ("seen", None), None),
     ("outward_acceleration", ("place", "velocity", "vector"), None),
-    ("begin_flight", ("gravity", None, None, None, "place", "velocity"), None),
-    ("step_flight", ("gravity", None, None, None, "place", "velocity"), None),
+    ("steps", ("gravity", "place", "velocity"), None),
+    ("entry", ("gravity", "place", "velocity"), None),
     ("discrete_gradient", ("place", "place"), "vector"),
     ("step_normal", ("place", "place"), "vector"),
     ("push", ("place", "vector", None), "place"),
@@ -50,7 +50,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("one_in_cell", (None, "place"), None),
     ("deepest_in_cell", ("place",), None),
 )
-_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "needs_bend", "chord_sweeps")
+_CONSTANTS = ("side", "flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "lacks_bend", "chord_sweeps")
 
 
 class Framed(Smooth):

@@ -9,11 +9,14 @@ import math
 from typing import Any
 
 from ..kernel.angle import sine_and_versine
+from ..kernel.gravity import accelerated
 from ..kernel.jit import select
-from ..kernel.vector import Vec, absolute, cross, dot, norm, times, total
-from . import flights
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
+from . import safe
 from .drive import Drive, Pose
 from .frames import Framed
+from .rising import flight_of
+from .walls import Field, Walls
 
 
 class Posed(Framed):
@@ -97,18 +100,41 @@ class Posed(Framed):
     def time_scale(self):
         return self.drive.time_scale
 
-    # --- Flight, but for what safe.py adds ---
+    # --- Flight ---
 
-    is_quartic, may_be_far, has_levels, in_steps = False, True, False, None
+    accelerates = True
+
+    def seen(self, flight, t):
+        remaining = flight.remaining - t
+        pose = self.drive.pose(remaining)
+        return flight.seen(t, Posed(self.body, pose, pose, self.drive, remaining, remaining), flight.pull)
+
+    def sees(self, gravity, r, v):
+        """A particle in the frame of the wall now, as `Seen`."""
+        return self.seen(flight_of(r, v, accelerated(gravity, ZERO, 1.0), self.remaining), 0.0)
+
+    def first_hit(self, r, v):
+        return self.falling_hit(r, v, ZERO)
+
+    def falling_hit(self, r, v, pull):
+        found = safe.march_alone(Walls((self,)), r, v, pull, self.remaining)
+        return found.time, found.wall >= 0.0
+
+    def field_hit(self, gravity, r, v):
+        """The first `Hit` with the bodies of a field, or how far the flight is surely free."""
+        return safe.march_alone(Walls((Field(self),)), r, v, accelerated(gravity, ZERO, 1.0), self.remaining)
+
+    def until_next_cell(self, r, v):
+        """When a straight flight may meet another body of a field."""
+        return safe.until_next_cell(self.body.grid, self.sees(None, r, v), self.remaining)
+
+    is_quartic, may_be_far, has_levels, in_steps = False, True, False, False
 
     def safe_time(self, r, v, pull):
         return 0.0
 
-    def begin_flight(self, gravity, course, row, lane, r, v):
-        flights.begin_whole(gravity, self, course, row, lane, r, v)
-
-    def step_flight(self, gravity, course, row, lane, r, v):
-        flights.step_whole(gravity, self, course, row, lane)
+    def steps(self, gravity, r, v):
+        return None
 
     def straight_hit(self, end, r0, r1):
         own = self.own_place(r0)
@@ -206,8 +232,13 @@ class Drifting(Posed):
         return a
 
     gravity_in = vector_in
+    accelerates = False
     is_quartic = property(lambda self: self.body.is_quartic)
     may_be_far = property(lambda self: self.body.may_be_far)
-    # As at a wall at rest, where a wall that moves otherwise takes safe steps.
+
+    def steps(self, gravity, r, v):
+        # As at a wall at rest where the level is known as a whole: else lanes ask for the hit.
+        return Framed.steps(self, gravity, r, v) if gravity is not None and self.is_quartic else None
+
     first_hit, falling_hit, safe_time = Framed.first_hit, Framed.falling_hit, Framed.safe_time
     field_hit, until_next_cell = Framed.field_hit, Framed.until_next_cell  # type: ignore[attr-defined]

@@ -23,6 +23,12 @@ class Listed(Field):
     """A field of walls that are surfaces of their own: each has a row of what it gives."""
 
 
+class Following(Record):
+    """A wall that moves with the one before it: both are of one surface."""
+
+    body: Any
+
+
 class Touched(Record):
     """The first wall that a step is in contact with, or -1, and how many there are."""
 
@@ -42,6 +48,9 @@ class Walls(Record):
 
         def __getattr__(self, name: str) -> Any: ...
 
+    # Whether some move other than uniformly, or as a field.
+    accelerate = False
+
     def at(self, remaining):
         """The walls when so much of the frame is left [s]: themselves, where none moves."""
         return self
@@ -51,14 +60,8 @@ class Walls(Record):
         return self
 
     def in_steps(self):
-        """A number where a straight flight to any wall takes steps in lanes: a type for the compiler.
-
-        None where its hit has a closed form, or is asked for as a whole.
-        """
-        steps = None
-        for wall in self.each:
-            steps = wall.in_steps if steps is None else steps
-        return steps
+        """Whether a straight flight to any wall takes steps in lanes: a constant for the compiler."""
+        return any(wall.in_steps for wall in self.each)
 
     # --- Their numbers and rows ---
 

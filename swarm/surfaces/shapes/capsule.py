@@ -107,7 +107,7 @@ class CapsuleNumbers(Distance):
         return select(abs(height) > half, cap, tube), True
 
     # Without gravity the hit has a closed form.
-    in_steps = None
+    in_steps = False
 
     def near(self, gravity, r, v):
         # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by
