@@ -4,7 +4,10 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..kernel.jit import select
+import numpy as np
+
+from ..kernel.arrays import scratch
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 
@@ -100,6 +103,33 @@ class Walls(Record):
         for k, stop in reversed(tuple(enumerate(stops))):
             row = select(number < stop, k, row)
         return row
+
+    # --- Near a point: all that are in no field, and of a field those in the cell of the point ---
+
+    def numbers_near(self, r):
+        """The numbers of the walls near a point, in an array of the function that asks."""
+        near = self.others().length()
+        for _number, field in reversed(self.fields()):
+            near = field.members.count_in_cell(r) + near
+        number = scratch(near, np.float64)
+        self._list_near(r, number)
+        return number
+
+    @outlined
+    def _list_near(self, r, into):
+        k = 0
+        for number, field in self.fields():
+            k += field.members.list_in_cell(k, number, r, into)
+        before = self.count_in_fields()
+        for i in range(self.others().length()):
+            into[k + i] = before + i
+
+    def until_others(self, r, v):
+        """When a straight flight may meet a wall that is not near its start."""
+        soonest = math.inf
+        for _number, field in reversed(self.fields()):
+            soonest = min(field.members.until_next_cell(r, v), soonest)
+        return soonest
 
     # --- Of one wall ---
 
