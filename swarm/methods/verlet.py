@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ..contact.force import NEEDS as FORCE_NEEDS
-from ..contact.force import add_impulses, add_works, force, work
+from ..contact.energy import NEEDS as FORCE_NEEDS
+from ..contact.energy import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene

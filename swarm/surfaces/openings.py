@@ -17,9 +17,9 @@ from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
 from . import required
+from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
-from .kinds import by_kind
 from .room import has_room
 from .surface import SIDES, Surface
 from .walls import Field, Walls, all_walls

@@ -73,13 +73,33 @@ class Posed(Framed):
         """The middle of the step, from the end of the frame on."""
         return -0.5 * (self.remaining + self.after)
 
-    place_in = own_place
+    place_in, end_in = own_place, own_end
 
     def place_out(self, r):
         return self.pose.place_out(self.drive.center, r)
 
+    def end_out(self, r):
+        """A point of the frame of the wall at the end of the step, in the scene."""
+        return self.end.place_out(self.drive.center, r)
+
     def vector_out(self, a):
         return self.pose.out(a)
+
+    def way_in(self, p):
+        """The free displacement of a step in the frame of a wall that does not turn."""
+        return p - self.displacement()
+
+    def normal_out(self, n):
+        """A normal of the frame of the wall, of a step, in the scene."""
+        if self.pose.turn is None:
+            return n
+        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
+        # across the axis and 1 along it, with the angle a of the step.
+        k = self.drive.turn.axis
+        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
+        along = dot(k, n) * k
+        n = along + (n - along) * (1.0 / (1.0 - half * half))
+        return 0.5 * (self.pose.out(n) + self.end.out(n))
 
     # --- At this instant ---
 
@@ -145,9 +165,6 @@ class Posed(Framed):
     def displacement(self):
         return self.end.shift - self.pose.shift
 
-    def end_inner(self, r):
-        return self.body.inner(self.own_end(r))
-
     def carry(self, r):
         spin = self.drive.spin
         if spin is None:
@@ -179,45 +196,11 @@ class Posed(Framed):
         return s + absolute(self.pose.shift) + Vec(late, late, late)
 
     def framed(self, r, p):
-        return self.body, self.own_place(r), p - self.displacement()
-
-    def push(self, r0, p, kappa):
-        body, own, free = self.framed(r0, p)
-        return self.end.shift + body.push(own, free, kappa)
-
-    def rise(self, r0, p, kappa):
-        body, own, free = self.framed(r0, p)
-        return body.rise(own, free, kappa)
-
-    def resolve(self, r, strength):
-        return self.pose.shift + self.body.resolve(self.own_place(r), strength)
-
-    def chord_guess(self, r, p):
-        body, own, free = self.framed(r, p)
-        return body.chord_guess(own, free)
-
-    def chord_improve(self, r, p, kappa):
-        body, own, free = self.framed(r, p)
-        return body.chord_improve(own, free, kappa)
-
-    def discrete_gradient(self, r0, r1):
-        return self._halfway(self.body.discrete_gradient(self.own_place(r0), self.own_end(r1)))
+        return self.body, self.own_place(r), self.way_in(p)
 
     def step_normal(self, r0, r1):
-        n = self._halfway(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
+        n = self.normal_out(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
         return n if self.pose.turn is None else n / norm(n)
-
-    def _halfway(self, n):
-        """A normal of the frame of the wall, of a step, in the scene."""
-        if self.pose.turn is None:
-            return n
-        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
-        # across the axis and 1 along it, with the angle a of the step.
-        k = self.drive.turn.axis
-        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
-        along = dot(k, n) * k
-        n = along + (n - along) * (1.0 / (1.0 - half * half))
-        return 0.5 * (self.pose.out(n) + self.end.out(n))
 
 
 class Drifting(Posed):
