@@ -143,11 +143,7 @@ class RuleNumbers(fixed_step.Numbers):
 
     def contact(self, walls, gravity, lane, wall, solution):
         r, there = self.free(walls, gravity, lane), self.there(walls, lane)
-        before, over, after = (
-            self.before(walls, lane.remaining),
-            self.over(walls, lane.remaining),
-            self.after(walls, lane.remaining),
-        )
+        before, over, after = self.times(walls, lane.remaining)
         point = _reached(there, wall, r, solution.kappa)
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0

@@ -1,14 +1,17 @@
-"""The methods that a surface lacks for its use: an error in one sentence, before anything is compiled."""
+"""What a surface lacks for its use, methods or a box in which it is known: an error before anything is compiled."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .contract import Smooth
 from .fields.members import Members
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
-from .surface import Surface
+from .surface import Surface, shown
 
 # What the definitions of contract.py ask for themselves. What has none there, such as `hessian`, must be given.
 _MADE_OF = {
@@ -36,6 +39,8 @@ _OF_PHI = ("gap_of", "gap_slope", "inner_gradient")
 # What a solid of several parts asks of each.
 _OF_PARTS = ("phi", "gradient", "distance", "gap_scale", "unit_normal", "first_hit")
 _DESCRIPTION = ("size", "bounds", "extent")
+# Of the width of a box in which a surface is known, by how much particles may leave it: round-off.
+_ROUND_OFF = 1e-9
 
 
 def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], name: str | None = None) -> None:
@@ -104,3 +109,28 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
     else:
         for used in _MADE_OF[name]:
             yield from _lacking(wall, used)
+
+
+def require_known(
+    surfaces: Sequence[Surface], bounds: Callable[[list[Surface]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+) -> None:
+    """Raise a `SceneError` where particles may leave the box in which a surface is known.
+
+    Args:
+        surfaces: those of a scene.
+        bounds: the corners of a box around the volume that some of them leave.
+    """
+    for i, surface in enumerate(surfaces):
+        known = surface.known_in()
+        if known is None:
+            continue
+        first, last = (np.array(corner) for corner in known)
+        low, high = bounds([one for one in surfaces if one.motion is None and not one.reacts()])
+        room = _ROUND_OFF * (last - first).max()
+        if surface.motion is not None or not ((low >= first - room).all() and (high <= last + room).all()):
+            raise SceneError(
+                f"surfaces[{i}] must be known wherever particles go, got {surface}, which reaches the border of its "
+                f"grid, from {shown(first)} to {shown(last)}, while the surfaces that do not move keep particles "
+                f"from {shown(low)} to {shown(high)}; sample it in a larger box, check that phi is below 0 inside, "
+                "or add surfaces that keep particles in the grid"
+            )

@@ -81,40 +81,38 @@ class Slab(Surface):
 # fall that loses energy.
 
 
-class AlongX(Record):
+class Along(Record):
+    """An axis of the scene as a unit vector."""
+
+    axis = 0
+
+    def part(self, r):
+        """Its component of a vector."""
+        return r[self.axis]
+
+    def scaled(self, k):
+        """It times a number."""
+        return Vec(*(k if i == self.axis else 0.0 for i in range(3)))
+
+
+class AlongX(Along):
     """The x axis."""
 
     x: float
 
-    def part(self, r):
-        return r.x
 
-    def scaled(self, k):
-        return Vec(k, 0.0, 0.0)
-
-
-class AlongY(Record):
+class AlongY(Along):
     """The y axis."""
 
     y: float
-
-    def part(self, r):
-        return r.y
-
-    def scaled(self, k):
-        return Vec(0.0, k, 0.0)
+    axis = 1
 
 
-class AlongZ(Record):
+class AlongZ(Along):
     """The z axis."""
 
     z: float
-
-    def part(self, r):
-        return r.z
-
-    def scaled(self, k):
-        return Vec(0.0, 0.0, k)
+    axis = 2
 
 
 AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)
