@@ -63,7 +63,7 @@ class Smooth(AtRest):
     def hessian_bounds(self, r):
         """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
 
-        The distance may only be infinite where there is no gravity.
+        The distance must be finite where the hits of falls follow from these.
         """
         raise NotImplementedError
 

@@ -28,7 +28,7 @@ class Bent(NamedTuple):
     most: float
 
 
-class Near(NamedTuple):
+class Here(NamedTuple):
     """The level, half of its slope along a flight, and the gradient of phi."""
 
     level: float
@@ -69,10 +69,10 @@ class SampledNumbers(CellNumbers):
         noise = _ROUND_OFF * room * norm(n)
         if not is_first and half >= 0.0 and level >= -noise:
             return Look(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
-        step, out, bent = self._safe_step(cell, Near(level, half, n), p, w, pull)
+        step, out, bent = self._safe_step(cell, Here(level, half, n), p, w, pull)
         slack = room * norm(n)
         if lets_go(level, half, step, slack):
-            step, _out, _bent_there = self._safe_step(cell, Near(-slack, half, n), p, w, pull)
+            step, _out, _bent_there = self._safe_step(cell, Here(-slack, half, n), p, w, pull)
             return Look(t, step, -1.0, -1.0)
         # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
         # least this.
@@ -93,25 +93,25 @@ class SampledNumbers(CellNumbers):
         level, half = self.side * value, 0.5 * self.side * dot(n, v)
         if level > 0.0:
             return 0.0
-        step, _out, _bent_there = self._safe_step(cell, Near(level, half, n), r, v, pull)
+        step, _out, _bent_there = self._safe_step(cell, Here(level, half, n), r, v, pull)
         return step
 
-    def _safe_step(self, cell, near, r, v, pull):
+    def _safe_step(self, cell, here, r, v, pull):
         """(a time during which a flight surely stays admissible, within which its bounds hold, these as `Bent`)."""
         # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
         speed, falls = norm(v), norm(pull) > 0.0
         out = least_of(self.spline.width) / speed if speed > 0.0 else 0.0
-        bent = self._bent(cell.row, near.slope, v, pull, 0.0)
-        step = rise_time(near.level, near.half, bent.most)
+        bent = self._bent(cell.row, here.slope, v, pull, 0.0)
+        step = rise_time(here.level, here.half, bent.most)
         if falls or not step < out:
             out = self._until_out(cell.low, 1.0, r, v, pull)
-            bent = self._bent(cell.row, near.slope, v, pull, out)
-            step = min(rise_time(near.level, near.half, bent.most), out)
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(rise_time(here.level, here.half, bent.most), out)
         if falls and 2.0 * step < out:
             # Again with the bounds of a shorter time
             out = 2.0 * step
-            bent = self._bent(cell.row, near.slope, v, pull, out)
-            step = min(max(step, rise_time(near.level, near.half, bent.most)), out)
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(max(step, rise_time(here.level, here.half, bent.most)), out)
         return step, out, bent
 
     def _bent(self, row, n, v, pull, time):
