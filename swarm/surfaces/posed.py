@@ -1,8 +1,9 @@
 """A wall that moves, at one instant or over one step: what is asked of a surface is asked in the frame of the wall.
 
-Of a flight only a wall in uniform translation is asked: it ends there as at a wall at rest. In the frame of a wall that
-is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by rho1 - rho0 = r1 - r0 - (d1 - d0): it is that
-at a wall at rest, with the free displacement p - (d1 - d0).
+A flight to a wall in uniform translation ends as at a wall at rest; to any other it goes by safe steps, safe.py.
+
+In the frame of a wall that is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by
+rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
 """
 
 import math
