@@ -17,15 +17,13 @@ from .kernel.gravity import Gravity
 from .kernel.vector import Vec
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.data.known import require_known
 from .surfaces.fields.grouped import Order, order_of, walls_in
 from .surfaces.fields.many import in_straight_flights, members_of
 from .surfaces.fields.members import Members
-from .surfaces.free import cell_in
 from .surfaces.images import Lengths, corners_of, images_of, lengths_of
 from .surfaces.moving import carried
 from .surfaces.openings import Opening, openings_in, require_few, volumes_of
-from .surfaces.period import Period
+from .surfaces.period import Period, cell_in
 from .surfaces.surface import Surface
 from .surfaces.walls import Walls
 from .volume import Volume
@@ -96,7 +94,7 @@ class Scene(Volume):
                 f"by one, at most {MOST_WALLS} walls in all"
             )
         object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
-        require_known(surfaces, lambda held: self._bounds(0.0, held))
+        required.require_known(surfaces, lambda held: self._bounds(0.0, held))
         if not self._has_volume():
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "

@@ -11,9 +11,8 @@ from . import motion as motions
 from .particles import Particles
 from .surfaces.fields.many import Many
 from .surfaces.images import Lengths, cell_of, into_cell
-from .surfaces.instant import box_of, gaps_of, gradient_of, planes_of
+from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.polyhedron import polyhedron_bounds
-from .surfaces.room import has_room
 from .surfaces.surface import UNBOUNDED, Box, Surface
 
 # Points whose gaps are found at once.

@@ -342,7 +342,7 @@ def in_all_directions(n, **laws):
 
 
 def takes_steps(walls, r):
-    return walls.in_steps() is not None or walls.outside(-1.0, r)
+    return walls.in_steps() or walls.outside(-1.0, r)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, square
-from ..surfaces.fields.grid import block_of, in_block, size_of
+from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried
 from ..surfaces.posed import Posed
@@ -53,14 +53,12 @@ def _meets_one(field, ends, number, active, path, near):
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
         return True
     block = block_of_path(grid, own_path(field, ends, path), near)
-    for k in range(size_of(block)):
-        cell = index(in_block(grid, block, k))
-        for entry in range(grid.first[cell], grid.first[cell + 1]):
-            m = float(grid.entries[entry])
-            body, end = field.wall(m), ends.wall(m)
-            if (not active.has(number + m)) and _may_meet(body, end, path, near):
-                return True
-    return False
+    return over_block(grid, block, False, _meets_body, field, ends, number, active, path, near)
+
+
+def _meets_body(found, m, field, ends, number, active, path, near):
+    m = float(m)
+    return found or ((not active.has(number + m)) and _may_meet(field.wall(m), ends.wall(m), path, near))
 
 
 def members_of(field):
@@ -138,16 +136,16 @@ def arrival(walls, active, path, near, remaining):
 @outlined
 def _first_of(members, number, active, path, near, later):
     """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
-    grid, found = members.grid, later
-    block = block_of_path(grid, path, near)
-    for k in range(size_of(block)):
-        cell = index(in_block(grid, block, k))
-        for entry in range(grid.first[cell], grid.first[cell + 1]):
-            m = grid.entries[entry]
-            if not active.has(number + m):
-                time = _deep_after(_Still(member(members, index(m))), path, near)
-                if time < found.time or (time == found.time and number + m < found.wall):
-                    found = Arrival(time, number + m)
+    block = block_of_path(members.grid, path, near)
+    return over_block(members.grid, block, later, _sooner_body, members, number, active, path, near)
+
+
+def _sooner_body(found, m, members, number, active, path, near):
+    if active.has(number + m):
+        return found
+    time = _deep_after(_Still(member(members, index(m))), path, near)
+    if time < found.time or (time == found.time and number + m < found.wall):
+        return Arrival(time, number + m)
     return found
 
 
@@ -155,7 +153,7 @@ def _arrival_later(walls, active, path, near, remaining):
     """`arrival` where some walls move."""
     later, before = Arrival(math.inf, -1.0), walls.count_in_fields()
     for i in range(walls.others().length()):
-        later = _sooner_at(walls, before + i, active, path, near, remaining, later)
+        later = _sooner_at(later, i, walls, before, active, path, near, remaining)
     if not walls.fields():
         return later
     starts, ends = walls.at(remaining).fields(), walls.at(remaining - path.h).fields()
@@ -168,24 +166,19 @@ def _arrival_later(walls, active, path, near, remaining):
 @outlined
 def _arrival_among(field, ends, walls, number, active, path, near, remaining):
     """`arrival` at the bodies of a field, which is `ends` at the end of the step."""
-    found = Arrival(math.inf, -1.0)
     grid = members_of(field).grid
     block = block_of_path(grid, own_path(field, ends, path), near)
-    for k in range(size_of(block)):
-        cell = index(in_block(grid, block, k))
-        for entry in range(grid.first[cell], grid.first[cell + 1]):
-            found = _sooner_at(walls, number + grid.entries[entry], active, path, near, remaining, found)
-    return found
+    none = Arrival(math.inf, -1.0)
+    return over_block(grid, block, none, _sooner_at, walls, number, active, path, near, remaining)
 
 
-def _sooner_at(walls, wall, active, path, near, remaining, found):
-    """The sooner one of an arrival and that at this wall."""
+def _sooner_at(found, m, walls, number, active, path, near, remaining):
+    """The sooner one of an arrival and that at wall m, which has so many before it."""
+    wall = number + m
     if active.has(wall):
         return found
     time = _deep_after(_Moving(walls, wall, remaining), path, near)
-    if time < found.time:
-        return Arrival(time, wall)
-    return found
+    return Arrival(time, wall) if time < found.time else found
 
 
 class _Still(Record):

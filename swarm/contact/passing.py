@@ -5,14 +5,13 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
-from ..surfaces.fields.grid import in_block, size_of
+from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
 from ..surfaces.openings import is_open, outside
 from ..surfaces.walls import Field
 from .crossing import at_part, bisected, block_of_path
 from .events import TOUCH
 from .reflection import relative, wall_velocity
-from .touching import numbers_near
 
 # Places of a step between which the distance to an opening has one least value, and steps of the search for it.
 _PLACES, _THIRDS = 16, 80
@@ -31,7 +30,7 @@ def _lets_out(openings, rules, walls, wall, r, near):
 @outlined
 def _is_covered(openings, rules, walls, wall, r, near):
     """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
-    number = numbers_near(walls, r)
+    number = walls.numbers_near(r)
     touch, n = TOUCH * rules.size + near, walls.unit_normal(wall, r)
     for i in range(number.size):
         m = walls.unit_normal(number[i], r)
@@ -52,7 +51,7 @@ def hit_wall(openings, rules, walls, motion, wall, near):
     if not is_open(openings, wall, r, near):
         return wall
     moving, touch = rules.laws.moving, TOUCH * rules.size + near
-    number = numbers_near(walls, r)
+    number = walls.numbers_near(r)
     found, soonest = wall, math.inf
     for i in range(number.size):
         w = relative(wall_velocity(moving, walls, number[i], r), v)
@@ -77,7 +76,7 @@ def open_wall_at(openings, rules, walls, r, near):
     """A wall at a place that lets out there, or -1."""
     if openings is None:
         return -1.0
-    number, touch = numbers_near(walls, r), TOUCH * rules.size
+    number, touch = walls.numbers_near(r), TOUCH * rules.size
     for i in range(number.size):
         if walls.distance(number[i], r) >= -touch and _lets_out(openings, rules, walls, number[i], r, near):
             return number[i]
@@ -111,14 +110,12 @@ def _may_enter(volume, path, reach):
 
 @outlined
 def _may_enter_one(members, path, reach):
-    grid = members.grid
-    block = block_of_path(grid, path, 0.0)
-    for k in range(size_of(block)):
-        cell = index(in_block(grid, block, k))
-        for entry in range(grid.first[cell], grid.first[cell + 1]):
-            if outside(member(members, index(grid.entries[entry])), path.r1) <= reach:
-                return True
-    return False
+    block = block_of_path(members.grid, path, 0.0)
+    return over_block(members.grid, block, False, _may_enter_body, members, path, reach)
+
+
+def _may_enter_body(found, m, members, path, reach):
+    return found or outside(member(members, index(m)), path.r1) <= reach
 
 
 def part_until_open(openings, rules, walls, active, path, near):
@@ -166,13 +163,12 @@ def _way_into(volume, path, near):
 
 @outlined
 def _way_into_any(members, path, near):
-    grid, first = members.grid, math.inf
-    block = block_of_path(grid, path, near)
-    for k in range(size_of(block)):
-        cell = index(in_block(grid, block, k))
-        for entry in range(grid.first[cell], grid.first[cell + 1]):
-            first = min(first, _way_in(member(members, index(grid.entries[entry])), path, near))
-    return first
+    block = block_of_path(members.grid, path, near)
+    return over_block(members.grid, block, math.inf, _way_into_body, members, path, near)
+
+
+def _way_into_body(first, m, members, path, near):
+    return min(first, _way_in(member(members, index(m)), path, near))
 
 
 @outlined

@@ -15,7 +15,6 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces import flights
-from ..surfaces.near import count_near, list_near, until_others
 from . import reflection
 from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
@@ -99,7 +98,7 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
     """One sliding step: the result of `impact`."""
     laws, r, moving = method.laws, flight.r, method.laws.moving
     carried, walls = walls, walls.at(flight.remaining)
-    number = numbers_near(walls, r)
+    number = walls.numbers_near(r)
     count = number.size
     touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
     _depths(walls, number, r, depth)
@@ -156,7 +155,7 @@ def _unhindered(walls, gravity, touch, r, v, h, near):
     for cut in range(_CUTS):
         u = velocity_along(walls, touch, r, accelerated(gravity, v, 0.5 * h), h)
         # Until then none but the near walls are met.
-        alone = until_others(walls, r, from_relative(touch.frame, u))
+        alone = walls.until_others(r, from_relative(touch.frame, u))
         if alone < h:
             h = alone
             continue
@@ -191,17 +190,10 @@ def _settled(walls, wall, touch, r):
     return r
 
 
-def numbers_near(walls, r):
-    """The numbers of the walls near a point, in an array of the function that asks."""
-    number = scratch(count_near(walls, r), np.float64)
-    list_near(walls, r, number)
-    return number
-
-
 @outlined
 def inside(walls, r):
     """A point that is no more than round-off outside of the walls, moved until it is not."""
-    number = numbers_near(walls, r)
+    number = walls.numbers_near(r)
     outside = scratch(number.size, np.float64)
     for _sweep in range(_SWEEPS):
         _depths(walls, number, r, outside)
@@ -261,10 +253,10 @@ def are_carried(walls, gravity, r, v, near, active):
 
     `active` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
     """
-    count = count_near(walls, r)
-    number, touched, depth = scratch(count, np.float64), scratch(count, np.bool_), scratch(count, np.float64)
+    number = walls.numbers_near(r)
+    count = number.size
+    touched, depth = scratch(count, np.bool_), scratch(count, np.float64)
     normal, taken = scratch((3, count), np.float64), scratch(count, np.float64)
-    list_near(walls, r, number)
     _depths(walls, number, r, depth)
     several = 0
     for i in range(count):

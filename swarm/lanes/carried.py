@@ -6,18 +6,14 @@ little; the forces follow from the acceleration. Until one lets go another wall 
 
 import math
 
-import numpy as np
-
 from ..contact import crossing, events
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
-from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
-from ..surfaces.near import count_near, list_near
 
 # The phase of a particle that these walls do not carry.
 NOT_CARRIED = -1
@@ -96,8 +92,7 @@ def _corner(laws, walls, gravity, active, r, least):
 @outlined
 def _find(laws, walls, gravity, r, near, least):
     """Three walls at a point that hold a particle there, and none of whose neighbours comes: `Three`."""
-    number = scratch(count_near(walls, r), np.float64)
-    list_near(walls, r, number)
+    number = walls.numbers_near(r)
     count = 0
     for i in range(number.size):
         if walls.distance(number[i], r) >= -near:

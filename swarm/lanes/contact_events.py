@@ -15,7 +15,6 @@ from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
-from ..surfaces.near import count_near, list_near
 from ..surfaces.openings import is_open
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
@@ -266,8 +265,7 @@ def _step(method, walls, gravity, share, i):
 def _have_closed(walls, method, r, remaining):
     """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
     now, deepest = walls.at(remaining), 0.0
-    number = scratch(count_near(now, r), np.float64)
-    list_near(now, r, number)
+    number = now.numbers_near(r)
     for i in range(number.size):
         deepest = max(deepest, now.distance(number[i], r))
     return deepest > events.TOUCH * method.size

@@ -200,7 +200,7 @@ def _close_up(seen, k, lanes, n, row):
 
 def _look(look, live):
     """Every lane at its body: in closed form where flights are straight and none is met by steps."""
-    if look.gravity is None and look.like.in_steps is None:
+    if look.gravity is None and not look.like.in_steps:
         seen = look.seen
         for i in range(index(live)):
             time, hits = gathered(look.like, seen.body, i, 0).first_hit(*look.flight(i))

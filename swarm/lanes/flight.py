@@ -65,7 +65,7 @@ def _has_fields(met):
 
 def _is_closed(gravity, walls):
     """Whether the first hit has a closed form: flights are straight, and no wall is met by steps."""
-    return gravity is None and walls.in_steps() is None
+    return gravity is None and not walls.in_steps()
 
 
 def _stride(walls, gravity, lanes, live):

@@ -7,8 +7,9 @@ from typing import Any
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import required, safe
+from ..surfaces import required
 from ..surfaces.drive import drive_of
+from ..surfaces.moving import lacks_bend
 
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
@@ -120,7 +121,7 @@ def check_motions(name: str, scene: Scene) -> None:
 def check_bends(scene: Scene) -> None:
     """Raise a `SceneError` if a surface moves so that it is met by safe steps, and does not bound its bend."""
     for i, surface in enumerate(scene.surfaces):
-        if safe.lacks_bend(surface):
+        if lacks_bend(surface):
             raise SceneError(
                 f"surfaces[{i}] ({type(surface).__name__}) must give hessian_bounds() to move as {surface.motion} "
                 "does: hits of such walls are found by safe steps; give it, or use a Translation alone"

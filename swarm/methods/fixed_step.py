@@ -187,6 +187,10 @@ class Steps(contract.MethodNumbers):
         """The walls at the end of that step."""
         return walls.at((remaining - 1.0) * self.dt)
 
+    def times(self, walls, remaining):
+        """The walls at the start of that step, over it and at its end."""
+        return self.before(walls, remaining), self.over(walls, remaining), self.after(walls, remaining)
+
     def reach(self: Any, before, gravity, lane):
         """From r0 to the point whose force it takes, as if there were no wall."""
         return displacement(gravity, lane.v, self.dt)

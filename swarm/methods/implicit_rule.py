@@ -1,18 +1,102 @@
 """The common part of the implicit baselines: the pass of a rule that takes the force at a point it has to find.
 
-A rule says where that point would be without walls (`reach`), and the step that follows from where it is (`end`).
+A rule says where that point would be without walls (`reach`), and the step that follows from where it is (`end`). The
+point r is pushed by the force at itself: s = r - c V'(g(s)) grad g(s). With kappa = c V'(g(s)) g'(q(s)) it is
+s = r - kappa grad q(s), which the surface solves for s (`resolve`), so that one equation in one unknown is left:
+    F(kappa) = kappa - c V'(g) g'(q) = 0 at s(kappa).                                        (I)
+c = h^2/(4m) for the midpoint and the trapezoidal rule.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import corner, implicit
+from ..contact import corner
+from ..contact.discrete_gradient import Reaction, illinois, narrowed
+from ..contact.energy import NEEDS as FORCE_NEEDS
+from ..contact.energy import strength
 from ..contact.impulse import Step
 from ..kernel.arrays import scratch
 from ..kernel.jit import select
-from ..kernel.vector import Vec, norm
+from ..kernel.vector import ZERO, Vec, norm, square
 from . import contract, fixed_step
+
+# The derivative of F is a difference quotient over this part of kappa: right to about the same part, so that a step of
+# _TOLERANCE is the last.
+_NUDGE = 1e-7
+_TOLERANCE = 1e-8
+# Sweeps of the vectorised solve; what needs more is solved by `reaction`.
+_SWEEPS = 10
+_CAREFUL_ITERATIONS = 200
+_EPSILON = 2.220446049250313e-16
+# The equation needs these of every wall.
+NEEDS = (*FORCE_NEEDS, "resolve", "farthest_push")
+
+
+# --- The equation ----------------------------------------------------------------------------------------
+
+
+def _residual(law, surface, r, c, kappa):
+    """F(kappa)"""
+    return kappa - c * strength(law, surface, surface.inner(surface.resolve(r, kappa)))
+
+
+def _guess(surface, law, r, c):
+    """kappa if the wall were flat and the spring linear."""
+    q = surface.inner(r)
+    g = surface.gap_of(q)
+    slope, _curvature = surface.gap_slope(q, q)
+    # g(s) = g - kappa g'(q) |grad q|^2 and V' = k g(s): kappa (1 + c k g'^2 |grad q|^2) = c k g' g
+    stiff = c * law.stiffness(g) * slope
+    return select(g > 0.0, stiff * g, 0.0) / (1.0 + stiff * slope * square(surface.discrete_gradient(r, r)))
+
+
+def _improve(surface, law, r, c, kappa):
+    """The Newton step of kappa, and whether it was so large that another is needed."""
+    f = _residual(law, surface, r, c, kappa)
+    nudge = _NUDGE * kappa
+    rise = _residual(law, surface, r, c, kappa + nudge) - f
+    # Without a push there is nothing to solve.
+    pushes = kappa != 0.0
+    step = f * nudge / select(pushes, rise, 1.0)
+    # True for NaN.
+    return step, pushes & (not (abs(step) <= _TOLERANCE * abs(kappa)))
+
+
+def _reached(walls, wall, r, kappa):
+    """s; r where there is no such wall."""
+    end = r
+    for k, one in reversed(tuple(enumerate(walls.each))):
+        end = select(wall == k, one.resolve(r, kappa), end)
+    return end
+
+
+class _AtEnd(NamedTuple):
+    """A form of `reaction`: the force is that at the end of the displacement, and c = h^2/(4m)."""
+
+    def reaction(self, law, multiplier, surface, step):
+        """`Reaction` of a surface."""
+        # A cavity pushes with kappa > 0, a solid with kappa < 0. The force falls along the push: F changes sign by
+        # -F(0).
+        r, c = step.r + step.p, step.c
+        f_low = _residual(law, surface, r, c, 0.0)
+        if f_low == 0.0:
+            return Reaction(ZERO, 0.0, True)
+        # Before the pole of `resolve`.
+        farthest = 0.5 * abs(surface.farthest_push())
+        low, high = 0.0, math.copysign(min(abs(f_low), (1.0 - 1e-12) * farthest), -f_low)
+        f_high = _residual(law, surface, r, c, high)
+        kappa, found = high, f_low * f_high <= 0.0
+        for _i in range(_CAREFUL_ITERATIONS):
+            if not found or f_high == 0.0 or abs(high - low) <= 2.0 * _EPSILON * abs(high):
+                break
+            kappa = illinois(low, f_low, high, f_high)
+            low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, _residual(law, surface, r, c, kappa))
+        return Reaction(r - surface.resolve(r, kappa), 0.0, found)
+
+
+# --- The rule --------------------------------------------------------------------------------------------
 
 
 class RuleStep(NamedTuple):
@@ -43,28 +127,24 @@ class RuleNumbers(fixed_step.Numbers):
         return walls.at((lane.remaining - self.point) * self.dt)
 
     def most_sweeps(self, walls):
-        return implicit.SWEEPS
+        return _SWEEPS
 
     def guess(self, walls, gravity, lane, wall):
         r = self.free(walls, gravity, lane)
         touching = wall >= 0.0
-        kappa = implicit.guess(self.there(walls, lane), wall, self.law, r, lane.own.over_mass)
+        kappa = self.there(walls, lane).of(wall, 0.0, _guess, self.law, r, lane.own.over_mass)
         return select(touching, kappa, 0.0), touching
 
     def improve(self, walls, gravity, lane, wall, solution, multiplier):
         r, kappa = self.free(walls, gravity, lane), solution.kappa
         there = self.there(walls, lane)
-        step, more = implicit.improve(there, wall, self.law, r, lane.own.over_mass, kappa)
+        step, more = there.of(wall, (0.0, False), _improve, self.law, r, lane.own.over_mass, kappa)
         return select(solution.unsolved, kappa - step, kappa), solution.unsolved & more, contract.NO_RECORD
 
     def contact(self, walls, gravity, lane, wall, solution):
         r, there = self.free(walls, gravity, lane), self.there(walls, lane)
-        before, over, after = (
-            self.before(walls, lane.remaining),
-            self.over(walls, lane.remaining),
-            self.after(walls, lane.remaining),
-        )
-        point = implicit.reached(there, wall, r, solution.kappa)
+        before, over, after = self.times(walls, lane.remaining)
+        point = _reached(there, wall, r, solution.kappa)
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
         # Another wall at s, or an equation that is not solved yet: the careful way.
@@ -81,7 +161,7 @@ class RuleNumbers(fixed_step.Numbers):
         before = self.before(walls, lane.remaining)
         free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
         reactions = scratch((walls.length(), 4), np.float64)
-        point, solved = corner.hold(implicit.AtEnd(), self.law, None, self.there(walls, lane), free, reactions)
+        point, solved = corner.hold(_AtEnd(), self.law, None, self.there(walls, lane), free, reactions)
         work = self.add_impulses(walls, lane, reactions, impulse, i)
         step = self.end(before, gravity, lane, point, corner.total(reactions))
         return fixed_step.Careful(step.r, step.v, solved, work)

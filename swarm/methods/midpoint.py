@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ..contact import corner, implicit
+from ..contact import corner
 from ..kernel.gravity import accelerated
 from ..scene import Scene
 from . import fixed_step, implicit_rule
@@ -36,10 +36,10 @@ class Midpoint(fixed_step.SoftWalls):
     """
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *super().needs(scene), *implicit.NEEDS
+        return *super().needs(scene), *implicit_rule.NEEDS
 
     def numbers(self, scene: Scene) -> fixed_step.Numbers:
-        # h^2/(4m) of equation (I) in contact/implicit.py
+        # h^2/(4m) of equation (I) in implicit_rule.py
         return self.record(MidpointNumbers, scene, 0.25 * self.dt * self.dt)
 
 

@@ -1,7 +1,7 @@
 """Penalty: fixed steps with soft walls, conserving kinetic + potential + stored energy."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from ..contact.impulse import Step
 from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
-from ..kernel.vector import norm
+from ..kernel.vector import Vec, norm
 from ..scene import Scene
-from . import contract, fixed_step
+from . import fixed_step
 
 
 @dataclass(frozen=True)
@@ -68,63 +68,116 @@ class Penalty(fixed_step.SoftWalls):
 # --- As kernels know it ----------------------------------------------------------------------------------
 
 
-class PenaltyNumbers(fixed_step.Numbers):
-    """The step with the composite discrete gradient, or with the mean-value one."""
+class Cut(NamedTuple):
+    """Length of the contact step, the same in the unit of `remaining`, and the regularisation."""
 
-    def free(self, gravity, lane):
-        """The step without walls: r0, p and c."""
-        return Step(lane.r, displacement(gravity, lane.v, self.dt), lane.own.over_mass)
+    h: float
+    used: float
+    law: Any
 
-    def restored(self, over, after, gravity, lane, work, ends):
-        """The factor of v1 with which the energy is that of the start and `work`, and whether it was so before."""
-        budget = energies.Budget(
-            2.0 / (self.dt * self.dt) * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 0.0
-        )
-        return energies.restored(self.law, over, after, gravity, budget, ends)
+
+class Pushed(NamedTuple):
+    """The end of a contact step, its walls over the step and at its end, and the impulse and the work per mass.
+
+    `balanced` is whether its energy is that of the start and the work, up to round-off that is restored.
+    """
+
+    r: Vec
+    v: Vec
+    over: Any
+    after: Any
+    impulse: float
+    work: float
+    balanced: bool
+
+
+class GradientSteps(fixed_step.Steps):
+    """The steps with a discrete gradient, r1 = r0 + p - kappa D(r0, r1); they have the fields `law` and `form` too."""
+
+    # Whether multipliers add to the springs.
+    multiplies = False
+
+    def cut(self: Any, remaining):
+        """The `Cut` of the next contact step."""
+        return Cut(self.dt, 1.0, self.law)
+
+    def free(self: Any, gravity, lane, h):
+        """The step without walls: r0, p and c = h^2/(2m)."""
+        raise NotImplementedError
+
+    def over_mass(self: Any, lane):
+        """1/m"""
+        raise NotImplementedError
 
     def most_sweeps(self, walls):
         return contact_impulse.NEWTON_STEPS
 
     def guess(self, walls, gravity, lane, wall):
-        over = self.over(walls, lane.remaining)
-        kappa = contact_impulse.guess(over, wall, self.law, self.free(gravity, lane))
+        cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
+        kappa = contact_impulse.guess(over, wall, cut.law, self.free(gravity, lane, cut.h))
         touching = wall >= 0.0
         return select(touching, kappa, 0.0), touching
 
     def improve(self, walls, gravity, lane, wall, solution, multiplier):
-        kappa, unsolved = solution.kappa, solution.unsolved
-        over = self.over(walls, lane.remaining)
-        newton = contact_impulse.improve(over, wall, self.law, None, self.free(gravity, lane), kappa)
-        return select(unsolved, kappa - newton.step, kappa), unsolved & newton.more, contract.NO_RECORD
+        cut, over, kappa = self.cut(lane.remaining), self.over(walls, lane.remaining), solution.kappa
+        given, free = multiplier if self.multiplies else None, self.free(gravity, lane, cut.h)
+        newton = contact_impulse.improve(over, wall, cut.law, given, free, kappa)
+        return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
-    def contact(self, walls, gravity, lane, wall, solution):
-        # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1)
-        h, kappa = self.dt, solution.kappa
-        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
-        step = self.free(gravity, lane)
+    def pushed(self, walls, gravity, lane, wall, h, kappa):
+        """The `Pushed` step of a wall, or the free one."""
+        over, step = self.over(walls, lane.remaining), self.free(gravity, lane, h)
         touching = wall >= 0.0
         r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
         # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
         g = over.discrete_gradient(wall, step.r, r1)
         f = select(touching, 2.0 / h * kappa, 0.0)
-        v1 = accelerated(gravity, lane.v, h) - f * g
-        work = self.work_along(over, wall, -f / h * g)
+        v1, work = accelerated(gravity, lane.v, h) - f * g, self.work_along(over, wall, -f / h * g)
+        given = abs(f) * norm(g)
+        end = self._restored(walls, gravity, lane, h, Pushed(r1, v1, over, None, given, work, False), 1.0 / h * given)
+        return end._replace(v=select(touching, end.v, v1))
 
+    def reacted(self, walls, gravity, lane, h, end, reactions, impulse, i):
+        """The `Pushed` step with these reactions of all walls; adds their impulses and works to `impulse`."""
+        over, reaction = self.over(walls, lane.remaining), corner.total(reactions)
+        corner.add_impulses(reactions, h, impulse, i)
+        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
+        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
+        force = 1.0 / h * (2.0 / h * norm(reaction))
+        return self._restored(walls, gravity, lane, h, Pushed(end, v1, over, None, 0.0, work, False), force)
+
+    def _restored(self: Any, walls, gravity, lane, h, end, force):
+        """A `Pushed` step with the energy of the start and the work; `force` is what multipliers may add."""
+        after = self.after(walls, lane.remaining)
+        energy = 0.5 * lane.own.twice_energy + end.work
+        budget = energies.Budget(self.over_mass(lane), energy, force if self.multiplies else 0.0)
+        ends = energies.Ends(lane.r, end.r, end.v, h)
+        factor, balanced = energies.restored(self.law, end.over, after, gravity, budget, ends)
+        return end._replace(v=end.v * factor, after=after, balanced=balanced)
+
+
+class PenaltyNumbers(GradientSteps, fixed_step.Numbers):
+    """The step with the composite discrete gradient, or with the mean-value one."""
+
+    def free(self, gravity, lane, h):
+        return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass)
+
+    def over_mass(self, lane):
+        return 2.0 / (self.dt * self.dt) * lane.own.over_mass
+
+    def contact(self, walls, gravity, lane, wall, solution):
+        # One step, free or in contact with one wall
+        end = self.pushed(walls, gravity, lane, wall, self.dt, solution.kappa)
         # A push into another wall, or an equation that is not solved yet: the careful way.
-        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-        solved = balanced & (not solution.unsolved) & over.pushes(wall, kappa)
-        solved = solved & (not after.outside(wall, r1))
-        new = touching & (not over.outside(-1.0, lane.r))
-        taken = fixed_step.Taken(r1, v1 * select(touching, factor, 1.0), solved, abs(f) * norm(g), new, work)
+        solved = end.balanced & (not solution.unsolved) & end.over.pushes(wall, solution.kappa)
+        solved = solved & (not end.after.outside(wall, end.r))
+        new = (wall >= 0.0) & (not end.over.outside(-1.0, lane.r))
+        taken = fixed_step.Taken(end.r, end.v, solved, end.impulse, new, end.work)
         return fixed_step.contact(lane, wall, taken)
 
     def careful_step(self, walls, gravity, lane, impulse, i):
-        h, step = self.dt, self.free(gravity, lane)
-        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
         reactions = scratch((walls.length(), 4), np.float64)
-        r1, solved = corner.hold(self.form, self.law, None, over, step, reactions)
-        corner.add_impulses(reactions, h, impulse, i)
-        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
-        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * corner.total(reactions)
-        factor, balanced = self.restored(over, after, gravity, lane, work, energies.Ends(step.r, r1, v1, h))
-        return fixed_step.Careful(r1, v1 * factor, solved and balanced, work)
+        over, free = self.over(walls, lane.remaining), self.free(gravity, lane, self.dt)
+        r1, solved = corner.hold(self.form, self.law, None, over, free, reactions)
+        end = self.reacted(walls, gravity, lane, self.dt, r1, reactions, impulse, i)
+        return fixed_step.Careful(end.r, end.v, solved and end.balanced, end.work)

@@ -5,13 +5,11 @@ exact impacts replace it.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..contact import corner, uzawa
-from ..contact import energy as energies
-from ..contact import impulse as contact_impulse
+from ..contact import uzawa
 from ..contact.discrete_gradient import MeanValue
 from ..contact.impulse import Step
 from ..contact.laws import NONE
@@ -20,10 +18,10 @@ from ..contact.touching import Contacts, Moving, impact
 from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
-from ..kernel.vector import norm, square
+from ..kernel.vector import square
 from ..status import Status
 from ..surfaces import flights
-from . import contract, fixed_step
+from . import contract, penalty
 
 RAISE, COUNT, IMPACT = 0, 1, 2
 # A second wall nearer than this part of the shortest flight is met in the same instant.
@@ -34,17 +32,10 @@ _MOST_BOUNCES = 1000
 _ROUND_OFF = 1e-13
 
 
-class Cut(NamedTuple):
-    """Length of the contact step, the same in the unit of `remaining`, and the regularisation."""
-
-    h: float
-    used: float
-    law: Any
-
-
-class Numbers(fixed_step.Steps):
+class Numbers(penalty.GradientSteps):
     """The method as kernels know it, and what is different between its two kinds of steps."""
 
+    multiplies = True
     # Of 1/mass in what a lane keeps.
     factor = 0.5
     dt: float
@@ -57,10 +48,6 @@ class Numbers(fixed_step.Steps):
     policy: int
     longest: Any  # step that jumps over no solid [m], None where there is none
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
-
-    def cut(self, remaining):
-        """The `Cut` of the next contact step."""
-        raise NotImplementedError
 
     def is_new(self, walls, r):
         """Whether a contact step starts with an impact."""
@@ -81,22 +68,10 @@ class Numbers(fixed_step.Steps):
     # --- The unknown of a contact ---
 
     def free(self, gravity, lane, h):
-        """The step without walls: r0, p and c = h^2/(2m)."""
         return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
 
-    def most_sweeps(self, walls):
-        return contact_impulse.NEWTON_STEPS
-
-    def guess(self, walls, gravity, lane, wall):
-        cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
-        kappa = contact_impulse.guess(over, wall, cut.law, self.free(gravity, lane, cut.h))
-        touching = wall >= 0.0
-        return select(touching, kappa, 0.0), touching
-
-    def improve(self, walls, gravity, lane, wall, solution, multiplier):
-        cut, over, kappa = self.cut(lane.remaining), self.over(walls, lane.remaining), solution.kappa
-        newton = contact_impulse.improve(over, wall, cut.law, multiplier, self.free(gravity, lane, cut.h), kappa)
-        return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
+    def over_mass(self, lane):
+        return 2.0 * lane.own.over_mass
 
     # --- Uzawa's loop (8) ---
 
@@ -119,33 +94,22 @@ class Numbers(fixed_step.Steps):
     # --- Contact ---
 
     def contact(self, walls, gravity, lane, wall, solution):
-        # One step, free or in contact with one wall: r1 = r0 + p - kappa D(r0, r1), v1 = v0 + h G - (2 kappa/h) D
         cut, kappa = self.cut(lane.remaining), solution.kappa
-        over, after = self.over(walls, lane.remaining), self.after(walls, lane.remaining)
-        h, p = cut.h, displacement(gravity, lane.v, cut.h)
-        r1 = over.push(wall, lane.r, p, kappa)
-        g = over.discrete_gradient(wall, lane.r, r1)
-        f = 2.0 / h * kappa
-        work = self.work_along(over, wall, -f / h * g)
-        v1 = accelerated(gravity, lane.v, h) - f * g
-        given = abs(f) * norm(g)
-
-        alone = self.is_alone(after, wall, lane.r, r1, kappa)
-        solved = alone & (not solution.unsolved) & over.pushes(wall, kappa)
+        end = self.pushed(walls, gravity, lane, wall, cut.h, kappa)
+        alone = self.is_alone(end.after, wall, lane.r, end.r, kappa)
+        solved = alone & (not solution.unsolved) & end.over.pushes(wall, kappa)
         touching = wall >= 0.0
         step = (lane.remaining > 0.0) & touching & solved
-        budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, 1.0 / h * given)
-        factor, _balanced = energies.restored(self.law, over, after, gravity, budget, energies.Ends(lane.r, r1, v1, h))
-        new = step & self.is_new(over, lane.r)
-        work = select(step, work, 0.0)
+        new = step & self.is_new(end.over, lane.r)
+        work = select(step, end.work, 0.0)
         # A step without contact: only fixed steps end here that way, just before one.
         loose = (lane.remaining > 0.0) & (wall > contract.HARD) & (not touching)
         return contract.Contact(
-            select(step, r1, select(loose, lane.r + p, kept(lane.r))),
-            select(step, v1 * factor, select(loose, accelerated(gravity, lane.v, h), kept(lane.v))),
+            select(step | loose, end.r, kept(lane.r)),
+            select(step, end.v, select(loose, accelerated(gravity, lane.v, cut.h), kept(lane.v))),
             lane.remaining - select(step | loose, cut.used, 0.0),
             select(touching & (not solved), contract.HARD - wall, wall),
-            select(step, given, 0.0),
+            select(step, end.impulse, 0.0),
             select(new, 1.0, 0.0),
             lane.own.twice_energy + 2.0 * work,
             False,
@@ -155,7 +119,7 @@ class Numbers(fixed_step.Steps):
     @outlined
     def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         cut, record = self.cut(lane.remaining), lanes.record
-        h, over, after = cut.h, self.over(walls, lane.remaining), self.after(walls, lane.remaining)
+        h, over = cut.h, self.over(walls, lane.remaining)
         if self.is_blocked(walls, wall, lane.r, h * lane.v):
             record[uzawa.SWEEPS, i] = 0.0
             return self.as_impacts(walls, lane, cut, wall, lanes, i)
@@ -171,17 +135,9 @@ class Numbers(fixed_step.Steps):
         if not end.converged and (self.policy == RAISE or not end.solved):
             return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
         new = 1.0 if self.is_new(over, lane.r) else 0.0
-        reaction = corner.total(reactions)
-        v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
-        corner.add_impulses(reactions, h, lanes.impulse, i)
-        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, lanes.impulse, i)
-        force = 1.0 / h * (2.0 / h * norm(reaction))
-        budget = energies.Budget(2.0 * lane.own.over_mass, 0.5 * lane.own.twice_energy + work, force)
-        factor, _balanced = energies.restored(
-            self.law, over, after, gravity, budget, energies.Ends(lane.r, end.r, v1, h)
-        )
-        remaining, twice_energy = lane.remaining - cut.used, lane.own.twice_energy + 2.0 * work
-        return contract.Contact(end.r, v1 * factor, remaining, wall, 0.0, new, twice_energy, False), Status.DONE.value
+        pushed = self.reacted(walls, gravity, lane, h, end.r, reactions, lanes.impulse, i)
+        remaining, twice_energy = lane.remaining - cut.used, lane.own.twice_energy + 2.0 * pushed.work
+        return contract.Contact(pushed.r, pushed.v, remaining, wall, 0.0, new, twice_energy, False), Status.DONE.value
 
 
 @outlined
@@ -199,9 +155,6 @@ def _after(r, v, remaining, hits):
 
 class FixedSteps(Numbers):
     """The method with steps of fixed length."""
-
-    def cut(self, remaining):
-        return Cut(self.dt, 1.0, self.law)
 
     def is_new(self, walls, r):
         return not walls.outside(-1.0, r)
@@ -239,7 +192,7 @@ class CutSteps(Numbers):
         # alpha.
         h = select(self.dt < remaining, self.dt, remaining)
         part = self.dt / h
-        return Cut(h, h, self.law.stiffened(part * part))
+        return penalty.Cut(h, h, self.law.stiffened(part * part))
 
     def is_new(self, walls, r):
         return True

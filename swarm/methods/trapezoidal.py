@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ..contact import corner, implicit
-from ..contact.force import add_impulses, add_works, force
+from ..contact import corner
+from ..contact.energy import add_impulses, add_works, force
 from ..kernel.gravity import accelerated, displacement
 from ..scene import Scene
 from . import fixed_step, implicit_rule
@@ -37,10 +37,10 @@ class Trapezoidal(fixed_step.SoftWalls):
     """
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        return *super().needs(scene), *implicit.NEEDS
+        return *super().needs(scene), *implicit_rule.NEEDS
 
     def numbers(self, scene: Scene) -> fixed_step.Numbers:
-        # h^2/(4m) of equation (I) in contact/implicit.py
+        # h^2/(4m) of equation (I) in implicit_rule.py
         return self.record(TrapezoidalNumbers, scene, 0.25 * self.dt * self.dt)
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ..contact.force import NEEDS as FORCE_NEEDS
-from ..contact.force import add_impulses, add_works, force, work
+from ..contact.energy import NEEDS as FORCE_NEEDS
+from ..contact.energy import add_impulses, add_works, force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
@@ -64,11 +64,7 @@ class VerletNumbers(fixed_step.Numbers):
     def step(self, walls, gravity, lane):
         """The `VerletStep` of a lane."""
         h, over_mass = self.dt, lane.own.over_mass
-        before, over, after = (
-            self.before(walls, lane.remaining),
-            self.over(walls, lane.remaining),
-            self.after(walls, lane.remaining),
-        )
+        before, over, after = self.times(walls, lane.remaining)
         f0 = force(before, self.law, lane.r)
         # h^2/(2m) F0
         r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
@@ -84,11 +80,7 @@ class VerletNumbers(fixed_step.Numbers):
 
     def careful_step(self, walls, gravity, lane, impulse, i):
         step, over_mass, law = self.step(walls, gravity, lane), lane.own.over_mass, self.law
-        before, over, after = (
-            self.before(walls, lane.remaining),
-            self.over(walls, lane.remaining),
-            self.after(walls, lane.remaining),
-        )
+        before, over, after = self.times(walls, lane.remaining)
         add_impulses(before, law, over_mass, lane.r, impulse, i)
         add_impulses(after, law, over_mass, step.r, impulse, i)
         work = add_works(self.moving, over, before, law, over_mass / self.dt, lane.r, impulse, i)

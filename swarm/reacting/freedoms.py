@@ -15,7 +15,7 @@ from ..surfaces import flights, safe
 from ..surfaces.drive import Drive, Pose, Swing
 from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
-from ..surfaces.relative import flight_of
+from ..surfaces.rising import flight_of
 from ..surfaces.walls import Walls
 
 

@@ -8,10 +8,10 @@ import math
 from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
+from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from ..surfaces.course import rise_time
 from ..surfaces.drive import Drive, Pose, Rows, Turn
-from ..surfaces.moving import Driven
 from ..surfaces.posed import Posed
 from .freedoms import Freedom, exact_sum, march
 
@@ -91,7 +91,7 @@ def rows_about(axis, angle):
     )
 
 
-class Swaying(Driven):
+class Swaying(Record):
     """A pendulum as flights meet it, from a time on."""
 
     body: Any

@@ -8,14 +8,11 @@ that rises through 0, so no root is skipped; near the root it is Newton's step o
 import math
 from typing import Any
 
-from ..kernel.gravity import Gravity, accelerated, displacement
-from ..kernel.jit import outlined, select
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import select
 from ..kernel.record import Record
-from . import flights
-from .course import Majorant, positive, rise_by
-
-# Steps of a flight that is asked for alone; what is not found by then goes on in the next pass.
-_STEPS = 100
+from ..kernel.vector import Vec
+from .course import Majorant, positive, rise_by, under_way
 
 
 class Near(Majorant):
@@ -48,11 +45,10 @@ class Near(Majorant):
         if self.border is None:
             return self, rise, size
         beyond = self.border.beyond(t)
-        a2 = self.a2 + select(self.border.rises, beyond, 0.0)
-        above = Near(self.c, self.b, a2, self.higher, self.window, self.nearly, self.meets, self.border)
+        above = self._replace(a2=self.a2 + select(self.border.rises, beyond, 0.0))
         return above, rise, size + beyond / select(t > 0.0, t, math.inf)
 
-    def ended(self, time, reach, size):
+    def step(self, time, reach, size):
         """(the step, its length or 0 if it is the last)."""
         step = select(time < reach, time, reach)
         # A step that only ends at its reach is no hit, however short.
@@ -62,18 +58,7 @@ class Near(Majorant):
     def first_step(self):
         """The first step of a flight: (t, its length, 0 if it is the last)."""
         above, rise, size = self.bounds(self.window)
-        return self.ended(above.rises_after_leaving(rise, self.window), self.window, size)
-
-    def next_step(self, t, last):
-        """One step more of a flight, from where the steps until t have led: (t, its length, 0 if it is the last).
-
-        The parabola holds for twice the last step, or without end where the level is one itself.
-        """
-        reach = select(self.window < math.inf, 2.0 * last, math.inf)
-        above, rise, size = self.bounds(reach)
-        step, length = self.ended(above.rises(rise, reach), reach, size)
-        goes_on = under_way(t, last)
-        return select(goes_on, t + step, t), select(goes_on, length, last)
+        return self.step(above.rises_after_leaving(rise, self.window), self.window, size)
 
 
 class Border(Record):
@@ -90,58 +75,31 @@ class Border(Record):
         return select(t > 0.0, over * over, 0.0)
 
 
-def under_way(t, last):
-    """Whether a flight has not met the wall, and may."""
-    return (t < math.inf) & (last > 0.0)
+class Approach(Record):
+    """The steps of a flight to a wall that is asked for its level, `near`, at each."""
+
+    surface: Any
+    gravity: Any
+    r: Vec
+    v: Vec
+
+    # What is not found by then goes on in the next pass.
+    most = 100
+
+    def first_step(self):
+        return self.surface.near(self.gravity, self.r, self.v).first_step()
+
+    def next_step(self, t, last):
+        # The parabola holds for twice the last step, or without end where the level is one itself.
+        level = self.surface.near(self.gravity, *place(self.gravity, self.r, self.v, t, last))
+        reach = select(level.window < math.inf, 2.0 * last, math.inf)
+        above, rise, size = level.bounds(reach)
+        step, length = level.step(above.rises(rise, reach), reach, size)
+        goes_on = under_way(t, last)
+        return select(goes_on, t + step, t), select(goes_on, length, last)
 
 
 def place(gravity, r, v, t, last):
     """Where the steps of a flight have led it, and its velocity there; its start where there are no more of them."""
     s = select(under_way(t, last), t, 0.0)
     return r + displacement(gravity, v, s), accelerated(gravity, v, s)
-
-
-# --- What follows from `near` ----------------------------------------------------------------------------
-
-
-@outlined
-def first_hit(surface, gravity, r, v):
-    """`first_hit` with or without gravity."""
-    t, last = surface.near(gravity, r, v).first_step()
-    for _step in range(_STEPS):
-        if not under_way(t, last):
-            break
-        p, w = place(gravity, r, v, t, last)
-        t, last = surface.near(gravity, p, w).next_step(t, last)
-    return t, not under_way(t, last)
-
-
-def safe_time(surface, r, v, pull):
-    """A time during which a fall surely stays admissible."""
-    level = surface.near(Gravity(pull.x, pull.y, pull.z), r, v)
-    return select(level.c > 0.0, 0.0, level.first_step()[0])
-
-
-# --- In lanes --------------------------------------------------------------------------------------------
-
-
-def begin(surface, gravity, course, row, lane, r, v):
-    """The start of a flight into course[row:, lane]."""
-    if _in_steps(surface, gravity):
-        level = surface.near(gravity, r, v)
-        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = level.first_step()
-    else:
-        flights.begin_whole(gravity, surface, course, row, lane, r, v)
-
-
-def step(surface, gravity, course, row, lane, r, v):
-    """One safe step of it."""
-    if _in_steps(surface, gravity):
-        t, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
-        level = surface.near(gravity, *place(gravity, r, v, t, last))
-        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = level.next_step(t, last)
-
-
-def _in_steps(surface, gravity):
-    """Whether a flight takes steps: a constant for the compiler."""
-    return gravity is not None or surface.in_steps is not None

@@ -15,6 +15,13 @@ class AtRest(Record):
 
     # --- Overridden by a wall in motion ---
 
+    # Whether it moves other than uniformly, so that flights to it go by safe steps in its frame.
+    accelerates = False
+
+    def seen(self, flight, t):
+        """A particle as safe steps to the wall see it after a time of its flight, `Seen`, None if none are needed."""
+        return
+
     def velocity(self, r):
         """The velocity of the wall at a point of it."""
         return ZERO
@@ -57,7 +64,7 @@ class AtRest(Record):
     # --- Overridden by a shape: safe steps in the frame of a wall that moves other than uniformly; see rising.py ---
 
     def level_along(self, seen):
-        """The level along a flight with a bound of its third derivative: a `Level`, or `Between`, of levels.py."""
+        """The level along a flight with a bound of its third derivative: a `Level`, or `Between` of rising.py."""
         raise NotImplementedError
 
     @property
@@ -72,9 +79,9 @@ class AtRest(Record):
         return rising.bent_step(self, seen, longest)
 
     @property
-    def needs_bend(self):
-        """Whether that step follows from `hessian_bounds`."""
-        return not (self.gives("level_along") or self.gives("moving_step"))
+    def lacks_bend(self):
+        """Whether that step follows from `hessian_bounds`, which the surface does not have."""
+        return not any(map(self.gives, ("level_along", "moving_step", "hessian_bounds")))
 
     def bounds_along(self, seen, within):
         """`Bounds` of that flight for some time, in any frame in which the level is the same function of place."""

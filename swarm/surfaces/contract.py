@@ -10,12 +10,13 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 `required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
 """
 
-from ..kernel.gravity import Gravity
-from ..kernel.jit import select
+from ..kernel.gravity import Gravity, as_vector
+from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
-from . import approach, flights, march, newton
+from . import march, newton
+from .approach import Approach
 from .at_rest import AtRest
-from .course import first_rise, rise_time, safe_rise_time
+from .course import Fall, close, first_rise, rise_near, rise_time, safe_rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
@@ -62,7 +63,7 @@ class Smooth(AtRest):
     def hessian_bounds(self, r):
         """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
 
-        The distance may only be infinite where there is no gravity.
+        The distance must be finite where the hits of falls follow from these.
         """
         raise NotImplementedError
 
@@ -127,15 +128,38 @@ class Smooth(AtRest):
         the approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle moves
         outward.
         """
-        return approach.first_hit(self, None, r, v) if self.gives("near") else march.march(self, r, v, ZERO)
+        return self.hit_by_steps(None, r, v)
 
     def falling_hit(self, r, v, pull):
         """`first_hit` for the parabola r + v t + G t^2/2."""
-        if self.is_quartic:
-            return first_rise(self.may_be_far, self.course(r, v, pull))
-        if self.gives("near"):
-            return approach.first_hit(self, Gravity(pull.x, pull.y, pull.z), r, v)
-        return march.march(self, r, v, pull)
+        return self.hit_by_steps(Gravity(pull.x, pull.y, pull.z), r, v)
+
+    def hit_by_steps(self, gravity, r, v):
+        """Both hits of a surface that gives `course`, `near` or `hessian_bounds`."""
+        steps = self.steps(gravity, r, v)
+        if isinstance(steps, Fall):
+            return first_rise(steps)
+        if steps is not None:
+            return _first_rise(self, gravity, r, v)
+        return march.march(self, r, v, ZERO if gravity is None else as_vector(gravity))
+
+    def steps(self, gravity, r, v):
+        """The safe steps of a flight to the wall, which lanes take: `Fall`, `Approach` or alike.
+
+        None where its hit is asked for as a whole.
+        """
+        if gravity is not None and self.is_quartic:
+            level = self.course(r, v, as_vector(gravity))
+            return Fall(level, close(level.window), self.may_be_far)
+        near = self.gives("near") and (gravity is not None or self.in_steps)
+        return Approach(self, gravity, r, v) if near else None
+
+    def look(self, r, v, pull, t, is_first):
+        """The `Look` of march.py at a flight at a time."""
+        return march.look(self, r, v, pull, t, is_first)
+
+    # The most looks at a fall.
+    falling_looks = march.FALLING_LOOKS
 
     def safe_time(self, r, v, pull):
         """A time during which that parabola surely stays admissible: a lower bound, cheap.
@@ -145,8 +169,19 @@ class Smooth(AtRest):
         if self.is_quartic:
             return safe_rise_time(self.course(r, v, pull))
         if self.gives("near"):
-            return approach.safe_time(self, r, v, pull)
+            level = self.near(Gravity(pull.x, pull.y, pull.z), r, v)
+            return select(level.c > 0.0, 0.0, level.first_step()[0])
         return march.safe_time(self, r, v, pull) if self.gives("hessian_bounds") else 0.0
+
+    def entry(self, gravity, r, v):
+        """A time until which a flight surely stays admissible: (time, whether it does no longer then).
+
+        By less than a hit, of a part of a solid: there the next entry of all parts is asked for again.
+        """
+        if gravity is None:
+            return self.first_hit(r, v)
+        pull = as_vector(gravity)
+        return rise_near(self.course(r, v, pull)) if self.is_quartic else self.falling_hit(r, v, pull)
 
     def straight_hit(self, end, r0, r1):
         """`first_hit` of a straight way from r0 at one instant to r1 at another, where the surface is `end`."""
@@ -173,22 +208,8 @@ class Smooth(AtRest):
 
     @property
     def in_steps(self):
-        """A number where a straight flight takes steps in lanes; None where its hit is asked for as a whole."""
-        return 1.0 if self.gives("near") else None
-
-    def begin_flight(self, gravity, course, row, lane, r, v):
-        """The start of a flight in lanes into course[row:, lane]."""
-        if self.gives("near"):
-            approach.begin(self, gravity, course, row, lane, r, v)
-        else:
-            flights.begin_whole(gravity, self, course, row, lane, r, v)
-
-    def step_flight(self, gravity, course, row, lane, r, v):
-        """One safe step of it, where it takes steps."""
-        if self.gives("near"):
-            approach.step(self, gravity, course, row, lane, r, v)
-        else:
-            flights.step_whole(gravity, self, course, row, lane)
+        """Whether a straight flight takes steps in lanes."""
+        return self.gives("near")
 
     def clearance(self, r):
         """Lower bound of the distance to the wall; 0 if unknown."""
@@ -271,3 +292,8 @@ class Smooth(AtRest):
         kappa = kappa - self.chord_improve(r, p, kappa)
         n = self.discrete_gradient(r, self.push(r, p, kappa))
         return n * (self.side / norm(n))
+
+
+@outlined
+def _first_rise(surface, gravity, r, v):
+    return first_rise(surface.steps(gravity, r, v))

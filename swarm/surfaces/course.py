@@ -1,7 +1,8 @@
 """The level along a flight as a polynomial of time, and when it first rises through 0.
 
 A straight flight makes the level of a quadric a parabola, whose root is a closed form. A fall makes it a quartic, whose
-first root is found by safe steps: none is skipped, however close to a double one.
+first root is found by safe steps: none is skipped, however close to a double one. Steps have two methods: `first_step`
+and `next_step`, which take a flight from the time that the steps so far have led to by a length on, 0 if it is there.
 """
 
 import math
@@ -80,6 +81,18 @@ class Quartic(Majorant):
         a3t = a3t + t * a4
         return Quartic(ct, bt, a2t, a3t, a4, self.window)
 
+    def first_step(self):
+        """The first step of a flight that does not rise at once: (t, what `Fall.next_step` takes as the last length).
+
+        Where c <= 0 and b <= 0 the level is below t (2 b + a2 t + s t^2), one power of t nearer to it than the parabola
+        of a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under
+        a ceiling needs: the parabola of the whole window rises at once there.
+        """
+        window = abs(self.window)
+        time = self.leaves(self.steepest(window))
+        time = select(self.b <= 0.0, select(time < window, time, window), 0.0)
+        return time, select(time < math.inf, math.inf, 0.0)
+
 
 def rise_time(c, b, a):
     """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
@@ -145,7 +158,7 @@ def rise_near(level):
     """
     window = abs(level.window)
     first = level.rises(level.steepest(window), window)
-    rises, leaving = first <= window, leave(level)[0]
+    rises, leaving = first <= window, level.first_step()[0]
     time = select(rises, first, window)
     rises, time = rises & (leaving <= time), select(leaving > time, leaving, time)
     reach = 2.0 * time
@@ -165,56 +178,54 @@ def rise_by(slope, window):
     return select(slope > 0.0, slope * window, 0.0)
 
 
-def leave(level):
-    """The first safe step of a flight that does not rise at once: (t, what `safe_step` takes as the last length).
-
-    Where c <= 0 and b <= 0 the level is below t (2 b + a2 t + s t^2), one power of t nearer to it than the parabola of
-    a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under a
-    ceiling needs: the parabola of the whole window rises at once there.
-    """
-    window = abs(level.window)
-    time = level.leaves(level.steepest(window))
-    time = select(level.b <= 0.0, select(time < window, time, window), 0.0)
-    return time, select(time < math.inf, math.inf, 0.0)
-
-
 def close(window):
     """The largest reach step^2 of a step that leaves nothing."""
     window = abs(window)
     return _CLOSE * window * window * window
 
 
-def safe_step(may_be_far, level, nearly, t, last):
-    """One step towards the first rise of a level through 0: (t, its length).
+class Fall(Record):
+    """The steps of a flight whose level is known as a whole."""
 
-    It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close to a
-    double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor polynomial,
-    and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0 from then on, or
-    next to it with a negative window, that is from afar: no hit, but a place to begin again from. `nearly` is what
-    `close` says of the window.
-    """
-    there, window = 0.0, level.window
-    if may_be_far:
-        there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
-    reach = select(2.0 * last < window, 2.0 * last, window)
-    here = level.moved(t)
-    time = here.rises(here.steepest(reach), reach)
-    step = select(time < reach, time, reach)
-    # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
-    at_root = time <= reach
-    return t + step, select(at_root & (reach * step * step <= nearly), there, step)
+    level: Quartic
+    nearly: float  # what `close` says of the window
+    may_be_far: Any  # whether the level may be one from afar: a constant for the compiler
+
+    most = SAFE_STEPS + MORE_STEPS
+
+    def first_step(self):
+        return self.level.first_step()
+
+    def next_step(self, t, last):
+        """One step towards the first rise of the level through 0: (t, its length).
+
+        It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close
+        to a double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor
+        polynomial, and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0
+        from then on, or next to it with a negative window, that is from afar: no hit, but a place to begin again from.
+        """
+        there, window = 0.0, self.level.window
+        if self.may_be_far:
+            there, window = select(window < 0.0, _NO_HIT, 0.0), abs(window)
+        reach = select(2.0 * last < window, 2.0 * last, window)
+        here = self.level.moved(t)
+        time = here.rises(here.steepest(reach), reach)
+        step = select(time < reach, time, reach)
+        # A step that only ends at its reach is no hit, however short: a flight may pass the wall by 1e-12 of its size.
+        at_root = time <= reach
+        return t + step, select(at_root & (reach * step * step <= self.nearly), there, step)
 
 
-def arrived(last):
-    """Whether a safe step was the last."""
-    return last == 0.0
+def under_way(t, last):
+    """Whether a flight has not met the wall, and may."""
+    return (t < math.inf) & (last > 0.0)
 
 
-def first_rise(may_be_far, level):
-    """`first_hit` for a level, by safe steps."""
-    t, last = leave(level)
-    for _step in range(SAFE_STEPS + MORE_STEPS):
-        t, last = safe_step(may_be_far, level, close(level.window), t, last)
-        if arrived(last):
+def first_rise(steps):
+    """(the time that the steps of a flight lead to, whether it meets the wall then or never)."""
+    t, last = steps.first_step()
+    for _step in range(steps.most):
+        if not under_way(t, last):
             break
-    return t, arrived(last)
+        t, last = steps.next_step(t, last)
+    return t, not under_way(t, last)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
-from .course import Quartic, arrived, close, leave, safe_step
+from .course import Fall, Quartic
 from .walls import Field
 
 
@@ -71,45 +71,36 @@ def sooner(time, found, number, later):
 
 # A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
 COURSE = 9
-_WINDOW, TIME, LAST, _CLOSE = 5, 6, 7, 8
+_WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 
 
 def begin(walls, gravity, course, row, lane, r, v):
     """The start of a flight for every wall into course[row:, lane]."""
     for k, wall in enumerate(walls.each):
-        wall.begin_flight(gravity, course, row + k * COURSE, lane, r, v)
-
-
-def begin_whole(gravity, surface, course, row, lane, r, v):
-    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
-    if gravity is not None and surface.is_quartic:
-        level = surface.course(r, v, as_vector(gravity))
-        course[row, lane], course[row + 1, lane], course[row + 2, lane] = level.c, level.b, level.a2
-        course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane] = level.a3, level.a4, level.window
-        course[row + TIME, lane], course[row + LAST, lane] = leave(level)
-        course[row + _CLOSE, lane] = close(level.window)
-    else:
-        time, found = hit(gravity, surface, r, v)
-        course[row + TIME, lane], course[row + LAST, lane] = time, select(found, 0.0, math.inf)
+        at, steps = row + k * COURSE, wall.steps(gravity, r, v)
+        if steps is None:
+            time, found = hit(gravity, wall, r, v)
+            course[at + _TIME, lane], course[at + _LAST, lane] = time, select(found, 0.0, math.inf)
+            continue
+        if isinstance(steps, Fall):
+            for i, number in enumerate(steps.level):
+                course[at + i, lane] = number
+            course[at + _CLOSE, lane] = steps.nearly
+        course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
 
 
 def step(walls, gravity, course, row, lane, r, v):
     """One safe step of every wall that needs steps, of the flight that starts at r."""
     for k, wall in enumerate(walls.each):
-        wall.step_flight(gravity, course, row + k * COURSE, lane, r, v)
-
-
-def step_whole(gravity, surface, course, row, lane):
-    """The same of a wall whose level along the flight is known as a whole, or whose hit is."""
-    if gravity is not None and surface.is_quartic:
-        level = Quartic(
-            course[row, lane], course[row + 1, lane], course[row + 2, lane],
-            course[row + 3, lane], course[row + 4, lane], course[row + _WINDOW, lane],
-        )  # fmt: skip
-        course[row + TIME, lane], course[row + LAST, lane] = safe_step(
-            surface.may_be_far, level, course[row + _CLOSE, lane],
-            course[row + TIME, lane], course[row + LAST, lane],
-        )  # fmt: skip
+        at = row + k * COURSE
+        if gravity is not None and wall.is_quartic:
+            level = Quartic(*(course[at + i, lane] for i in range(_WINDOW + 1)))
+            steps = Fall(level, course[at + _CLOSE, lane], wall.may_be_far)
+        else:
+            steps = wall.steps(gravity, r, v)
+        if steps is not None:
+            t, last = steps.next_step(course[at + _TIME, lane], course[at + _LAST, lane])
+            course[at + _TIME, lane], course[at + _LAST, lane] = t, last
 
 
 def end(walls, course, row, lane):
@@ -117,7 +108,7 @@ def end(walls, course, row, lane):
     first = NEVER
     for k, _wall in reversed(tuple(enumerate(walls.each))):
         at = row + k * COURSE
-        first = sooner(course[at + TIME, lane], arrived(course[at + LAST, lane]), float(k), first)
+        first = sooner(course[at + _TIME, lane], course[at + _LAST, lane] == 0.0, float(k), first)
     return first
 
 

@@ -2,7 +2,8 @@
 
 Each argument of the contract has a role, by which it goes into the frame, and each answer one by which it comes out: a
 place, a velocity and any other vector are turned, a place is moved too, in a wall that moves a velocity loses that of
-the wall, and a number is the same in any frame.
+the wall, and a number is the same in any frame. Over a step the wall may be elsewhere at its end: that is the place
+`end`, the free displacement is a `way`, and the `normal` of the step is turned to both.
 """
 
 from typing import Any
@@ -33,16 +34,17 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("level_along", ("seen",), None),
     ("moving_step", ("seen", None), None),
     ("outward_acceleration", ("place", "velocity", "vector"), None),
-    ("begin_flight", ("gravity", None, None, None, "place", "velocity"), None),
-    ("step_flight", ("gravity", None, None, None, "place", "velocity"), None),
-    ("discrete_gradient", ("place", "place"), "vector"),
-    ("step_normal", ("place", "place"), "vector"),
-    ("push", ("place", "vector", None), "place"),
-    ("rise", ("place", "vector", None), None),
+    ("steps", ("gravity", "place", "velocity"), None),
+    ("entry", ("gravity", "place", "velocity"), None),
+    ("end_inner", ("end",), None),
+    ("discrete_gradient", ("place", "end"), "normal"),
+    ("step_normal", ("place", "end"), "normal"),
+    ("push", ("place", "way", None), "end"),
+    ("rise", ("place", "way", None), None),
     ("resolve", ("place", None), "place"),
-    ("chord_guess", ("place", "vector"), None),
-    ("chord_improve", ("place", "vector", None), None),
-    ("chord_normal", ("place", "vector", None), "vector"),
+    ("chord_guess", ("place", "way"), None),
+    ("chord_improve", ("place", "way", None), None),
+    ("chord_normal", ("place", "way", None), "normal"),
     # Of a field: see `Members`
     ("count", (), None),
     ("field_hit", ("gravity", "place", "velocity"), None),
@@ -53,14 +55,14 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("one_in_cell", (None, "place"), None),
     ("deepest_in_cell", ("place",), None),
 )
-_CONSTANTS = ("flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "needs_bend", "chord_sweeps")
+_CONSTANTS = ("side", "flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "lacks_bend", "chord_sweeps")
 
 
 class Framed(Smooth):
     """A surface `body`, asked in its own frame.
 
-    A class of frames gives `place_in`, `velocity_in`, `vector_in`, `gravity_in`, `place_out` and `vector_out`, as far
-    as its surfaces are asked, and overrides what depends on more than its arguments.
+    A class of frames gives the ways in, such as `place_in`, and out, as far as its surfaces are asked, and overrides
+    what depends on more than its arguments.
     """
 
     def seen_in(self, seen):

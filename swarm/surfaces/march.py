@@ -1,21 +1,107 @@
-"""The first hit of a flight by safe steps, and a time during which it surely hits nothing, from `hessian_bounds`.
+"""The first hit of a flight by looks at it: each says for how long it surely meets nothing, so no root is skipped.
 
-A safe step ends where a parabola above the level rises through 0, so no root is skipped.
+Here a look at a wall follows from `hessian_bounds`, by the root of a parabola above its level. A sampled surface, one
+by functions and walls in motion say in other ways for how long.
 """
 
 import math
+from typing import Any
 
 from ..kernel.jit import outlined, select
-from ..kernel.vector import absolute, dot, norm, square, total
+from ..kernel.record import Record
+from ..kernel.vector import Vec, absolute, dot, norm, square, total
 from .course import rise_time
 
 _EPSILON = 2.220446049250313e-16
-# Steps of one march to the first hit; near the wall each one doubles the digits. What is not found by then goes on in
-# the next pass. A fall may end before it meets the wall, which the march does not know: it looks less far ahead.
-_MARCH = 200
-_FALLING_MARCH = 16
+# Looks of one flight; near the wall each one doubles the digits. What is not found by then goes on in the next pass. A
+# fall may end before it meets the wall, which nothing here knows: from `hessian_bounds` it looks less far ahead.
+LOOKS, FALLING_LOOKS = 200, 16
 # Bisections of an interval down to neighbouring numbers.
 _BISECTIONS = 1100
+
+
+# --- Any flight ------------------------------------------------------------------------------------------
+
+
+class Look(Record):
+    """One look at a flight: a time from which on it surely meets nothing for so long, infinite if it never does."""
+
+    since: Any
+    time: Any
+    wall: Any = 0.0  # the wall that it is at after that time, or -1
+    past: Any = -1.0  # a wall that it is past at this time by more than round-off, or -1
+
+
+class Search(Record):
+    """A flight that is looked at; those to one wall have the fields `surface`, r, v and `pull`."""
+
+    start, longest, looks = 0.0, math.inf, LOOKS
+
+    def look(self, t, is_first):
+        """The `Look` at a time; at the first one the sign of the approach decides whether it meets a wall at once."""
+        raise NotImplementedError
+
+    def past(self: Any, t):
+        """A wall that it is past at a time, or -1."""
+        surface = self.surface
+        level = surface.level_of(surface.inner(self.r + t * (self.v + (0.5 * t) * self.pull)))
+        return select(level > 0.0, 0.0, -1.0)
+
+
+class ToWall(Search):
+    """A flight to one wall that is asked for its `look`."""
+
+    surface: Any
+    r: Vec
+    v: Vec
+    pull: Vec
+    looks: int
+
+    def look(self, t, is_first):
+        return self.surface.look(self.r, self.v, self.pull, t, is_first)
+
+
+def first_met(flight):
+    """(when a flight meets a wall, which); the wall is -1 where it is only known to meet none until then."""
+    t, before = flight.start, flight.start
+    for i in range(flight.looks):
+        look = flight.look(t, i == 0)
+        if look.past >= 0.0:
+            return bisected(flight, before, look.since, look.past)
+        goes_on = look.time < flight.longest - look.since
+        before, t = look.since, look.since + look.time
+        if look.wall >= 0.0:
+            return t, look.wall
+        if not goes_on:
+            # Never to meet a wall is known as well as a hit.
+            return flight.longest, select(flight.longest < math.inf, -1.0, 0.0)
+    return t, -1.0
+
+
+@outlined
+def bisected(flight, low, high, wall):
+    """(the last time between two at which a flight is past no wall, that which it is past then)."""
+    for _i in range(_BISECTIONS):
+        t = 0.5 * (low + high)
+        if not low < t < high:
+            break
+        past = flight.past(t)
+        if past >= 0.0:
+            high, wall = t, past
+        else:
+            low = t
+    return low, wall
+
+
+# --- To a wall with `hessian_bounds` ---------------------------------------------------------------------
+
+
+@outlined
+def march(surface, r, v, pull):
+    """`first_hit` of a wall alone."""
+    straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
+    time, wall = first_met(ToWall(surface, r, v, pull, LOOKS if straight else surface.falling_looks))
+    return time, wall >= 0.0
 
 
 def safe_time(surface, r, v, pull):
@@ -24,44 +110,22 @@ def safe_time(surface, r, v, pull):
     return select(level > 0.0, 0.0, step)
 
 
-@outlined
-def march(surface, r, v, pull):
-    """Safe steps to the first root of the level along the flight."""
+def look(surface, r, v, pull, t, is_first):
+    """The `Look` at a wall."""
+    p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+    level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
+    # By round-off, or because the surface bends more than its file says.
+    is_past = level > 0.0 and half > 0.0 and not is_first
+    room = 2.0 * _EPSILON * total(absolute(p))
+    slack = room * steepness
+    if not is_past and lets_go(level, half, step, slack):
+        _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
+        return Look(t, step, -1.0, -1.0)
     straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
-    t, before = 0.0, 0.0
-    for i in range(_MARCH if straight else _FALLING_MARCH):
-        p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-        level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
-        if level > 0.0 and half > 0.0 and i > 0:
-            # Past the wall by round-off, or because the surface bends more than its file says.
-            return bisected(surface, r, v, pull, before, t), True
-        room = 2.0 * _EPSILON * total(absolute(p))
-        slack = room * steepness
-        if lets_go(level, half, step, slack):
-            _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
-            before, t = t, t + step
-            continue
-        if not step < math.inf or (straight and surface.passed(p, w)):
-            return math.inf, True
-        before, t = t, t + step
-        # At t = 0 the sign of the approach decides, which rise_time has seen to.
-        if (i > 0 or step == 0.0) and way <= room:
-            return t, True
-    return t, False
-
-
-@outlined
-def bisected(surface, r, v, pull, low, high):
-    """The last time between two at which the level is not above 0."""
-    for _i in range(_BISECTIONS):
-        t = 0.5 * (low + high)
-        if not low < t < high:
-            break
-        if surface.level_of(surface.inner(r + t * (v + (0.5 * t) * pull))) > 0.0:
-            high = t
-        else:
-            low = t
-    return low
+    if not is_past and straight and surface.passed(p, w):
+        return Look(t, math.inf, -1.0, -1.0)
+    arrives = (not is_first or step == 0.0) and way <= room
+    return Look(t, step, select(arrives, 0.0, -1.0), select(is_past, 0.0, -1.0))
 
 
 def lets_go(level, half, step, slack):

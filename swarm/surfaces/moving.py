@@ -8,27 +8,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..kernel.record import Record
+from ..motion import Guide
 from .drive import Drive, drive_of
 from .posed import Drifting, Posed
 from .surface import Surface
-from .walls import Field, Walls
+from .walls import Field, Following, Walls
 
 
-class Driven(Record):
-    """A wall that moves."""
-
-    def seen(self, flight, t):
-        """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
-        return
-
-
-class Moving(Driven):
+class Moving(Record):
     """A wall, or a field of them, and its motion."""
 
     body: Any
     drive: Drive
 
-    posed = Posed
+    posed, accelerates = Posed, True
 
     def count(self):
         """How many walls a field has."""
@@ -41,6 +34,7 @@ class Moving(Driven):
         return self.posed(self.body, start, end, self.drive, remaining, after)
 
     def seen(self, flight, t):
+        """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
@@ -48,16 +42,10 @@ class Moving(Driven):
 class Translated(Moving):
     """A wall in uniform translation, with or without a spin that leaves the surface as it is."""
 
-    posed = Drifting
+    posed, accelerates = Drifting, False
 
     def seen(self, flight, t):
         return None
-
-
-class Following(Record):
-    """A wall that moves with the one before it: both are of one surface."""
-
-    body: Any
 
 
 class Carried(Walls):
@@ -75,11 +63,13 @@ class Carried(Walls):
         return Walls(made)
 
     def in_steps(self):
-        return None
+        return False
 
 
 class Marched(Carried):
     """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""
+
+    accelerate = True
 
 
 class Strided(Marched):
@@ -121,5 +111,17 @@ def walls_of(surface: Surface, moment: float) -> list[Any]:
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)
-    uniform = not drive.swings and drive.track is None and drive.turn is None
-    return [(Translated if uniform else Moving)(first, drive), *map(Following, others)]
+    return [(Translated if _is_uniform(drive) else Moving)(first, drive), *map(Following, others)]
+
+
+def _is_uniform(drive: Drive) -> bool:
+    return not drive.swings and drive.track is None and drive.turn is None
+
+
+def lacks_bend(surface: Surface) -> bool:
+    """Whether a surface moves so that its hits need safe steps, and does not bound its bend."""
+    if surface.mass is not None and surface.inertia is None:
+        steps = isinstance(surface.motion, Guide) and surface.motion.stiffness > 0.0
+    else:
+        steps = surface.motion is not None and not _is_uniform(drive_of(surface, 0.0))
+    return steps and any(wall.lacks_bend for wall in surface.walls())

@@ -17,11 +17,11 @@ from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
 from . import required
+from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
-from .kinds import by_kind
-from .room import has_room
-from .surface import SIDES, Surface
+from .instant import has_room, side_of
+from .surface import Surface
 from .walls import Field, Walls, all_walls
 
 # Most walls that all openings of a scene may be compiled for.
@@ -110,7 +110,7 @@ def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
 
 def _reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
-    both = _gap(opening, _sign(opening)), _gap(surface, SIDES[getattr(surface, "side", "inside")])
+    both = _gap(opening, _sign(opening)), _gap(surface, side_of(surface))
     reach = _REACH * max(surface.extent(), opening.extent())
     low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
     # Also where the box of a flat volume has no width
@@ -134,7 +134,7 @@ def _gap(surface: Surface, sign: float) -> Any:
 
 def _sign(opening: Surface) -> float:
     """That of phi where the volume is not."""
-    return 1.0 if isinstance(opening, Many) else SIDES[getattr(opening, "side", "inside")]
+    return 1.0 if isinstance(opening, Many) else side_of(opening)
 
 
 def _box_of(opening: Surface) -> Any:

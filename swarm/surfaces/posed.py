@@ -1,19 +1,23 @@
 """A wall that moves, at one instant or over one step: what is asked of a surface is asked in the frame of the wall.
 
-Of a flight only a wall in uniform translation is asked: it ends there as at a wall at rest. In the frame of a wall that
-is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by rho1 - rho0 = r1 - r0 - (d1 - d0): it is that
-at a wall at rest, with the free displacement p - (d1 - d0).
+A flight to a wall in uniform translation ends as at a wall at rest; to any other it goes by safe steps, safe.py.
+
+In the frame of a wall that is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by
+rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
 """
 
 import math
 from typing import Any
 
 from ..kernel.angle import sine_and_versine
+from ..kernel.gravity import accelerated
 from ..kernel.jit import select
-from ..kernel.vector import Vec, absolute, cross, dot, norm, times, total
-from . import flights
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
+from . import safe
 from .drive import Drive, Pose
 from .frames import Framed
+from .rising import flight_of
+from .walls import Field, Walls
 
 
 class Posed(Framed):
@@ -70,13 +74,33 @@ class Posed(Framed):
         """The middle of the step, from the end of the frame on."""
         return -0.5 * (self.remaining + self.after)
 
-    place_in = own_place
+    place_in, end_in = own_place, own_end
 
     def place_out(self, r):
         return self.pose.place_out(self.drive.center, r)
 
+    def end_out(self, r):
+        """A point of the frame of the wall at the end of the step, in the scene."""
+        return self.end.place_out(self.drive.center, r)
+
     def vector_out(self, a):
         return self.pose.out(a)
+
+    def way_in(self, p):
+        """The free displacement of a step in the frame of a wall that does not turn."""
+        return p - self.displacement()
+
+    def normal_out(self, n):
+        """A normal of the frame of the wall, of a step, in the scene."""
+        if self.pose.turn is None:
+            return n
+        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
+        # across the axis and 1 along it, with the angle a of the step.
+        k = self.drive.turn.axis
+        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
+        along = dot(k, n) * k
+        n = along + (n - along) * (1.0 / (1.0 - half * half))
+        return 0.5 * (self.pose.out(n) + self.end.out(n))
 
     # --- At this instant ---
 
@@ -97,18 +121,41 @@ class Posed(Framed):
     def time_scale(self):
         return self.drive.time_scale
 
-    # --- Flight, but for what safe.py adds ---
+    # --- Flight ---
 
-    is_quartic, may_be_far, has_levels, in_steps = False, True, False, None
+    accelerates = True
+
+    def seen(self, flight, t):
+        remaining = flight.remaining - t
+        pose = self.drive.pose(remaining)
+        return flight.seen(t, Posed(self.body, pose, pose, self.drive, remaining, remaining), flight.pull)
+
+    def sees(self, gravity, r, v):
+        """A particle in the frame of the wall now, as `Seen`."""
+        return self.seen(flight_of(r, v, accelerated(gravity, ZERO, 1.0), self.remaining), 0.0)
+
+    def first_hit(self, r, v):
+        return self.falling_hit(r, v, ZERO)
+
+    def falling_hit(self, r, v, pull):
+        found = safe.march_alone(Walls((self,)), r, v, pull, self.remaining)
+        return found.time, found.wall >= 0.0
+
+    def field_hit(self, gravity, r, v):
+        """The first `Hit` with the bodies of a field, or how far the flight is surely free."""
+        return safe.march_alone(Walls((Field(self),)), r, v, accelerated(gravity, ZERO, 1.0), self.remaining)
+
+    def until_next_cell(self, r, v):
+        """When a straight flight may meet another body of a field."""
+        return safe.until_next_cell(self.body.grid, self.sees(None, r, v), self.remaining)
+
+    is_quartic, may_be_far, has_levels, in_steps = False, True, False, False
 
     def safe_time(self, r, v, pull):
         return 0.0
 
-    def begin_flight(self, gravity, course, row, lane, r, v):
-        flights.begin_whole(gravity, self, course, row, lane, r, v)
-
-    def step_flight(self, gravity, course, row, lane, r, v):
-        flights.step_whole(gravity, self, course, row, lane)
+    def steps(self, gravity, r, v):
+        return None
 
     def straight_hit(self, end, r0, r1):
         own = self.own_place(r0)
@@ -118,9 +165,6 @@ class Posed(Framed):
 
     def displacement(self):
         return self.end.shift - self.pose.shift
-
-    def end_inner(self, r):
-        return self.body.inner(self.own_end(r))
 
     def carry(self, r):
         spin = self.drive.spin
@@ -153,45 +197,11 @@ class Posed(Framed):
         return s + absolute(self.pose.shift) + Vec(late, late, late)
 
     def framed(self, r, p):
-        return self.body, self.own_place(r), p - self.displacement()
-
-    def push(self, r0, p, kappa):
-        body, own, free = self.framed(r0, p)
-        return self.end.shift + body.push(own, free, kappa)
-
-    def rise(self, r0, p, kappa):
-        body, own, free = self.framed(r0, p)
-        return body.rise(own, free, kappa)
-
-    def resolve(self, r, strength):
-        return self.pose.shift + self.body.resolve(self.own_place(r), strength)
-
-    def chord_guess(self, r, p):
-        body, own, free = self.framed(r, p)
-        return body.chord_guess(own, free)
-
-    def chord_improve(self, r, p, kappa):
-        body, own, free = self.framed(r, p)
-        return body.chord_improve(own, free, kappa)
-
-    def discrete_gradient(self, r0, r1):
-        return self._halfway(self.body.discrete_gradient(self.own_place(r0), self.own_end(r1)))
+        return self.body, self.own_place(r), self.way_in(p)
 
     def step_normal(self, r0, r1):
-        n = self._halfway(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
+        n = self.normal_out(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
         return n if self.pose.turn is None else n / norm(n)
-
-    def _halfway(self, n):
-        """A normal of the frame of the wall, of a step, in the scene."""
-        if self.pose.turn is None:
-            return n
-        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
-        # across the axis and 1 along it, with the angle a of the step.
-        k = self.drive.turn.axis
-        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
-        along = dot(k, n) * k
-        n = along + (n - along) * (1.0 / (1.0 - half * half))
-        return 0.5 * (self.pose.out(n) + self.end.out(n))
 
 
 class Drifting(Posed):
@@ -206,8 +216,13 @@ class Drifting(Posed):
         return a
 
     gravity_in = vector_in
+    accelerates = False
     is_quartic = property(lambda self: self.body.is_quartic)
     may_be_far = property(lambda self: self.body.may_be_far)
-    # As at a wall at rest, where a wall that moves otherwise takes safe steps.
+
+    def steps(self, gravity, r, v):
+        # As at a wall at rest where the level is known as a whole: else lanes ask for the hit.
+        return Framed.steps(self, gravity, r, v) if gravity is not None and self.is_quartic else None
+
     first_hit, falling_hit, safe_time = Framed.first_hit, Framed.falling_hit, Framed.safe_time
     field_hit, until_next_cell = Framed.field_hit, Framed.until_next_cell  # type: ignore[attr-defined]

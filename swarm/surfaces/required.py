@@ -1,28 +1,46 @@
-"""The methods that a surface lacks for its use: an error in one sentence, before anything is compiled.
+"""What a surface lacks for its use, methods or a box in which it is known: an error before anything is compiled."""
 
-Which methods a definition in contract.py, march.py, approach.py or newton.py is made of is read from its code. One that
-has no definition there, such as `hessian`, must be given where it is asked for, or something that is made of it is.
-"""
-
-import inspect
-import sys
-import types
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import SceneError
-from . import approach, march, newton
 from .contract import Smooth
 from .fields.members import Members
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
-from .surface import Surface
+from .surface import Surface, shown
 
+# What the definitions of contract.py ask for themselves. What has none there, such as `hessian`, must be given.
+_MADE_OF = {
+    "inner": ("phi",),
+    "inner_gradient": ("gradient",),
+    "gap_of": ("side",),
+    "level_of": ("gap_of",),
+    "gap_slope": ("side",),
+    "distance": ("inner", "gap_of", "gradient"),
+    "gap_scale": ("gradient",),
+    "unit_normal": ("gradient", "side"),
+    "project": ("phi", "gradient"),
+    **dict.fromkeys(("first_hit", "falling_hit"), ("inner", "level_of", "inner_gradient", "side")),
+    "safe_time": (),
+    "outward_acceleration": ("inner_gradient", "hessian", "side"),
+    "discrete_gradient": ("inner_gradient", "inner"),
+    "step_normal": ("discrete_gradient", "side"),
+    **dict.fromkeys(("push", "rise", "resolve"), ("discrete_gradient", "hessian")),
+    "chord_guess": ("chord_improve",),
+    "chord_improve": ("rise",),
+    "chord_normal": ("push", "side"),
+}
 # Their definitions hold for the inner function q = phi only: a surface with another q gives these too.
 _OF_PHI = ("gap_of", "gap_slope", "inner_gradient")
 # What a solid of several parts asks of each.
 _OF_PARTS = ("phi", "gradient", "distance", "gap_scale", "unit_normal", "first_hit")
 _DESCRIPTION = ("size", "bounds", "extent")
+# Of the width of a box in which a surface is known, by how much particles may leave it: round-off.
+_ROUND_OFF = 1e-9
 
 
 def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], name: str | None = None) -> None:
@@ -76,55 +94,43 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
     """The methods without which a method of a wall does not work."""
     if not isinstance(wall, Smooth):
         yield "the base class swarm.surfaces.contract.Smooth"
+    elif name == "side":
+        yield from () if hasattr(wall, "side") else ("the field `side`",)
+    elif name == "falling_hit" and wall.is_quartic:
+        yield from () if wall.gives("course") else ("course()",)
+    elif wall.gives(name):
         return
-    if name == "falling_hit" and wall.is_quartic and not wall.gives("course"):
-        yield _named("course")
-    if wall.gives(name):
-        return
-    if name in _OF_PHI and wall.gives("inner"):
-        yield f"{_named(name)} for its `inner`"
-        return
-    if name in ("first_hit", "falling_hit") and not (
-        wall.gives("near") or wall.gives("hessian_bounds") or _falls(wall, name)
-    ):
-        yield f"{_named(name)} (or hessian_bounds(), from which it follows by safe steps)"
-        return
-    for used in _names_in(_definition(wall, name)):
-        if used == "NotImplementedError":
-            yield _named(name)
-        elif used == "side" and not hasattr(wall, "side"):
-            yield "the field `side`"
-        elif isinstance(getattr(Smooth, used, None), types.FunctionType):
+    elif name in _OF_PHI and wall.gives("inner"):
+        yield f"{name}() for its `inner`"
+    elif name in ("first_hit", "falling_hit") and not any(map(wall.gives, ("near", "steps", "hessian_bounds"))):
+        yield f"{name}() (or hessian_bounds(), from which it follows by safe steps)"
+    elif name not in _MADE_OF:
+        yield f"{name}()"
+    else:
+        for used in _MADE_OF[name]:
             yield from _lacking(wall, used)
 
 
-def _falls(wall: Any, name: str) -> bool:
-    """Whether what is asked about a fall follows from its quartic."""
-    return name in ("falling_hit", "safe_time") and bool(wall.is_quartic)
+def require_known(
+    surfaces: Sequence[Surface], bounds: Callable[[list[Surface]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+) -> None:
+    """Raise a `SceneError` where particles may leave the box in which a surface is known.
 
-
-def _definition(wall: Any, name: str) -> types.FunctionType:
-    """The function that a method follows by which a surface does not give."""
-    if name == "safe_time" or _falls(wall, name):
-        return _nothing  # type: ignore[return-value]
-    if name in ("first_hit", "falling_hit"):
-        return inspect.unwrap(approach.first_hit if wall.gives("near") else march.march)  # type: ignore[no-any-return]
-    return inspect.unwrap(getattr(newton if name in ("push", "rise", "resolve") else Smooth, name))  # type: ignore[no-any-return]
-
-
-def _nothing(*_asked: Any) -> None:
-    """Of a bound that may be 0, or of what is asked for already."""
-
-
-def _names_in(definition: types.FunctionType) -> Iterator[str]:
-    """The names that a definition uses, in the functions of its module that it calls too."""
-    for name in definition.__code__.co_names:
-        called = vars(sys.modules[definition.__module__]).get(name)
-        if isinstance(called, types.FunctionType) and called.__module__ == definition.__module__:
-            yield from _names_in(called)
-        else:
-            yield name
-
-
-def _named(name: str) -> str:
-    return "hessian()" if name in ("push", "rise", "resolve") else f"{name}()"
+    Args:
+        surfaces: those of a scene.
+        bounds: the corners of a box around the volume that some of them leave.
+    """
+    for i, surface in enumerate(surfaces):
+        known = surface.known_in()
+        if known is None:
+            continue
+        first, last = (np.array(corner) for corner in known)
+        low, high = bounds([one for one in surfaces if one.motion is None and not one.reacts()])
+        room = _ROUND_OFF * (last - first).max()
+        if surface.motion is not None or not ((low >= first - room).all() and (high <= last + room).all()):
+            raise SceneError(
+                f"surfaces[{i}] must be known wherever particles go, got {surface}, which reaches the border of its "
+                f"grid, from {shown(first)} to {shown(last)}, while the surfaces that do not move keep particles "
+                f"from {shown(low)} to {shown(high)}; sample it in a larger box, check that phi is below 0 inside, "
+                "or add surfaces that keep particles in the grid"
+            )

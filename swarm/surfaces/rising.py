@@ -13,12 +13,158 @@ from typing import Any
 
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..kernel.vector import absolute, dot, norm, times, total
-from .course import rise_time
-from .relative import Seen
+from ..kernel.vector import Vec, absolute, dot, norm, times, total
+from .course import Majorant, rise_time
 
 # The bounds of a step hold for at most so many times its length, after so many trials.
 _CLOSE, _TRIALS = 2.0, 8
+
+
+# --- The flight in the frame of a wall -------------------------------------------------------------------
+
+
+class Flight(Record):
+    """A free flight, and how much of the frame is left at its start [s]."""
+
+    r: Vec
+    v: Vec
+    pull: Vec
+    remaining: float
+    speed: float  # |v|
+    weight: float  # |G|
+
+    def place(self, t):
+        """Where the particle is after a time."""
+        return self.r + t * (self.v + (0.5 * t) * self.pull)
+
+    def velocity(self, t):
+        """Its velocity then."""
+        return self.v + t * self.pull
+
+    def seen(self, t, wall, pull):
+        """The particle after a time as `Seen` in the frame of a wall `Posed` then, where this pulls it."""
+        p, v = self.place(t), self.velocity(t)
+        return Seen(
+            wall.drive, wall.own_place(p), wall.own_velocity(p, v), wall.own_pull(p, v, pull),
+            self.speed + t * self.weight, wall.arm_length(p), self.weight,
+            total(absolute(p)) + total(absolute(wall.pose.shift)),
+        )  # fmt: skip
+
+
+class Bounds(Record):
+    """Of the speed, the acceleration and the jerk in the frame of a wall for some time."""
+
+    speed: float
+    acceleration: float
+    jerk: float
+
+
+class Seen(Record):
+    """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
+
+    drive: Any  # a `Drive`
+    r: Vec
+    v: Vec
+    a: Vec
+    speed: float  # a bound of |v| in the scene
+    arm: float  # its distance from the centre of the rotation; 0 where there is none
+    weight: float  # |G|
+    coordinates: float  # what the round-off of its place is relative to [m]
+
+    def bounds(self, within):
+        """`Bounds` that hold for so long [s]."""
+        drive, spin = self.drive, self.drive.angular_speed()
+        # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
+        speed = self.speed + self.weight * within + drive.fastest
+        arm, hard = self.arm + speed * within, self.weight + drive.hardest
+        return Bounds(
+            speed + spin * arm,
+            hard + spin * (2.0 * speed + spin * arm),
+            drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
+        )
+
+
+def flight_of(r, v, pull, remaining):
+    """The flight of a particle."""
+    return Flight(r, v, pull, remaining, norm(v), norm(pull))
+
+
+# --- Levels whose second derivative is known: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
+
+
+class Level(Majorant):
+    """A level whose third derivative has a bound: f, f'/2, f''/2, |grad q| and m."""
+
+    c: float
+    b: float
+    a2: float
+    steepness: float
+    magnitude: float
+
+    def third(self, bounds, within):
+        """The bound of f''' within that time."""
+        moved = self.steepness + 2.0 * self.magnitude * bounds.speed * within
+        return 6.0 * self.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
+
+    def own_rise(self):
+        """When its own parabola rises."""
+        return rise_time(self.c, self.b, self.a2)
+
+    def soonest(self, sixth, within, is_first):
+        """When it rises at the soonest, if a sixth of f''' is bounded within that time.
+
+        How deep a particle is that leaves no wall, the parabola alone knows.
+        """
+        return self.rises_after_leaving(sixth, within) if is_first else self.rises(sixth, within)
+
+
+class Between(Record):
+    """The levels of the two planes of a slab: the place between them in the direction of motion, f'/2 > 0 and f''/2."""
+
+    place: float
+    half: float
+    bend: float
+    radius: float
+
+    steepness = 1.0
+
+    def third(self, bounds, within):
+        """The bound of f''' within that time."""
+        return bounds.jerk
+
+    def own_rise(self):
+        """When the parabola of one of them rises."""
+        # The plane ahead, unless the particle turns short of it: then the one behind
+        c, b, a = self.place - self.radius, self.half, self.bend
+        discriminant = b * b - a * c
+        reaches = (discriminant >= 0.0) | (a > 0.0)
+        discriminant = select(reaches, discriminant, b * b - a * (self.place + self.radius))
+        root = _root(discriminant)
+        over, under = select(reaches, -c, b + root), select(reaches, b + root, -a)
+        return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
+
+    def soonest(self, sixth, within, is_first):
+        """When one of them rises at the soonest, as of a `Level`."""
+        b, k = self.half, sixth * within
+        c, a = self.place - self.radius, self.bend + k
+        discriminant = b * b - a * c
+        root = _root(discriminant)
+        reaches = ((discriminant >= 0.0) | (a > 0.0)) & (b + root > 0.0)
+        ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
+        # The one behind: the particle moves away from it.
+        c, a = -self.place - self.radius, k - self.bend
+        behind = select(a > 0.0, (b + _root(b * b - a * c)) / a, math.inf)
+        if is_first:
+            leaving = rise_time(-2.0 * b, -0.5 * self.bend, sixth)
+            behind = select(leaving > behind, leaving, behind)
+        return select(behind < ahead, behind, ahead)
+
+
+def _root(discriminant):
+    return math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+
+
+# --- Steps -----------------------------------------------------------------------------------------------
 
 
 class Step(Record):

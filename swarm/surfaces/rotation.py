@@ -134,8 +134,8 @@ class Rotated(Framed):
         """A vector of the surface's own frame in the scene."""
         return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
 
-    place_in = velocity_in = vector_in
-    place_out = vector_out
+    place_in = end_in = velocity_in = way_in = vector_in
+    place_out = end_out = normal_out = vector_out
 
     def flat_normal(self):
         n = self.body.flat_normal()

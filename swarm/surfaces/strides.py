@@ -12,8 +12,7 @@ from ..kernel.jit import select
 from ..kernel.vector import ZERO
 from .flights import Hit
 from .moving import Moving
-from .relative import flight_of
-from .rising import Known
+from .rising import Known, flight_of
 from .safe import closed_hit, seen_by_walls
 
 _EPSILON = 2.220446049250313e-16

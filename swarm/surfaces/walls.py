@@ -4,7 +4,10 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..kernel.jit import select
+import numpy as np
+
+from ..kernel.arrays import scratch
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 
@@ -21,6 +24,12 @@ class Field(Record):
 
 class Listed(Field):
     """A field of walls that are surfaces of their own: each has a row of what it gives."""
+
+
+class Following(Record):
+    """A wall that moves with the one before it: both are of one surface."""
+
+    body: Any
 
 
 class Touched(Record):
@@ -42,6 +51,9 @@ class Walls(Record):
 
         def __getattr__(self, name: str) -> Any: ...
 
+    # Whether some move other than uniformly, or as a field.
+    accelerate = False
+
     def at(self, remaining):
         """The walls when so much of the frame is left [s]: themselves, where none moves."""
         return self
@@ -51,14 +63,8 @@ class Walls(Record):
         return self
 
     def in_steps(self):
-        """A number where a straight flight to any wall takes steps in lanes: a type for the compiler.
-
-        None where its hit has a closed form, or is asked for as a whole.
-        """
-        steps = None
-        for wall in self.each:
-            steps = wall.in_steps if steps is None else steps
-        return steps
+        """Whether a straight flight to any wall takes steps in lanes: a constant for the compiler."""
+        return any(wall.in_steps for wall in self.each)
 
     # --- Their numbers and rows ---
 
@@ -97,6 +103,33 @@ class Walls(Record):
         for k, stop in reversed(tuple(enumerate(stops))):
             row = select(number < stop, k, row)
         return row
+
+    # --- Near a point: all that are in no field, and of a field those in the cell of the point ---
+
+    def numbers_near(self, r):
+        """The numbers of the walls near a point, in an array of the function that asks."""
+        near = self.others().length()
+        for _number, field in reversed(self.fields()):
+            near = field.members.count_in_cell(r) + near
+        number = scratch(near, np.float64)
+        self._list_near(r, number)
+        return number
+
+    @outlined
+    def _list_near(self, r, into):
+        k = 0
+        for number, field in self.fields():
+            k += field.members.list_in_cell(k, number, r, into)
+        before = self.count_in_fields()
+        for i in range(self.others().length()):
+            into[k + i] = before + i
+
+    def until_others(self, r, v):
+        """When a straight flight may meet a wall that is not near its start."""
+        soonest = math.inf
+        for _number, field in reversed(self.fields()):
+            soonest = min(field.members.until_next_cell(r, v), soonest)
+        return soonest
 
     # --- Of one wall ---
 

@@ -14,6 +14,7 @@ from bounded import bounded
 import swarm
 from swarm.kernel.vector import Vec
 from swarm.surfaces.data import flight
+from swarm.surfaces.march import march
 
 pytestmark = pytest.mark.physics
 
@@ -76,7 +77,7 @@ def test_the_steps_of_that_flight_are_few(monkeypatch):
     wall, r = sampled(center, 0.9).walls()[0], Vec(*center)
     v, g = Vec(1.0, 0.0, -8.9e-16), Vec(0.0, 1.0, 0.0)
     for _pass in range(20):
-        time, found = wall.march(r, v, g)
+        time, found = march(wall, r, v, g)
         assert not found
         r, v = r + time * (v + (0.5 * time) * g), v + time * g
         if center[2] + K * (r.x - center[0]) ** 3 - r.z > 1e-6:

@@ -11,14 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernel.jit import outlined, select
-from ...kernel.vector import ZERO, Vec, dot, norm, total
+from ...kernel.vector import Vec, dot, norm, total
 from ..course import rise_time
-from ..march import bisected, lets_go
+from ..march import LOOKS, Look, lets_go
 from .numbers import CellNumbers, known, least_of
 
 _EPSILON = float(np.finfo(np.float64).eps)
-# Steps of one flight; what is not found by then goes on in the next pass.
-_MARCH = 200
 # A flight that is past the wall by so many times the round-off of its place is at it.
 _ROUND_OFF = 8.0
 
@@ -30,7 +28,7 @@ class Bent(NamedTuple):
     most: float
 
 
-class Near(NamedTuple):
+class Here(NamedTuple):
     """The level, half of its slope along a flight, and the gradient of phi."""
 
     level: float
@@ -51,56 +49,37 @@ def _form(a, v, w):
 class SampledNumbers(CellNumbers):
     """A sampled surface as kernels take it."""
 
-    def first_hit(self, r, v):
-        return self.march(r, v, ZERO)
+    falling_looks = LOOKS
 
-    def falling_hit(self, r, v, pull):
-        return self.march(r, v, pull)
-
-    @outlined
-    def march(self, r, v, pull):
-        """Safe steps to the first root of the level along the flight."""
-        t, before = 0.0, 0.0
+    def look(self, r, v, pull, t, is_first):
         g = norm(pull)
-        if norm(v) == 0.0 and g == 0.0:
-            return math.inf, True
-        for i in range(_MARCH):
-            if g == 0.0:
-                t = self._through_empty(r, v, t)
-            p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-            cell = self._cell_of(p)
-            if not cell.inside or cell.clear >= 0.0:
-                free = self._free_time(cell, p, w, pull)
-                if not free < math.inf:
-                    return math.inf, True
-                # Round-off must not leave it where it is for ever.
-                t += max(free, _EPSILON * t)
-                continue
-            value, n = self.spline.value_and_slope(p)
-            level, half = self.side * value, 0.5 * self.side * dot(n, w)
-            speed, room = norm(w), 2.0 * _EPSILON * total(self.spline.coordinates(p))
-            # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
-            noise = _ROUND_OFF * room * norm(n)
-            if i > 0 and half >= 0.0 and level >= -noise:
-                if level <= noise:
-                    return t, True
-                return bisected(self, r, v, pull, before, t), True
-            step, out, bent = self._safe_step(cell, Near(level, half, n), p, w, pull)
-            slack = room * norm(n)
-            if lets_go(level, half, step, slack):
-                step, _out, _bent_there = self._safe_step(cell, Near(-slack, half, n), p, w, pull)
-                before, t = t, t + step
-                continue
-            before, t = t, t + step
-            # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
-            # least this.
-            rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
-            arrives = (
-                speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
-            )
-            if step < out and arrives and (i > 0 or rising > 0.0 or step == 0.0):
-                return t, True
-        return t, False
+        if g == 0.0:
+            if norm(v) == 0.0:
+                return Look(t, math.inf, -1.0, -1.0)
+            t = self._through_empty(r, v, t)
+        p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+        cell = self._cell_of(p)
+        if not cell.inside or cell.clear >= 0.0:
+            # Round-off must not leave it where it is for ever.
+            return Look(t, max(self._free_time(cell, p, w, pull), _EPSILON * t), -1.0, -1.0)
+        value, n = self.spline.value_and_slope(p)
+        level, half = self.side * value, 0.5 * self.side * dot(n, w)
+        speed, room = norm(w), 2.0 * _EPSILON * total(self.spline.coordinates(p))
+        # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
+        noise = _ROUND_OFF * room * norm(n)
+        if not is_first and half >= 0.0 and level >= -noise:
+            return Look(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
+        step, out, bent = self._safe_step(cell, Here(level, half, n), p, w, pull)
+        slack = room * norm(n)
+        if lets_go(level, half, step, slack):
+            step, _out, _bent_there = self._safe_step(cell, Here(-slack, half, n), p, w, pull)
+            return Look(t, step, -1.0, -1.0)
+        # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
+        # least this.
+        rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
+        arrives = speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
+        arrives = step < out and arrives and (not is_first or rising > 0.0 or step == 0.0)
+        return Look(t, step, select(arrives, 0.0, -1.0), -1.0)
 
     @outlined
     def safe_time(self, r, v, pull):
@@ -114,25 +93,25 @@ class SampledNumbers(CellNumbers):
         level, half = self.side * value, 0.5 * self.side * dot(n, v)
         if level > 0.0:
             return 0.0
-        step, _out, _bent_there = self._safe_step(cell, Near(level, half, n), r, v, pull)
+        step, _out, _bent_there = self._safe_step(cell, Here(level, half, n), r, v, pull)
         return step
 
-    def _safe_step(self, cell, near, r, v, pull):
+    def _safe_step(self, cell, here, r, v, pull):
         """(a time during which a flight surely stays admissible, within which its bounds hold, these as `Bent`)."""
         # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
         speed, falls = norm(v), norm(pull) > 0.0
         out = least_of(self.spline.width) / speed if speed > 0.0 else 0.0
-        bent = self._bent(cell.row, near.slope, v, pull, 0.0)
-        step = rise_time(near.level, near.half, bent.most)
+        bent = self._bent(cell.row, here.slope, v, pull, 0.0)
+        step = rise_time(here.level, here.half, bent.most)
         if falls or not step < out:
             out = self._until_out(cell.low, 1.0, r, v, pull)
-            bent = self._bent(cell.row, near.slope, v, pull, out)
-            step = min(rise_time(near.level, near.half, bent.most), out)
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(rise_time(here.level, here.half, bent.most), out)
         if falls and 2.0 * step < out:
             # Again with the bounds of a shorter time
             out = 2.0 * step
-            bent = self._bent(cell.row, near.slope, v, pull, out)
-            step = min(max(step, rise_time(near.level, near.half, bent.most)), out)
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(max(step, rise_time(here.level, here.half, bent.most)), out)
         return step, out, bent
 
     def _bent(self, row, n, v, pull, time):

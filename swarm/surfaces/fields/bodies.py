@@ -13,7 +13,8 @@ from ..shapes.cylinder import Cylinder
 from ..shapes.ellipsoid import Ellipsoid
 from ..shapes.sphere import Sphere, ball
 from ..surface import Surface
-from .many import Floats, Many, field_of
+from .grid import Floats
+from .many import Many, field_of
 from .members import Members, aligned
 
 

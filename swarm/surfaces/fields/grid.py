@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernel.arrays import index
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec
 from ..course import rise_time
-from ..relative import Bounds
+from ..rising import Bounds
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.
@@ -87,15 +88,14 @@ def block_of(grid, low, high):
     )  # fmt: skip
 
 
-def size_of(block):
-    """How many cells a block has."""
-    return max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)
-
-
-def in_block(grid, block, k):
-    """The number of cell k of a block."""
-    x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
-    return int(((block.x + x) * grid.shape.y + block.y + y) * grid.shape.z + block.z + z)
+def over_block(grid, block, found, ask, *given):
+    """`found` after ask(found, m, *given) for each body m of the cells of a block."""
+    for k in range(max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)):
+        x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
+        number = ((block.x + x) * grid.shape.y + block.y + y) * grid.shape.z + block.z + z
+        for entry in range(grid.first[index(int(number))], grid.first[index(int(number)) + 1]):
+            found = ask(found, grid.entries[entry], *given)
+    return found
 
 
 def until_next(gravity, grid, cell, r, v):

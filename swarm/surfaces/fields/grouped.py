@@ -1,11 +1,11 @@
 """Which surfaces of a scene kernels take together: more than a few of one kind are one field."""
 
+import functools
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
-from ..kinds import by_kind
 from ..moving import walls_of
 from ..surface import Surface
 from ..walls import Field, Listed, Walls, all_walls
@@ -15,6 +15,40 @@ from .members import Members, alike, can_be_member, kind_of
 # So many surfaces of one kind stay walls of their own, whose numbers are not looked up: an impact in a sphere with 6
 # balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
 _FEW = 6
+
+Thing = TypeVar("Thing")
+
+
+# --- By kind ---------------------------------------------------------------------------------------------
+
+
+def by_kind(things: Iterable[Thing], numbers: Callable[[Thing], Any]) -> list[Thing]:
+    """Things in the order of the types of their numbers; those of the same types stay in their order.
+
+    Kernels are compiled for these types: one order stands for all in which a user may list the same.
+    """
+    listed = list(things)
+    # The numbers of one thing alone may take long.
+    return sorted(listed, key=lambda thing: _rank(numbers(thing))) if len(listed) > 1 else listed
+
+
+def _rank(numbers: Any) -> tuple[int, str]:
+    # What is known by most numbers comes first, so planes last. Any order would do, but of two walls that are met at
+    # the same instant the first is met first.
+    text = _text(numbers)
+    return -len(text), text
+
+
+def _text(numbers: Any) -> str:
+    """The types of nested numbers."""
+    if type(numbers) is tuple:
+        # As nested pairs: by their text walls have the order in which results of earlier versions were made.
+        return functools.reduce(lambda rest, part: f"Chain({_text(part)},{rest})", reversed(numbers), "NoneType")
+    parts = f"({','.join(map(_text, numbers))})" if isinstance(numbers, (tuple, list)) else ""
+    return type(numbers).__name__ + parts
+
+
+# --- The order of a scene --------------------------------------------------------------------------------
 
 
 class Order(NamedTuple):

@@ -36,7 +36,12 @@ class Members(Record):
     grid: Grid
 
     # What a wall at rest says, as in contract.py.
-    flat = False
+    flat = accelerates = False
+
+    @property
+    def lacks_bend(self):
+        """Whether they cannot move other than uniformly."""
+        return self.like.lacks_bend
 
     def time_scale(self):
         """A time in which their motion changes little [s]."""

@@ -9,11 +9,9 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..course import rise_time
-from ..march import bisected
+from ..march import Look, Search, first_met
 
 _EPSILON = 2.220446049250313e-16
-# Safe steps of one march; what is not found by then goes on in the next pass.
-_MARCH = 200
 # Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
 _SHORT = 1e-2
 _NODE = 0.5 * math.sqrt(0.6)
@@ -125,7 +123,6 @@ class OwnNumbers(contract.Smooth):
 
     @outlined
     def first_hit(self, r, v):
-        # Safe steps: along a straight flight the second derivative has the same bounds everywhere.
         t, end = 0.0, math.inf
         speed2 = square(v)
         if speed2 == 0.0:
@@ -138,27 +135,8 @@ class OwnNumbers(contract.Smooth):
         # least <= v.side H v <= most
         most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
         least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
-        resolved = 2.0 * _EPSILON / math.sqrt(speed2)
-        before = t
-        for i in range(_MARCH):
-            p = r + t * v
-            level = self.side * self.phi(p)
-            half = 0.5 * self.side * dot(self.gradient(p), v)
-            if level > 0.0 and half > 0.0 and i > 0:
-                # Past the wall by round-off, or because the surface bends more than was said.
-                return bisected(self, r, v, ZERO, before, t), True
-            step = rise_time(level, half, most)
-            if not t + step <= end or not step < math.inf:
-                return math.inf, True
-            before, t = t, t + step
-            # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
-            rising = half + least * step
-            shortest = resolved * (total(absolute(p)) + math.sqrt(speed2) * step)
-            if (i > 0 or rising > 0.0 or step == 0.0) and (
-                step <= shortest or (most - least) * step * step <= 2.0 * shortest * rising
-            ):
-                return t, True
-        return t, False
+        time, wall = first_met(Straight(self, r, v, ZERO, t, end, least, most, math.sqrt(speed2)))
+        return time, wall >= 0.0
 
     def _in_box(self, r, v):
         """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
@@ -167,3 +145,34 @@ class OwnNumbers(contract.Smooth):
         from_y, until_y = _between(low.y, high.y, d.y, v.y)
         from_z, until_z = _between(low.z, high.z, d.z, v.z)
         return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)
+
+
+class Straight(Search):
+    """A straight flight from its `start` to its end: its level's second derivative has the same bounds everywhere."""
+
+    surface: OwnNumbers
+    r: Vec
+    v: Vec
+    pull: Vec
+    start: float
+    end: float
+    least: float
+    most: float
+    speed: float
+
+    def look(self, t, is_first):
+        surface, p, speed = self.surface, self.r + t * self.v, self.speed
+        level = surface.side * surface.phi(p)
+        half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
+        # By round-off, or because the surface bends more than was said.
+        is_past = level > 0.0 and half > 0.0 and not is_first
+        step = rise_time(level, half, self.most)
+        # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
+        rising = half + self.least * step
+        shortest = 2.0 * _EPSILON / speed * (total(absolute(p)) + speed * step)
+        arrives = (not is_first or rising > 0.0 or step == 0.0) and (
+            step <= shortest or (self.most - self.least) * step * step <= 2.0 * shortest * rising
+        )
+        is_over = not t + step <= self.end or not step < math.inf
+        wall = select(arrives and not is_over, 0.0, -1.0)
+        return Look(t, select(is_over, math.inf, step), wall, select(is_past, 0.0, -1.0))

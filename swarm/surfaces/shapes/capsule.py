@@ -17,8 +17,6 @@ from .revolved import Revolved
 
 # The last step of a fall leaves this part of R^2.
 _CLOSE = 1e-16
-# From farther than the root of this many times the thickness a fall first goes so much nearer.
-_AFAR = 1024.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +105,7 @@ class CapsuleNumbers(Distance):
         return select(abs(height) > half, cap, tube), True
 
     # Without gravity the hit has a closed form.
-    in_steps = None
+    in_steps = False
 
     def near(self, gravity, r, v):
         # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by
@@ -118,14 +116,12 @@ class CapsuleNumbers(Distance):
         speed, pull = select(in_tube, 0.0, v.z), select(in_tube, 0.0, g.z)
         s2 = v.x * v.x + v.y * v.y + speed * speed + e.x * g.x + e.y * g.y + e.z * pull
         s3, s4 = v.x * g.x + v.y * g.y + speed * pull, 0.25 * (g.x * g.x + g.y * g.y + pull * pull)
-        # From afar to a thicker one: of a small distance round-off leaves nothing.
-        far = q > _AFAR * self.radius2
-        radius2 = select(far, q * (1.0 / _AFAR), self.radius2)
+        radius2 = self.near_radius2(q)
         size2 = select(q > radius2, q, radius2)
         return Near(
             side * (q - radius2), side * dot(e, v), side * s2, (side * s3, side * s4),
-            2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * self.radius2, not far,
-            Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
+            2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * self.radius2,
+            radius2 == self.radius2, Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),
         )  # fmt: skip
 
     def hessian_bounds(self, r):

@@ -10,6 +10,8 @@ from .. import contract
 _TINY = float(np.finfo(np.float64).tiny)
 # The least root of an inner function that is told from 0: the cube of its inverse is a number.
 _MIDDLE = 1e-100
+# From farther than the root of this many times the radius a flight first goes so much nearer.
+_AFAR = 1024.0
 
 
 class Distance(contract.Smooth):
@@ -29,6 +31,10 @@ class Distance(contract.Smooth):
 
     def clearance(self, r):
         return -self.gap_of(self.inner(r))
+
+    def near_radius2(self, q):
+        """radius^2, or that of a thicker one that is near: from afar round-off of the level is that of the distance."""
+        return select(q > _AFAR * self.radius2, q * (1.0 / _AFAR), self.radius2)
 
     def farthest_push(self):
         # The pole of 1/(1 + kappa H), where no eigenvalue of H is above 1

@@ -7,7 +7,7 @@ from ...checks import Vector, number
 from ...kernel.jit import select
 from ...kernel.vector import Vec, dot, vec
 from ..course import rise_time
-from ..levels import Level
+from ..rising import Level
 from ..rotation import turned, unit
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
 from .common import ExactChord
@@ -65,13 +65,15 @@ class PlaneNumbers(ExactChord):
     normal: Vec
     offset: float
 
+    side = 1.0
+
     def phi(self, r):
         return self.inner(r) - self.offset
 
     def gradient(self, r):
         return self.normal
 
-    slope = unit_normal = gradient
+    unit_normal = gradient
 
     def inner(self, r):
         return dot(self.normal, r)

@@ -13,7 +13,7 @@ from ...kernel.jit import select
 from ...kernel.vector import Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
 from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
-from ..levels import Level
+from ..rising import Level
 from ..surface import side_sign
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
@@ -97,8 +97,6 @@ class QuadricNumbers(contract.Smooth):
 
     def gradient(self, r):
         return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
-
-    slope = gradient
 
     def inner(self, r):
         d = r - self.center

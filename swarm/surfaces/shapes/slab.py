@@ -12,8 +12,7 @@ from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
 from ..course import rise_time
-from ..levels import Between, Level
-from ..rising import level_step
+from ..rising import Between, Level, level_step
 from ..rotation import turned, unit
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
 from .common import Distance, ExactChord
@@ -82,40 +81,38 @@ class Slab(Surface):
 # fall that loses energy.
 
 
-class AlongX(Record):
+class Along(Record):
+    """An axis of the scene as a unit vector."""
+
+    axis = 0
+
+    def part(self, r):
+        """Its component of a vector."""
+        return r[self.axis]
+
+    def scaled(self, k):
+        """It times a number."""
+        return Vec(*(k if i == self.axis else 0.0 for i in range(3)))
+
+
+class AlongX(Along):
     """The x axis."""
 
     x: float
 
-    def part(self, r):
-        return r.x
 
-    def scaled(self, k):
-        return Vec(k, 0.0, 0.0)
-
-
-class AlongY(Record):
+class AlongY(Along):
     """The y axis."""
 
     y: float
-
-    def part(self, r):
-        return r.y
-
-    def scaled(self, k):
-        return Vec(0.0, k, 0.0)
+    axis = 1
 
 
-class AlongZ(Record):
+class AlongZ(Along):
     """The z axis."""
 
     z: float
-
-    def part(self, r):
-        return r.z
-
-    def scaled(self, k):
-        return Vec(0.0, 0.0, k)
+    axis = 2
 
 
 AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)
@@ -187,7 +184,7 @@ class SlabNumbers(Distance, ExactChord):
         return select(meets, select(time > 0.0, time, 0.0), math.inf), True
 
     def falling_hit(self, r, v, pull):
-        near = self.near_face_hit(r, v, pull)
+        near, _found = self.entry(pull, r, v)
         d = self.off(r)
         sign = math.copysign(0.5, d)
         b, a = sign * self.along(v), sign * self.along(pull)
@@ -195,12 +192,14 @@ class SlabNumbers(Distance, ExactChord):
         far = rise_time(-abs(d) - self.radius, -b, -a)
         return select((self.side > 0.0) & (far < near), far, near), True
 
-    def near_face_hit(self, r, v, pull):
-        """When a fall meets the wall on the side where it begins, of a plate the only one: a plane."""
+    def entry(self, gravity, r, v):
+        if gravity is None:
+            return self.first_hit(r, v)
+        # The wall on the side where a fall begins, of a plate the only one: a plane
         d = self.off(r)
         sign = math.copysign(0.5, d)
-        b, a = sign * self.along(v), sign * self.along(pull)
-        return rise_time(self.side * (abs(d) - self.radius), self.side * b, self.side * a)
+        b, a = sign * self.along(v), sign * self.along(gravity)
+        return rise_time(self.side * (abs(d) - self.radius), self.side * b, self.side * a), True
 
     def safe_time(self, r, v, pull):
         time, _found = self.falling_hit(r, v, pull)

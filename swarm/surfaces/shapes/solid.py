@@ -9,25 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ...kernel.gravity import Gravity, as_vector, displacement
-from ...kernel.jit import outlined, select
+from ...kernel.gravity import displacement
+from ...kernel.jit import select
+from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
-from .. import contract, flights
-from ..approach import place, under_way
-from ..course import rise_near
+from .. import contract
+from ..approach import place
+from ..course import under_way
 from ..rising import Step
-from ..rotation import Rotated
-from .plane import PlaneNumbers
-from .slab import SlabNumbers
 
 _EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.
 _TINY = float(np.finfo(np.float64).tiny)
 # Round-off of a part's level, in units of the last place of its largest terms.
 _ULPS = 32.0
-# Steps of a flight that is asked for alone, each to where a part is still to be entered, or entered again, before it
-# goes on in the next pass.
-_ENTRIES = 100
 # Part of the coordinates over which the gradient is differenced: the cube root of the round-off.
 _SPACING = 6e-6
 
@@ -49,11 +44,10 @@ class SolidNumbers(contract.Smooth):
         h = _SPACING * (total(absolute(r)) + self.extent) + np.finfo(np.float64).tiny
         return _bend_of_largest(self.parts, r, h)[1]
 
-    def first_hit(self, r, v):
-        return _entry(self, None, r, v)
+    def steps(self, gravity, r, v):
+        return Entering(self, gravity, r, v)
 
-    def falling_hit(self, r, v, pull):
-        return _entry(self, Gravity(pull.x, pull.y, pull.z), r, v)
+    in_steps = True
 
     def safe_time(self, r, v, pull):
         # Outside of one part is outside of the body.
@@ -95,19 +89,6 @@ class SolidNumbers(contract.Smooth):
             found = Step(level, half, select(time > found.time, time, found.time))
         return found
 
-    # --- Flight in lanes ---
-
-    in_steps = 1.0
-
-    def begin_flight(self, gravity, course, row, lane, r, v):
-        time, last = _entry_step(self, gravity, r, v, 0.0, math.inf)
-        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
-
-    def step_flight(self, gravity, course, row, lane, r, v):
-        time, last = course[row + flights.TIME, lane], course[row + flights.LAST, lane]
-        time, last = _entry_step(self, gravity, r, v, time, last)
-        course[row + flights.TIME, lane], course[row + flights.LAST, lane] = time, last
-
 
 def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
     """The intersection of parts, each the numbers of a wall that is admissible outside of the part.
@@ -119,12 +100,6 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
     return SolidNumbers(tuple(parts), -1.0, float(extent))
 
 
-def _sign(part):
-    """The sign with which phi of a part rises out of it."""
-    body = part.body if isinstance(part, Rotated) else part
-    return -1.0 if isinstance(body, PlaneNumbers) else 1.0
-
-
 # --- The level set ---------------------------------------------------------------------------------------
 
 
@@ -132,7 +107,8 @@ def _largest(parts, r):
     """The largest phi of the parts, and its gradient."""
     most, gradient = -math.inf, ZERO
     for part in reversed(parts):
-        sign = _sign(part)
+        # phi of a part rises out of it, that of a plane into it.
+        sign = -part.side
         here = sign * part.phi(r)
         # No select: these may be arrays.
         use = 1.0 * (here >= most)
@@ -145,7 +121,7 @@ def _bend_of_largest(parts, r, h):
     """The largest phi of the parts, and half its second derivatives, by differences."""
     most, bend = -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for part in reversed(parts):
-        sign = _sign(part)
+        sign = -part.side
         here = sign * part.phi(r)
         if not here < most:
             f = 0.25 * sign / h
@@ -162,55 +138,44 @@ def _turn(part, r, step, f):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-@outlined
-def _entry(surface, gravity, r, v):
-    """When the flight is inside of all parts for the first time: (time, whether it is then)."""
-    t, last = 0.0, math.inf
-    for _i in range(_ENTRIES):
-        t, last = _entry_step(surface, gravity, r, v, t, last)
-        if not under_way(t, last):
-            break
-    return t, not under_way(t, last)
+class Entering(Record):
+    """The steps of a flight until it is inside of all parts, each to where one is still to be entered, or again."""
 
+    body: SolidNumbers
+    gravity: Any
+    r: Vec
+    v: Vec
 
-def _entry_step(surface, gravity, r, v, t, last):
-    """One step more: (t, its length, 0 if the flight is inside of all parts then).
+    # What is not found by then goes on in the next pass.
+    most = 99
 
-    Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
-    """
-    p, w = place(gravity, r, v, t, last)
-    wait, found = _last_entry(surface.parts, gravity, surface.extent, p, w)
-    moved = total(absolute(displacement(gravity, w, wait)))
-    # The place is known to round-off of its own coordinates and of those the flight comes from.
-    coordinates = total(absolute(p)) + abs(r.x) + abs(r.y) + abs(r.z)
-    is_in = found & (moved <= 4.0 * _EPSILON * (coordinates + surface.extent))
-    goes_on = under_way(t, last)
-    length = select(is_in, 0.0, select(wait > 0.0, wait, _TINY))
-    return select(goes_on, t + wait, t), select(goes_on, length, last)
+    def first_step(self):
+        return self.next_step(0.0, math.inf)
+
+    def next_step(self, t, last):
+        # Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
+        body, gravity = self.body, self.gravity
+        p, w = place(gravity, self.r, self.v, t, last)
+        wait, found = _last_entry(body.parts, gravity, body.extent, p, w)
+        moved = total(absolute(displacement(gravity, w, wait)))
+        # The place is known to round-off of its own coordinates and of those the flight comes from.
+        coordinates = total(absolute(p)) + abs(self.r.x) + abs(self.r.y) + abs(self.r.z)
+        is_in = found & (moved <= 4.0 * _EPSILON * (coordinates + body.extent))
+        goes_on = under_way(t, last)
+        length = select(is_in, 0.0, select(wait > 0.0, wait, _TINY))
+        return select(goes_on, t + wait, t), select(goes_on, length, last)
 
 
 def _last_entry(parts, gravity, extent, r, v):
     """When the last of the parts is entered that the particle is not inside of: (time, whether it is then)."""
     time, found = 0.0, True
     for part in reversed(parts):
-        here, found_here = _entry_of(part, gravity, r, v)
+        here, found_here = part.entry(gravity, r, v)
         # On the face of a part, which is left or entered now, the sign of the approach decides.
         depth = part.gap_of(part.inner(r))
         later = (here > time) & (not (depth > noise(part, extent, r)))
         time, found = select(later, here, time), select(later, found_here, found)
     return time, found
-
-
-def _entry_of(part, gravity, r, v):
-    """A time until which a flight surely does not enter a part: (time, whether it does then)."""
-    if gravity is None:
-        return part.first_hit(r, v)
-    pull = as_vector(gravity)
-    if isinstance(part, SlabNumbers):
-        return part.near_face_hit(r, v, pull), True
-    if part.is_quartic:
-        return rise_near(part.course(r, v, pull))
-    return part.falling_hit(r, v, pull)
 
 
 def noise(part, extent, r):

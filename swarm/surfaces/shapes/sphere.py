@@ -7,8 +7,7 @@ from ...checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
 from ..course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
-from ..levels import Level
-from ..relative import Bounds
+from ..rising import Bounds, Level
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from .common import Distance, ExactChord
 

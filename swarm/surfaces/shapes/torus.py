@@ -17,7 +17,7 @@ from .common import Distance
 
 # The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.
 _CLOSE = 4e-16
-# From farther than the root of this many times the thickness a flight first goes so much nearer.
+# From farther than the root of this many times its size a flight to the ball around it first goes so much nearer.
 _AFAR = 1024.0
 # Squares: of a ball around the torus, in its radii, within which its own level is asked, and of one in that.
 _OUTER, _NEARER = 1.3, 1.1
@@ -127,10 +127,6 @@ class TorusNumbers(Distance):
         d = r - self.center
         return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), np.finfo(np.float64).tiny)
 
-    def _tube2(self, q):
-        """a^2, or that of a thicker tube that is near: from afar round-off of F is that of the distance."""
-        return select(q > _AFAR * self.radius2, q * (1.0 / _AFAR), self.radius2)
-
     def _nearly(self):
         return _CLOSE * self.major * self.major * self.radius2
 
@@ -139,7 +135,7 @@ class TorusNumbers(Distance):
         rho = self._from_axis(r)
         across = rho - major
         q, d2 = across * across + d.z * d.z, square(d)
-        tube2 = self._tube2(q)
+        tube2 = self.near_radius2(q)
         level, bp, wp, wz = q - tube2, d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y, v.z * v.z
         b, w = bp + d.z * v.z, wp + wz
         # |d|^2 + R^2 - a^2 and its powers: level + 2 R rho, 2 b, w
@@ -160,7 +156,7 @@ class TorusNumbers(Distance):
         rho = self._from_axis(r)
         across = rho - major
         q, d2 = across * across + d.z * d.z, square(d)
-        tube2 = self._tube2(q)
+        tube2 = self.near_radius2(q)
         # |d + v t + G t^2/2|^2 by powers of t, and that of its components across the axis
         bp, p2 = d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y + d.x * g.x + d.y * g.y
         bz, z2 = d.z * v.z, v.z * v.z + d.z * g.z
