@@ -77,6 +77,19 @@ def ties(axes: Any, lines: tuple[Floats, Colours], faces: tuple[Floats, Colours]
     return drawn
 
 
+def frame(
+    axes: Any,
+    points: Floats,
+    packed: Colours,
+    wires: list[tuple[bool, list[Floats]]],
+    lines: tuple[Floats, Colours],
+    faces: tuple[Floats, Colours],
+) -> None:
+    """A frame: `particles` of colours 0xRRGGBBAA, which bodies with faces do not show, and their `ties`."""
+    particles(axes, points, red_green_blue(packed), wires, 0.0 if len(faces[0]) else 1.0)
+    ties(axes, lines, faces)
+
+
 def particles(
     axes: Any,
     positions: ArrayLike,

@@ -1,7 +1,9 @@
 """The run of copies of a body."""
 
 import math
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -19,13 +21,14 @@ from ..scene import Scene
 from ..status import Status
 from .base import Arrays, BaseRun, result_of
 from .energies import Energies, summed
-from .stack import threads_with
 from .tiers import Tier
 
 # Round-off of a position on a wall, as a part of the scene's size.
 _ROUND_OFF = 8.0 * np.finfo(np.float64).eps
 # Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
 _STACK, _MOST_LANES = 1 << 20, 32
+# What else a stack holds; and stacks are whole pages.
+_REST, _PAGE = 8 << 20, 1 << 16
 # Bodies that a thread draws at a time.
 _AT_ONCE = 256
 # Suzuki's composition: five steps of second order are one of fourth.
@@ -219,6 +222,23 @@ class BodyRun(BaseRun):
 
     def arrays(self) -> Arrays:
         return dict(self._bodies._asdict())
+
+
+def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
+    """A pool of `count` threads, all of them begun, each with room for so many bytes of scratch arrays.
+
+    Memory that is not used is none: a system maps a stack page by page.
+    """
+    before = threading.stack_size(-(-(scratch + _REST) // _PAGE) * _PAGE)
+    try:
+        pool = ThreadPoolExecutor(count, thread_name_prefix="swarm")
+        # Each waits for all the others, so none takes the turn of two.
+        together = threading.Barrier(count)
+        for begun in [pool.submit(together.wait) for _ in range(count)]:
+            begun.result()
+    finally:
+        threading.stack_size(before)
+    return pool
 
 
 def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> BodyState:

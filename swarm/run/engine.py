@@ -93,7 +93,7 @@ class Run(BaseRun):
             until = self._limit(latest)
             self._ticket[0] = 0
             others, helps = self._hands(span, writing)
-            self._watch.begin(until, helps, self._tier.is_plain)
+            self._watch.begin(until, helps)
             began = time.perf_counter()
             shares = [self._pool.submit(self._share, span) for _ in range(others)]
             ends = [self._share(span)] if helps else []
