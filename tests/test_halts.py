@@ -193,7 +193,7 @@ def test_a_frame_in_two_threads_has_the_same_bits():
     for alone in (0, 1, 3, 10**6):
         with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
             for moment in (0.5, 1.0, 1.5):
-                run._pace, run._watch._alone = 0.0 if alone else np.inf, alone
+                run._pace, run._watch._alone[True] = 0.0 if alone else np.inf, alone
                 assert run.advance(0.5, moment)
             ends.add((run.state.position.tobytes(), run.state.velocity.tobytes(), run.state.impacts.tobytes()))
     assert len(ends) == 1
@@ -205,7 +205,7 @@ def test_a_frame_of_no_time_leaves_nothing_for_the_next():
     start, ends = swarm.fill(scene, LANES + 44, speed=1.0, seed=1), set()
     for alone in (1, 10**6):
         with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
-            run._watch._alone = alone
+            run._watch._alone[True] = alone
             assert run.advance(0.0, 0.0)
             assert run.advance(0.5, 0.5)
             ends.add((run.state.position.tobytes(), run.state.impacts.tobytes()))
@@ -215,14 +215,14 @@ def test_a_frame_of_no_time_leaves_nothing_for_the_next():
 def test_a_signal_is_not_lost_when_the_callers_thread_is_freed():
     """Whenever it comes: before, between and after what is done to free it."""
     watch = Watch(10)
-    watch.begin(np.inf, helps=True)
+    watch.begin(np.inf, helps=True, plain=True)
     assert watch.passes[0] > 0
     assert watch.is_freed(0.0)
     watch.halt()
-    watch.begin(np.inf, helps=False)
+    watch.begin(np.inf, helps=False, plain=True)
     assert watch.passes[0] == 0
     watch.end()
-    watch.begin(np.inf, helps=True)
+    watch.begin(np.inf, helps=True, plain=True)
     watch.halt()
     assert not watch.is_freed(0.0)
 

@@ -1,8 +1,8 @@
 """Two tiers of kernels with the same bits: plain Python, which starts at once, and compiled, where that pays.
 
 Plain Python takes 30 to 150 us an impact, the compiler 1 to 9 s for a new kind of scene: 20 particles with 6 impacts
-each in a sphere take 1.1 s of processor time from the start of Python to its end in plain Python, 2.4 s where their
-kernels are compiled, and 1.1 s where these are found.
+each in a sphere take 0.8 s of processor time from the start of Python to its end in plain Python, 2.2 s where their
+kernels are compiled, and 1.0 s where these are found.
 """
 
 import math
@@ -44,17 +44,15 @@ class Tier:
         self.is_plain = self.remaining > 0.0
         self._missing: list[str] = []
 
-    def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> bool:
-        """Choose the tier for the next calls, kernels and their arguments; whether it has changed."""
-        before = self.is_plain
+    def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
+        """Choose the tier for the next calls, kernels and their arguments."""
         if self.remaining == math.inf:
-            return False
+            return
         self._missing = []
         if self.remaining > 0.0:
             self._missing = [cache.kind(*call) for call in calls if not cache.is_compiled(*call)]
             self.remaining = min(self.remaining, _PATIENCE - spent(self._missing))
         self.is_plain = self.remaining > 0.0 and bool(self._missing)
-        return self.is_plain != before
 
     def spend(self, seconds: float) -> None:
         """Count a time [s] that the kernels of this tier took."""

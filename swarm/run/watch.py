@@ -8,10 +8,10 @@ import numpy as np
 from ..lanes.block import NEVER
 from ..lanes.table import LANES
 
-# Flights of the caller's thread in its first frame, after which it is free again: 0.1 s or so of dear ones in plain
-# Python. Then their number is doubled as long as they take less than the second time [s], and halved where they take
-# more than the first: whatever a flight costs, a short frame never meets them.
-_FLIGHTS, _LONG, _SHORT = 1 << 10, 0.05, 0.025
+# Flights of the caller's thread in its first frame, compiled and in plain Python, after which it is free again: 0.1 s
+# or so of dear ones. Then their number is doubled as long as they take less than the second time [s], and halved where
+# they take more than the first: whatever a flight costs, a short frame never meets them.
+_FLIGHTS, _PLAIN_FLIGHTS, _LONG, _SHORT = 1 << 16, 1 << 10, 0.05, 0.025
 
 
 class Watch:
@@ -26,9 +26,10 @@ class Watch:
     """
 
     def __init__(self, particles: int) -> None:
+        lanes = min(LANES, particles)
         self.passes = np.full(1, NEVER)
-        self._asked, self._latest = NEVER, math.inf
-        self._alone = _FLIGHTS // min(LANES, particles)
+        self._asked, self._latest, self._plain = NEVER, math.inf, False
+        self._alone = {False: _FLIGHTS // lanes, True: _PLAIN_FLIGHTS // lanes}
 
     def halt(self, passes: int = 0) -> None:
         """Make every kernel call of this frame return after so many passes.
@@ -39,12 +40,15 @@ class Watch:
         self._asked = min(self._asked, passes)
         np.minimum(self.passes, passes, out=self.passes)
 
-    def begin(self, latest: float, helps: bool) -> None:
-        """Kernels begin, halted at the time `latest` [s of time.monotonic]; `helps`: the caller's thread computes."""
-        self._latest = latest
+    def begin(self, latest: float, helps: bool, plain: bool) -> None:
+        """Kernels begin, halted at the time `latest` [s of time.monotonic].
+
+        `helps`: the caller's thread computes; `plain`: in plain Python.
+        """
+        self._latest, self._plain = latest, plain
         self._reset()
         if helps:
-            np.minimum(self.passes, self._alone, out=self.passes)
+            np.minimum(self.passes, self._alone[plain], out=self.passes)
 
     def is_over(self, turns: int) -> bool:
         """Whether a thread that has called kernels so often ends: many calls of a few passes each are passes too."""
@@ -54,12 +58,13 @@ class Watch:
 
     def is_freed(self, seconds: float) -> bool:
         """Whether kernels have returned after so many seconds only since the caller's thread is to be free."""
-        if self._asked <= self._alone:
+        alone = self._alone[self._plain]
+        if self._asked <= alone:
             return False
         if seconds < _SHORT:
-            self._alone *= 2
+            self._alone[self._plain] = 2 * alone
         elif seconds > _LONG:
-            self._alone = max(1, self._alone // 2)
+            self._alone[self._plain] = max(1, alone // 2)
         return True
 
     def end(self) -> None:
