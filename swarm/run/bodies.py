@@ -19,7 +19,7 @@ from ..observables import CHUNK
 from ..particles import Floats, Particles, State
 from ..scene import Scene
 from ..status import Status
-from .base import Arrays, BaseRun, result_of
+from .base import Arrays, BaseRun
 from .energies import Energies, summed
 from .tiers import Tier
 
@@ -103,10 +103,8 @@ class BodyRun(BaseRun):
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
-        kernel, arguments = self._tier.kernel(advance_bodies), self._arguments()
         threads = 1 if self._tier.is_plain else self._threads
-        ends = [self._pool.submit(kernel, *arguments) for _ in range(threads)]
-        status, number = max(result_of(end, latest, self.halt) for end in ends)
+        status, number = max(self._called(advance_bodies, [self._arguments()] * threads, latest))
         self._watch.end()
         self._cut_short = status == Status.INTERRUPTED
         if status not in (Status.DONE, Status.INTERRUPTED):
