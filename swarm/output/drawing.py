@@ -19,7 +19,7 @@ from .colours import Colours
 # Okabe and Ito's, for a light background.
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MAP = ListedColormap(colours.table(), name="swarm")
-BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
+BACKGROUND, LIGHT = "#{:02x}{:02x}{:02x}".format(*colours.BACKGROUND), "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _FEW_WIRES = 300
 # A direction in which a picture extends by less than this part of its widest one is drawn as flat.
