@@ -20,9 +20,21 @@ _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 # Columns of numbers above 0.
 _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b", "c"}
 
-# What the last axis of an observable is where it is neither a surface nor a cavity.
+# What the last axis of an observable, or of a column of a log, is where it is neither a surface nor a cavity.
 COMPONENTS = dict.fromkeys(
-    ("momentum", "angular_momentum", "wall_position", "wall_velocity", "wall_spin"), ("x", "y", "z")
+    (
+        "momentum",
+        "angular_momentum",
+        "wall_position",
+        "wall_velocity",
+        "wall_spin",
+        "position",
+        "velocity_before",
+        "velocity_after",
+        "slip",
+        "image",
+    ),
+    ("x", "y", "z"),
 ) | {"wall_orientation": ("w", "x", "y", "z")}
 
 

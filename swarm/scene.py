@@ -80,11 +80,11 @@ class Scene(Volume):
         pull = None if gravity is None else checks.vector("gravity", gravity)
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
-        object.__setattr__(self, "surfaces", surfaces)
-        object.__setattr__(self, "period", lengths_of(period))
-        object.__setattr__(self, "_images", tuple(self._images_of(i) for i in range(len(surfaces))))
-        named = ((surface, self.period, f"surfaces[{i}]") for i, surface in enumerate(surfaces))
-        object.__setattr__(self, "volumes", tuple(volumes_of(*one) for one in named))
+        lengths = lengths_of(period)
+        named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
+        images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
+        checks.assign(self, surfaces=surfaces, period=lengths, _images=images)
+        checks.assign(self, volumes=tuple(volumes_of(one, lengths, name) for one, name in named))
         self._require_few_walls("")
         require_few(self.volumes)
         for i in self._fields() if self.reacts() else ():
@@ -93,7 +93,7 @@ class Scene(Volume):
                 f"{surfaces[i]}; give that surface a motion instead of a mass and an inertia, or list the bodies one "
                 f"by one, at most {MOST_WALLS} walls in all"
             )
-        object.__setattr__(self, "gravity", pull if pull is not None and any(pull) else None)
+        checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         required.require_known(surfaces, lambda held: self._bounds(0.0, held))
         if not self._has_volume():
             raise SceneError(
@@ -288,11 +288,6 @@ class Scene(Volume):
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""
         return [self.owners_of_pieces[i] for i in self.order.fields]
-
-    def _images_of(self, i: int) -> tuple[Surface, ...]:
-        if self.period is None:
-            return (self.surfaces[i],)
-        return tuple(images_of(self.surfaces[i], self.period, f"surfaces[{i}]"))
 
 
 def _thermal(surface: Surface) -> Thermal:

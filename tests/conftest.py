@@ -21,7 +21,7 @@ from swarm.contact.regularisation import Hertz, Linear, regularisation
 from swarm.kernel import cache
 from swarm.kernel.jit import inlined
 from swarm.kernel.vector import Vec, vec
-from swarm.run import ledger, tiers
+from swarm.run import tiers
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.walls import Walls
 
@@ -47,8 +47,7 @@ settings.load_profile("swarm")
 # kind in which contact lasts takes 10 to 20 s, a particle that slides for ten crossings 2 s.
 tiers._PATIENCE = 10.0
 # The tier of a test does not depend on the tests before it.
-LEDGER = {name: getattr(ledger, name) for name in ("spent", "is_remembered")}
-ledger.spent, ledger.is_remembered = lambda kinds: 0.0, lambda kinds: False
+SPENT, tiers.spent = tiers.spent, lambda kinds: 0.0
 EPSILON = float(np.finfo(np.float64).eps)
 
 

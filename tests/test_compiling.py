@@ -38,8 +38,8 @@ def test_every_kernel_of_a_run_has_words(run):
     import swarm
     from swarm.run import compiling
     from swarm.run.admission import task_of
+    from swarm.run.machine import run_of
     from swarm.run.options import RunOptions
-    from swarm.run.runs import run_of
 
     walls = [swarm.Plane((0.0, 0.0, -1.0), 0.0), swarm.Sphere(0.5)]
     walls[0] = walls[0] if run != "reacting" else swarm.Plane((0.0, 0.0, -1.0), 0.0, mass=1.0)

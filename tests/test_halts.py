@@ -19,8 +19,8 @@ from swarm.reacting import queue
 from swarm.run import reacting, turns
 from swarm.run.admission import task_of
 from swarm.run.engine import Run
+from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
-from swarm.run.runs import run_of
 from swarm.run.watch import Watch
 
 FLOOR = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], (0.0, 0.0, -9.81))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
-from conftest import METHODS, SURFACES, every_surface
+from conftest import METHODS, SPENT, SURFACES, every_surface
 
 import swarm
 from swarm.kernel import cache
@@ -94,19 +94,13 @@ def test_the_tier_at_the_start(monkeypatch, compile, found, plain):
 
 
 @compiled_only
-def test_bodies_that_are_compiled_later_have_as_many_lanes(monkeypatch):
-    """One was left of the start in plain Python: four times the time of a whole run."""
+def test_bodies_are_compiled_at_once_and_have_lanes_there_alone():
+    """With one lane they took four times as long."""
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.2, 1.0), 40, speed=1.0, seed=1)
-    made, task = [], task_of(SPHERE, bodies, swarm.Impact(dt=0.01), RunOptions(until=1.0))
-    for found in (True, False):
-        monkeypatch.setattr(cache, "is_compiled", lambda *call, found=found: found)
-        made.append(BodyRun(SPHERE, bodies, task.particles, task.method, 1, None, "auto"))
-    compiled, later = made
-    assert (compiled._tier.is_plain, later._tier.is_plain) == (False, True)
-    assert compiled._rule.lanes > later._rule.lanes == 1
-    later._tier.remaining = 0.0
-    later._choose_tier()
-    assert later._rule.lanes == compiled._rule.lanes
+    task = task_of(SPHERE, bodies, swarm.Impact(dt=0.01), RunOptions(until=1.0))
+    runs = [BodyRun(SPHERE, bodies, task.particles, task.method, 1, None, choice) for choice in ("auto", "never")]
+    assert [run._tier.is_plain for run in runs] == [False, True]
+    assert runs[0]._rule.lanes > runs[1]._rule.lanes == 1
 
 
 @compiled_only
@@ -180,22 +174,89 @@ def test_another_word_is_refused():
         swarm.simulate(SPHERE, swarm.fill(SPHERE, 2, speed=1.0), swarm.Impact(), until=1.0, compile="alwyas")
 
 
+# --- Plain Python is counted over all runs of a process ------------------------------------------------------------
+
+
+def tier_of(*kernels, choice="auto"):
+    """The tier of a run that calls these kernels; a call stands for its kind."""
+    tier = tiers.Tier(choice, (), 3)
+    tier.choose([(kernel, ()) for kernel in kernels])
+    return tier
+
+
+@pytest.fixture
+def _counted(monkeypatch):
+    """No kernel is compiled, and none was missing so far."""
+    monkeypatch.setattr(tiers, "_spent", {})
+    monkeypatch.setattr(tiers, "spent", SPENT)
+    monkeypatch.setattr(tiers, "_PATIENCE", 8.0)
+    monkeypatch.setattr(cache, "is_compiled", lambda kernel, arguments: False)
+
+
+@pytest.fixture
+def _named(_counted, monkeypatch):
+    monkeypatch.setattr(cache, "kind", lambda kernel, arguments: kernel)
+
+
+@pytest.mark.usefixtures("_named")
+def test_the_time_of_all_runs_of_a_kind_counts():
+    for remaining in (8.0, 5.0, 2.0):
+        tier = tier_of("fly", "observe")
+        assert tier.is_plain
+        assert tier.remaining == remaining
+        tier.spend(3.0)
+    assert not tier_of("fly", "observe").is_plain
+
+
+@pytest.mark.usefixtures("_named")
+def test_other_kinds_have_time_of_their_own():
+    tier_of("fly", "observe").spend(7.0)
+    # What both need is missing for longer: it is compiled with what is used as long.
+    assert tier_of("other", "observe").remaining == 8.0
+    assert tier_of("fly").remaining == 1.0
+    # A run that meets another kind has no more time than it had.
+    tier = tier_of("fly")
+    tier.choose([("fly", ()), ("slide", ())])
+    assert tier.remaining == 1.0
+
+
+@pytest.mark.usefixtures("_named")
+@pytest.mark.parametrize(("choice", "plain"), [("always", False), ("never", True)])
+def test_what_is_chosen_by_hand_counts_nothing(choice, plain):
+    tier_of("fly").spend(20.0)
+    tier = tier_of("fly", choice=choice)
+    assert tier.is_plain is plain
+    tier.spend(20.0)
+    assert SPENT(["fly"]) == 20.0
+
+
+@pytest.mark.usefixtures("_named")
+def test_what_runs_compiled_counts_nothing(monkeypatch):
+    monkeypatch.setattr(cache, "is_compiled", lambda kernel, arguments: True)
+    tier_of("fly").spend(20.0)
+    assert SPENT(["fly"]) == 0.0
+
+
 @compiled_only
-def test_while_another_process_compiles_a_run_goes_on_in_plain_python(monkeypatch):
-    monkeypatch.setattr(cache, "kind", lambda *call: call)
-    monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
-    for waits in (True, False):
-        monkeypatch.setattr(cache, "is_being_compiled", lambda *call, waits=waits: waits)
-        tier = tiers.Tier("auto", (), 3)
-        tier.remaining = -1.0
-        assert tier.choose([(None, ())]) is not waits
-        assert tier.is_plain is waits
-        assert (tier.remaining > 0.0) is waits
-    # Not for ever, and never where plain Python has other bits or does too little.
-    monkeypatch.setattr(cache, "is_being_compiled", lambda *call: True)
-    tier = tiers.Tier("auto", (), 3)
-    tier.remaining, tier._latest = -1.0, 0.0
-    assert tier.choose([(None, ())])
-    many = tiers.Tier("auto", (), 1_000_000)
-    many.choose([(None, ())])
-    assert not many.is_plain
+@pytest.mark.usefixtures("_counted")
+def test_the_second_run_is_compiled_from_the_start(monkeypatch):
+    """By the time that `Run` books: here any time is enough."""
+    monkeypatch.setattr(tiers, "_PATIENCE", 1e-9)
+    start = swarm.fill(SPHERE, 3, speed=1.0, seed=1)
+    with Run(SPHERE, start.copy(), swarm.Impact(), 1, None, "auto") as run:
+        assert run._tier.is_plain
+        run.observe()
+    assert not Run(SPHERE, start.copy(), swarm.Impact(), 1, None, "auto")._tier.is_plain
+
+
+@compiled_only
+@pytest.mark.usefixtures("_counted")
+def test_runs_of_other_sizes_are_of_the_same_kind():
+    def missing(radius, method):
+        scene = swarm.Scene([swarm.Sphere(radius)])
+        return set(Run(scene, swarm.Particles((0, 0, 0), (1, 0, 0)), method, 1, None, "auto")._tier._missing)
+
+    first = missing(0.5, swarm.Impact())
+    assert len(first) == 2
+    assert first == missing(0.7, swarm.Impact())
+    assert not first & missing(0.5, swarm.Penalty(dt=1e-3, penalty=1e4))

@@ -43,7 +43,6 @@ class Variant:
         parameters: the keys of the sweep and their values.
         stem: of the names of its files.
         kind: the same for runs that differ in numbers alone, and probably share their kernels.
-        compile: "auto", "always" or "never", as the file says.
         has_impacts: whether it writes a log of impacts.
     """
 
@@ -51,7 +50,6 @@ class Variant:
     parameters: dict[str, Any]
     stem: str
     kind: str
-    compile: str
     has_impacts: bool
 
 
@@ -217,7 +215,7 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list
                 )
         stem = _digest(own, path, contents)
         kind = _digest_of(_unnumbered(own))
-        made = Variant(len(variants), parameters, stem, kind, job.run.compile, job.run.impacts is not None)
+        made = Variant(len(variants), parameters, stem, kind, job.run.impacts is not None)
         if stem in variants:
             raise SceneError(
                 f"sweep: the runs with {told(variants[stem].parameters)} and with {told(parameters)} are the same; "

@@ -12,9 +12,6 @@ from .hand import Hand
 from .plan import Variant
 from .results import Results, Status
 
-# Seconds of plain Python before all workers that are worth the compilation of kernels, 3 to 15 s.
-_WORTH = 20.0
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -47,7 +44,6 @@ class Pool:
         self._shares: dict[int, float] = {}
         self._sentence = ""
         self._ended = {"done": len(results.of_state("done")), "failed": 0}
-        self._seconds, self._runs = 0.0, 0
         self._stops = False
         self._lock = threading.Lock()
 
@@ -128,18 +124,12 @@ class Pool:
         impacts = self._results.impacts(variant)
         with self._lock:
             self._shares[variant.number] = 0.0
-            choice = variant.compile
-            # Seconds until the end, at the pace of the runs that have ended.
-            left = self._seconds / max(self._runs, 1) * len(self._left) / self._processes
-            if choice == "auto" and left > _WORTH:
-                choice = "always"
         order = {
             "text": self._results.plan.text(variant),
             "source": str(self._results.plan.path),
             "trajectory": str(self._results.trajectory(variant)),
             "impacts": None if impacts is None else str(impacts),
             "threads": self._threads,
-            "compile": choice,
             "goes_on": self._goes_on,
         }
         if self._stops:
@@ -156,8 +146,6 @@ class Pool:
             del self._shares[variant.number]
             if has_ended:
                 self._ended[status["state"]] += 1
-                self._runs += 1
-                self._seconds += status["wall_time"] or 0.0
 
     def _tell(self, variant: Variant, message: dict[str, Any]) -> None:
         with self._lock:

@@ -130,7 +130,6 @@ def _simulated(job: "Job", order: dict[str, Any], line: _Line, **how: Any) -> di
         trajectory=order["trajectory"],
         impacts=order["impacts"],
         threads=job.run.threads or order["threads"],
-        compile=order["compile"],
         scene_text=job.text,
         progress=_display(line),
         **how,

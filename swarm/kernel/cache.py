@@ -19,7 +19,7 @@ from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
 
 from .entries import File, Key, is_own, key_of
-from .once import held, is_held
+from .once import held
 
 _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
@@ -198,7 +198,7 @@ def in_python(kernel: Any) -> Any:
 
 
 def kind(kernel: Any, arguments: tuple[Any, ...]) -> str:
-    """A name for what a kernel is compiled for, whatever its own code: the same in every process."""
+    """A name for what a kernel is compiled for."""
     function = in_python(kernel)
     return key_of(tuple(map(numba.typeof, arguments)), function.__module__, function.__qualname__).text
 
@@ -212,11 +212,6 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     if in_python(kernel) is kernel:
         return True  # the compiler is disabled
     return _is_found(kernel, tuple(map(numba.typeof, arguments)))
-
-
-def is_being_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
-    """Whether another process compiles a kernel for such arguments now."""
-    return in_python(kernel) is not kernel and is_held(_lock_of(kernel, tuple(map(numba.typeof, arguments))))
 
 
 @contextlib.contextmanager

@@ -27,20 +27,3 @@ def held(path: Path) -> Iterator[None]:
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
             lock.release()
-
-
-def is_held(path: Path) -> bool:
-    """Whether another process, or another thread, holds the lock of a file."""
-    import filelock
-
-    if not path.exists():
-        return False
-    lock = filelock.FileLock(path, blocking=False)
-    try:
-        lock.acquire()
-    except filelock.Timeout:
-        return True
-    except (OSError, NotImplementedError):
-        return False
-    lock.release()
-    return False

@@ -17,6 +17,7 @@ Colours = NDArray[np.uint32]
 Values = Callable[[Floats, Floats], Floats]
 
 BY = ("speed", "energy-error")
+BACKGROUND = (24, 24, 27)
 
 # Viridis (https://bids.github.io/colormap) without its darkest third, which is invisible on a dark background. It
 # goes from dark to light with every kind of colour vision.

@@ -19,7 +19,7 @@ from .colours import Colours
 # Okabe and Ito's, for a light background.
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MAP = ListedColormap(colours.table(), name="swarm")
-BACKGROUND, LIGHT = "#18181b", "#c8c8d0"
+BACKGROUND, LIGHT = "#{:02x}{:02x}{:02x}".format(*colours.BACKGROUND), "#c8c8d0"
 _WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
 _FEW_WIRES = 300
 # A direction in which a picture extends by less than this part of its widest one is drawn as flat.
@@ -75,6 +75,19 @@ def ties(axes: Any, lines: tuple[Floats, Colours], faces: tuple[Floats, Colours]
     for one in drawn:
         axes.add_collection3d(one, autolim=False)
     return drawn
+
+
+def frame(
+    axes: Any,
+    points: Floats,
+    packed: Colours,
+    wires: list[tuple[bool, list[Floats]]],
+    lines: tuple[Floats, Colours],
+    faces: tuple[Floats, Colours],
+) -> None:
+    """A frame: `particles` of colours 0xRRGGBBAA, which bodies with faces do not show, and their `ties`."""
+    particles(axes, points, red_green_blue(packed), wires, 0.0 if len(faces[0]) else 1.0)
+    ties(axes, lines, faces)
 
 
 def particles(

@@ -55,6 +55,12 @@ class Drawn:
             lines = scale.colours(values(self.middles(position), self.middles(velocity)))
         return position, scale.colours(values(position, velocity)), lines
 
+    def ties(
+        self, points: Floats, packed: Colours, tints: Colours
+    ) -> tuple[tuple[Floats, Colours], tuple[Floats, Colours]]:
+        """The lines (S, 2, 3) and the triangles (T, 3, 3) between points (N, 3), each with their colours."""
+        return (points[self.lines], tints), (points[self.triangles], packed[self.triangles])
+
     def middles(self, rows: Floats) -> Floats:
         """The middles of the lines, from the points that are shown."""
         return np.asarray(0.5 * (rows[:, self.lines[:, 0]] + rows[:, self.lines[:, 1]]))

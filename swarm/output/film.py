@@ -179,9 +179,7 @@ class _Film:
         if self._scene.moves():
             for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
                 artist.set_segments(curves)
-        points = position.T
-        faces = points[drawn.triangles], packed[drawn.triangles]
-        ties = drawing.ties(self._axes, (points[drawn.lines], tints), faces)
+        ties = drawing.ties(self._axes, *drawn.ties(position.T, packed, tints))
         of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
         self._title.set_text(f"{drawn.shown}{of} {drawn.noun}, t = {self._seen['time'][k]:.4g} s")
         self._canvas.restore_region(self._still)

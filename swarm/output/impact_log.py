@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks, notebook
+from ..columns import flattened
 from ..errors import SceneError
 from ..extras import needed_by
 from . import layout
@@ -191,13 +192,7 @@ class ImpactLog(Stored):
         with needed_by("a frame of impacts", "table"):
             import pandas
         table = self.table(**chosen)
-        columns: dict[str, Any] = {}
-        for name in self.dtype.names or ():
-            values = table[name]
-            columns |= (
-                {name: values} if values.ndim == 1 else {f"{name}_{x}": values[:, i] for i, x in enumerate("xyz")}
-            )
-        return pandas.DataFrame(columns)
+        return pandas.DataFrame(flattened({name: table[name] for name in self.dtype.names or ()}))
 
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0

@@ -7,12 +7,11 @@ import rerun.blueprint as rrb
 
 from ..particles import Floats
 from . import series
-from .colours import Scale
+from .colours import BACKGROUND, Scale
 from .drawn import Drawn
+from .playback import LINES, MESH, PARTICLES
 from .shapes import Shape
 
-LINES, MESH = "/scene/bodies/lines", "/scene/bodies/mesh"
-_BACKGROUND = (24, 24, 27)
 _CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
@@ -29,7 +28,7 @@ def path_of(shape: Shape) -> str:
 def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -> None:
     """Log the walls, and how particles and bodies look."""
     stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log("/scene/particles", rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
+    stream.log(PARTICLES, rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
     width = rr.Radius.ui_points(1.0)
     if len(drawn.triangles):
         stream.log(MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)
@@ -78,7 +77,7 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
 def blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
     """The 3-D view beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
-        origin="/scene", name=noun, background=_BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
+        origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
     )
     plots = []
     for group, together in series.views_of(lines).items():

@@ -21,7 +21,8 @@ _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 # Recordings of older versions do not say them.
 _NOUN, _CENTER = "noun", "center"
-_PARTICLES, _LINES, _MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
+# The entities of particles, and of bodies; recordings are written with them too.
+PARTICLES, LINES, MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
 _WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
@@ -86,7 +87,7 @@ class Playback:
                 continue
             for name, column in columns.items():
                 self._rows.setdefault((entity, name), {}).update({k: (column, i) for i, k in enumerate(numbers)})
-        drawn = self._rows.get((_PARTICLES, _POSITIONS))
+        drawn = self._rows.get((PARTICLES, _POSITIONS))
         if not drawn or "/time" not in scalars:
             raise ValueError("it is not a recording of swarm, or holds no frame")
         said = {name: column for (entity, name), column in self._static.items() if entity == "/about"}
@@ -114,7 +115,7 @@ class Playback:
             (entity.startswith("/scene/solids/"), [np.array(strip) for strip in kept.as_py()])
             for entity, kept in strips.items()
         ]
-        triangles = self._static.get((_MESH, _TRIANGLES))
+        triangles = self._static.get((MESH, _TRIANGLES))
         self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
 
     def wires_at(self, number: int) -> list[tuple[bool, list[Floats]]]:
@@ -130,16 +131,16 @@ class Playback:
 
     def frame(self, number: int) -> tuple[Floats, Colours]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""
-        return self._points(_PARTICLES, _POSITIONS, number), self._colours(_PARTICLES, _COLOURS, number)
+        return self._points(PARTICLES, _POSITIONS, number), self._colours(PARTICLES, _COLOURS, number)
 
     def lines(self, number: int) -> tuple[Floats, Colours]:
         """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; none where bodies have faces."""
-        colours = self._colours(_LINES, _TINTS, number)
-        return self._points(_LINES, _STRIPS, number)[: 2 * len(colours)].reshape(-1, 2, 3), colours
+        colours = self._colours(LINES, _TINTS, number)
+        return self._points(LINES, _STRIPS, number)[: 2 * len(colours)].reshape(-1, 2, 3), colours
 
     def faces(self, number: int) -> tuple[Floats, Colours]:
         """Triangles of bodies (T, 3, 3) and the colours of their corners (T, 3) at a frame."""
-        corners, colours = self._points(_MESH, _CORNERS, number), self._colours(_MESH, _PAINT, number)
+        corners, colours = self._points(MESH, _CORNERS, number), self._colours(MESH, _PAINT, number)
         return corners[self._triangles], colours[self._triangles]
 
     def _row(self, entity: str, name: str, number: int) -> Any:

@@ -102,19 +102,19 @@ def figure_of(content: Content, figsize: Any, particles: int) -> drawing.Picture
 def _series(figure: Any, content: Content, shapes: list[Shape], width: float) -> None:
     """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
-    lines = series.lines_of(content.scene, content.method, shapes, content.body)
-    values = {line.path: line.values(times, seen) for line in lines}
-    shown = [line for line in lines if series.group_of(line.path) not in series.RARE or values[line.path].any()]
-    views = series.views_of(shown)
-    count = len(views) + bool(content.frames)  # one more is for the speeds
+    drawn = {}
+    for line in series.lines_of(content.scene, content.method, shapes, content.body):
+        values = line.values(times, seen)
+        known = ~np.isnan(values)
+        drawn[line.path] = line.name, times[known], values[known]
+    plots = series.plots_of(drawn)
+    count = len(plots) + bool(content.frames)  # one more is for the speeds
     columns = max(1, min(round(width / _CELL), -(-count // 2)))
     cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
-    for cell, (group, together) in zip(cells, views.items(), strict=False):
-        known = {line.name: ~np.isnan(values[line.path]) for line in together}
-        curves = {line.name: (times[known[line.name]], values[line.path][known[line.name]]) for line in together}
+    for cell, (group, curves) in zip(cells, plots.items(), strict=False):
         drawing.lines(cell, *series.VIEWS[group], curves)
     if content.frames:
-        _speeds(cells[len(views)], content)
+        _speeds(cells[len(plots)], content)
     for cell in cells[count:]:
         cell.set_axis_off()
 
@@ -125,12 +125,10 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     start = content.frames.get("start", end)
     scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, packed, tints = drawn.coloured(end, scale, values)
-    points, axes = position.T, figure.add_subplot(projection="3d")
+    axes = figure.add_subplot(projection="3d")
     figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
-    size = 0.0 if len(drawn.triangles) else 1.0
-    drawing.particles(axes, points, drawing.red_green_blue(packed), wires, size)
-    drawing.ties(axes, (points[drawn.lines], tints), (points[drawn.triangles], packed[drawn.triangles]))
+    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints))
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
     title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from .exported import Progress
+    from .export import Progress
 
 
 class Presented(Stored):

@@ -32,6 +32,7 @@ from ..scene import Scene
 from . import colours, looks, paths, series, viewer
 from .drawn import Drawn
 from .origin import origin_of
+from .playback import LINES, MESH, PARTICLES
 from .shapes import shapes_of, since_start
 from .writer import WriteFrames, Written, rows
 
@@ -185,15 +186,15 @@ class RecordingWriter:
         """Send points (frames, n, 3) with their colours, and what ties them together."""
         drawn, (frames, n, _three) = self._drawn, points.shape
         columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
-        self._send("/scene/particles", numbers, times, columns.partition([n] * frames))
+        self._send(PARTICLES, numbers, times, columns.partition([n] * frames))
         if len(drawn.lines):
             strips = points[:, drawn.lines].reshape(-1, 2, 3)
             tinted = {"colors": lines.ravel()} if lines.size else {}
             columns = rr.LineStrips3D.columns(strips=strips, **tinted)
-            self._send(looks.LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
+            self._send(LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
         if len(drawn.triangles):
             columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
-            self._send(looks.MESH, numbers, times, columns.partition([n] * frames))
+            self._send(MESH, numbers, times, columns.partition([n] * frames))
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""

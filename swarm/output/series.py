@@ -1,5 +1,7 @@
 """The time series that recordings and plots show, from the observables of frames."""
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +29,8 @@ VIEWS = {
     "heat": ("heat from each surface [W]", False),
 }
 # Views that pictures leave out where all values are 0.
-RARE = ("sliding",)
+_RARE = ("sliding",)
+_ENERGIES = ("total", "kinetic", "potential", "contact", "dissipated", "elastic", "work")
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,28 @@ def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
         elif surface.motion is not None:
             lines.append(Line(f"/energy/work_{name}", f"work of {name}", "wall_work", i))
     return lines
+
+
+def plots_of(curves: Mapping[str, tuple[str, Floats, Floats]]) -> dict[str, dict[str, tuple[Floats, Floats]]]:
+    """The curves of each plot of a picture, (times [s], values) by their names, by the key in `VIEWS`.
+
+    They are given by their entities, as (name, times, values). In every picture they have the same order, and so the
+    same colours.
+    """
+    plots: dict[str, dict[str, tuple[Floats, Floats]]] = {}
+    # Recordings of other versions may have others.
+    for path in sorted((path for path in curves if group_of(path) in VIEWS), key=_place):
+        name, times, values = curves[path]
+        if group_of(path) not in _RARE or values.any():
+            plots.setdefault(group_of(path), {})[name] = times, values
+    return plots
+
+
+def _place(path: str) -> tuple[int, ...]:
+    """The order of an entity: of its plot, of an energy, and of a surface by its number."""
+    group, name = group_of(path), path.rpartition("/")[2]
+    energy = _ENERGIES.index(name) if name in _ENERGIES else len(_ENERGIES)
+    return list(VIEWS).index(group), energy, *map(int, re.findall(r"\d+", name))
 
 
 def views_of(lines: list[Line]) -> dict[str, list[Line]]:

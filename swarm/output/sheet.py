@@ -68,12 +68,8 @@ def _pictures(
 
 
 def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
-    groups: dict[str, dict[str, Any]] = {}
-    for path, values in sorted(playback.series.items()):
-        group = series.group_of(path)
-        if group not in series.RARE or values[1].any():
-            groups.setdefault(group, {})[playback.names[path]] = values
-    above, below = -(-len(frames) // _COLUMNS), -(-len(groups) // _COLUMNS)
+    plots = series.plots_of({path: (playback.names[path], *values) for path, values in playback.series.items()})
+    above, below = -(-len(frames) // _COLUMNS), -(-len(plots) // _COLUMNS)
     picture = drawing.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
     top.set_facecolor(drawing.BACKGROUND)
@@ -88,16 +84,13 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             cells[-1].set_axis_off()
         else:
             number = playback.numbers[k]
-            (positions, packed), faces = playback.frame(number), playback.faces(number)
-            size = 0.0 if len(faces[0]) else 1.0
-            wires = playback.wires_at(number)
-            drawing.particles(cells[-1], positions, drawing.red_green_blue(packed), wires, size)
-            drawing.ties(cells[-1], playback.lines(number), faces)
+            ties = playback.lines(number), playback.faces(number)
+            drawing.frame(cells[-1], *playback.frame(number), playback.wires_at(number), *ties)
     about = playback.about
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
     top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
-    for place, group in enumerate(group for group in series.VIEWS if group in groups):
-        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], groups[group])
+    for place, (group, curves) in enumerate(plots.items()):
+        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], curves)
     return picture

@@ -116,6 +116,12 @@ class BaseRun:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
         failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
 
+    def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
+        """What a kernel of this tier returns for each of these arguments, in a thread each, halted at `latest`."""
+        chosen = self._tier.kernel(kernel)
+        shares = [self._pool.submit(chosen, *arguments) for arguments in calls]
+        return [result_of(share, latest, self.halt) for share in shares]
+
     def _choose_tier(self) -> None:
         """Take the tier of the next calls."""
         self._tier.choose(self.calls())

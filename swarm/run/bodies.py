@@ -1,7 +1,9 @@
 """The run of copies of a body."""
 
 import math
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -17,15 +19,16 @@ from ..observables import CHUNK
 from ..particles import Floats, Particles, State
 from ..scene import Scene
 from ..status import Status
-from .base import Arrays, BaseRun, result_of
+from .base import Arrays, BaseRun
 from .energies import Energies, summed
-from .stack import threads_with
 from .tiers import Tier
 
 # Round-off of a position on a wall, as a part of the scene's size.
 _ROUND_OFF = 8.0 * np.finfo(np.float64).eps
 # Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
 _STACK, _MOST_LANES = 1 << 20, 32
+# What else a stack holds; and stacks are whole pages.
+_REST, _PAGE = 8 << 20, 1 << 16
 # Bodies that a thread draws at a time.
 _AT_ONCE = 256
 # Suzuki's composition: five steps of second order are one of fourth.
@@ -58,22 +61,23 @@ class BodyRun(BaseRun):
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
-        self._lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
+        lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
         self._size = max(1, block_size or _AT_ONCE)
         self._threads = min(threads, math.ceil(n / self._size))
         # Matrices of ties, and of contacts, of one body.
         pressed = max(contacts, 3 * MOST_CONTACTS)
         at_once = 8 * (rows * rows + pressed * (pressed + 3 * rows))
-        # Sines of two libraries differ in the last bit.
-        choice = "always" if compile == "auto" and led_points(bodies.body) else compile
-        tier = Tier(choice, self._walls, n * points)
-        super().__init__(scene, method, n, threads_with(self._threads, self._lanes * per_lane + at_once), tier, first)
+        # In plain Python a step takes some milliseconds: it never pays.
+        tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
+        super().__init__(scene, method, n, threads_with(self._threads, lanes * per_lane + at_once), tier, first)
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = _ROUND_OFF * max(size, scene.extent())
         noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
         strict = getattr(method, "on_unconverged", "") == "raise"
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
-        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, self._lanes, soft, contacts, looped, strict)
+        # More gain in a compiled kernel alone.
+        lanes = 1 if tier.is_plain else lanes
+        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
         pull = math.hypot(*gravity) * self._ties.mass.sum()
@@ -86,7 +90,6 @@ class BodyRun(BaseRun):
         self._bodies.energy[:] = self._start
         self._seen: dict[str, Any] = {}
         self._sums = np.zeros((0, 0))
-        self._choose_tier()
 
     def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
         return [(advance_bodies, self._arguments())]
@@ -96,22 +99,12 @@ class BodyRun(BaseRun):
         both, ticket = (self._ties, self._touching), np.zeros(1, np.int64)
         return both, self._walls, self._rule, self._bodies, ticket, self._size, self._watch.passes
 
-    def _choose_tier(self) -> None:
-        super()._choose_tier()
-        # More gain in a compiled kernel alone.
-        self._rule = self._rule._replace(lanes=1 if self._tier.is_plain else self._lanes)
-
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
-        if self._tier.remaining < math.inf:
-            self._tier.remaining = 0.0
-        latest = self._limit(latest)
-        kernel, arguments = self._tier.kernel(advance_bodies), self._arguments()
         threads = 1 if self._tier.is_plain else self._threads
-        ends = [self._pool.submit(kernel, *arguments) for _ in range(threads)]
-        status, number = max(result_of(end, latest, self.halt) for end in ends)
+        status, number = max(self._called(advance_bodies, [self._arguments()] * threads, latest))
         self._watch.end()
         self._cut_short = status == Status.INTERRUPTED
         if status not in (Status.DONE, Status.INTERRUPTED):
@@ -227,6 +220,23 @@ class BodyRun(BaseRun):
 
     def arrays(self) -> Arrays:
         return dict(self._bodies._asdict())
+
+
+def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
+    """A pool of `count` threads, all of them begun, each with room for so many bytes of scratch arrays.
+
+    Memory that is not used is none: a system maps a stack page by page.
+    """
+    before = threading.stack_size(-(-(scratch + _REST) // _PAGE) * _PAGE)
+    try:
+        pool = ThreadPoolExecutor(count, thread_name_prefix="swarm")
+        # Each waits for all the others, so none takes the turn of two.
+        together = threading.Barrier(count)
+        for begun in [pool.submit(together.wait) for _ in range(count)]:
+            begun.result()
+    finally:
+        threading.stack_size(before)
+    return pool
 
 
 def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> BodyState:

@@ -76,7 +76,6 @@ class Run(BaseRun):
         self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, self._draws)
-        self._pace = math.inf  # work of the last frame [s], over its span
         self._choose_tier()
 
     def __exit__(self, *error: object) -> None:
@@ -103,9 +102,8 @@ class Run(BaseRun):
             status, particle, _left = max(ends, key=lambda end: end[:2])
             self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
             if self._cut_short:
-                self._halted = left_behind(
-                    self._halted, self._phase, [remaining for *_, remaining in ends if remaining is not None]
-                )
+                left = [halted for *_, halted in ends if halted is not None]
+                self._halted = left_behind(self._halted, self._phase, left)
             if status == Status.HARD_CONTACT:
                 # Go on with the kernel of this phase, or with hard contacts where none last.
                 if self.state.contacts is not None:
@@ -258,8 +256,9 @@ class Run(BaseRun):
             yield observables.count_escaped, self._escaping()
 
     def _choose_tier(self) -> None:
-        if self._tier.choose(self.calls()):
-            self._pace = math.inf
+        super()._choose_tier()
+        # Work of the last frame [s], over its span; unknown, so that another thread compiles what is missing.
+        self._pace = math.inf
 
     def arrays(self) -> Arrays:
         found: Arrays = {}
@@ -282,9 +281,8 @@ class Run(BaseRun):
 
     def seen(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
-        escaped = 0
-        if self._far < math.inf:
-            escaped = self._tier.kernel(observables.count_escaped)(*self._escaping())
+        is_closed = self._far == math.inf
+        escaped = 0 if is_closed else self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:
             escaped += int(np.count_nonzero(~np.isnan(self.state.escape_time)))
         if self._scene.moves():

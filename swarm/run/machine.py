@@ -15,13 +15,16 @@ from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
 from .base import BaseRun
+from .bodies import BodyRun
 from .compiling import Compilations
+from .engine import Run
 from .impacts import log_of
 from .options import Task
 from .outputs import recorder_of, writer_of
 from .progress import Display, display
-from .runs import run_of
+from .reacting import ReactingRun
 from .session import Session
+from .state import Seeding
 from .tally import Tally, Watched
 
 if TYPE_CHECKING:
@@ -32,6 +35,7 @@ _LOG = logging.getLogger("swarm")
 CHUNK_SUMS = "chunk_sums"
 # So many frames are packed into arrays: as Python objects they take 3 kB each.
 _PACKED = 1024
+_UNWATCHED = Watched()
 
 
 class End(NamedTuple):
@@ -130,6 +134,17 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
         compilations.calls = run.calls
         session.restore(run)
         yield run, writer_of(task, session, recorder, watched.log), show, watched
+
+
+def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
+    """The state of a run at its start, and the threads that advance it."""
+    options = task.options
+    how = options.thread_count(), options.block_size, options.compile
+    if task.bodies is not None:
+        return BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
+    if task.scene.reacts():
+        return ReactingRun(task.scene, task.particles, task.method, *how)
+    return Run(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:

@@ -1,4 +1,4 @@
-"""The progress display of a run: a bar on a terminal, else a line a minute."""
+"""The progress display of a run, or of a sweep: a bar on a terminal, else a line a minute."""
 
 import contextlib
 import math
@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 # ETA and speed come from the last seconds only: compile time would spoil an average from the start.
 _WINDOW = 10.0
@@ -47,36 +47,44 @@ def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Disp
         yield Display(lambda frame: progress(frame.apart()))
     elif not progress:
         yield Display(_nothing)
-    elif sys.stderr.isatty():
-        with _bar() as bar:
-            yield bar
     else:
-        yield lines(_A_MINUTE)
+        with told() as one:
+            yield _of_run(one, _A_MOMENT if sys.stderr.isatty() else _A_MINUTE)
+
+
+class Told(NamedTuple):
+    """Where it is told how far something is: by the share that is done and a line about it, or by a sentence."""
+
+    put: Callable[[float, str], None]
+    say: Callable[[str], None]
 
 
 @contextlib.contextmanager
-def _bar() -> Iterator[Display]:
+def told(sentences_stay: bool = False) -> Iterator[Told]:
+    """A bar on a terminal, above which sentences stay, or which shows them for a moment; else a line a minute."""
+    if not sys.stderr.isatty():
+        yield in_lines(_A_MINUTE)
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (
-        BarColumn(bar_width=24),
-        TextColumn("{task.percentage:3.0f}%"),
-        TextColumn("{task.fields[line]}"),
-    )
+    columns = BarColumn(bar_width=24), TextColumn("{task.percentage:3.0f}%"), TextColumn("{task.fields[line]}")
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0, line="")
 
         def put(share: float, line: str) -> None:
             bar.update(task, completed=share, line=line)
 
-        def compiling(sentence: str) -> None:
-            bar.update(task, line=sentence, refresh=True)
+        def say(sentence: str) -> None:
+            if sentences_stay:
+                bar.console.print(sentence, highlight=False, markup=False)
+            else:
+                bar.update(task, line=sentence, refresh=True)
 
-        yield _put_by(put, _A_MOMENT, compiling)
+        yield Told(put, say)
 
 
-def lines(interval: float) -> Display:
+def in_lines(interval: float) -> Told:
     """Print a line when the last one is `interval` seconds old."""
     last = time.monotonic()
 
@@ -87,33 +95,34 @@ def lines(interval: float) -> Display:
             print(f"{100.0 * share:.1f}%  {line}", file=sys.stderr, flush=True)
             last = now
 
-    def compiling(sentence: str) -> None:
-        print(sentence, file=sys.stderr, flush=True)
-
-    return _put_by(put, interval, compiling)
+    return Told(put, lambda sentence: print(sentence, file=sys.stderr, flush=True))
 
 
-def _put_by(put: Callable[[float, str], None], every: float, compiling: Callable[[str], None]) -> Display:
+def lines(interval: float) -> Display:
+    """The display of a run that prints a line when the last one is `interval` seconds old."""
+    return _of_run(in_lines(interval), interval)
+
+
+def _of_run(one: Told, every: float) -> Display:
     """A display of the share that is done, and of a line about the last seconds."""
     recent = _Recent()
 
     def frame(done: Any) -> None:
         line = recent.frame(done)
         if done.number > 0:  # the first frame is the start: kernels compile after it
-            put(done.time / done.until, line)
+            one.put(done.time / done.until, line)
 
     def within(moment: float, until: float) -> None:
-        put(moment / until, recent.within(moment, until))
+        one.put(moment / until, recent.within(moment, until))
 
-    return Display(frame, within, every, compiling)
+    return Display(frame, within, every, one.say)
 
 
 class _Recent:
     """The last seconds of a run."""
 
     def __init__(self) -> None:
-        self._moments: deque[tuple[float, float]] = deque()
-        self._impacts: deque[tuple[float, float]] = deque()
+        self._moments, self._impacts = Pace(_WINDOW), Pace(_WINDOW)
         self._energy = ""
 
     def frame(self, frame: Any) -> str:
@@ -121,26 +130,42 @@ class _Recent:
         self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
         if frame.number == 0:
             return ""
-        _note(self._impacts, frame.observables["impacts"])
+        self._impacts.note(frame.observables["impacts"])
         return self.within(frame.time, frame.until)
 
     def within(self, moment: float, until: float) -> str:
         """The same within a frame, with speed and energy error of the last one."""
-        elapsed, advanced = _note(self._moments, moment)
-        line = f"{moment:.4g}/{until:.4g} s"
-        if elapsed > 0.0 and advanced > 0.0:
-            left = int(elapsed * (until - moment) / advanced)
-            line += f"  ETA {left // 3600}:{left // 60 % 60:02}:{left % 60:02}"
-        if len(self._impacts) > 1:
-            (before, few), (after, many) = self._impacts[0], self._impacts[-1]
-            line += f"  {(many - few) / (after - before):.3g} impacts/s" if after > before else ""
-        return line + self._energy
+        self._moments.note(moment)
+        elapsed, impacts = self._impacts.lately()
+        speed = f"  {impacts / elapsed:.3g} impacts/s" if elapsed > 0.0 else ""
+        return f"{moment:.4g}/{until:.4g} s{self._moments.eta(until)}{speed}{self._energy}"
 
 
-def _note(values: deque[tuple[float, float]], value: float) -> tuple[float, float]:
-    """Add a value, drop those before the window: (seconds, difference) from the first to the last."""
-    now = time.perf_counter()
-    values.append((now, value))
-    while len(values) > 2 and now - values[0][0] > _WINDOW:
-        values.popleft()
-    return now - values[0][0], value - values[0][1]
+class Pace:
+    """A value that grows, in the last `window` seconds."""
+
+    def __init__(self, window: float) -> None:
+        self._window = window
+        self._values: deque[tuple[float, float]] = deque()
+
+    def note(self, value: float) -> None:
+        """Add a value, and drop those before the window."""
+        now = time.monotonic()
+        self._values.append((now, value))
+        while len(self._values) > 2 and now - self._values[0][0] > self._window:
+            self._values.popleft()
+
+    def lately(self) -> tuple[float, float]:
+        """Seconds and difference from the first value to the last."""
+        if not self._values:
+            return 0.0, 0.0
+        (began, before), (now, value) = self._values[0], self._values[-1]
+        return now - began, value - before
+
+    def eta(self, end: float) -> str:
+        """How long it takes from the last value to the end, if that is known."""
+        elapsed, advanced = self.lately()
+        if not (elapsed > 0.0 and advanced > 0.0):
+            return ""
+        left = int(elapsed * (end - self._values[-1][1]) / advanced)
+        return f"  ETA {left // 3600}:{left // 60 % 60:02}:{left % 60:02}"

@@ -22,7 +22,7 @@ from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
 from ..scene import Scene
 from ..status import Status
 from . import failures
-from .base import Arrays, BaseRun, result_of
+from .base import Arrays, BaseRun
 from .tiers import Tier
 
 # Fewer particles than this are predicted sooner than another thread is awake.
@@ -98,7 +98,7 @@ class ReactingRun(BaseRun):
         leases = 0
         while self._predict(rule, latest) and leases < self._watch.passes[0]:
             leases += 1
-            status, particle = result_of(self._pool.submit(self._tier.kernel(events.take), *taking), latest, self.halt)
+            ((status, particle),) = self._called(events.take, [taking], latest)
             if status != Status.LEASE_ENDED:
                 return status, particle
             self._fit_leases()
@@ -137,10 +137,7 @@ class ReactingRun(BaseRun):
         """Call a kernel for the particles from `first` to before `last`, a part of them in each thread."""
         threads = 1 if self._tier.is_plain else self._threads
         ends = np.linspace(first, last, threads + 1).astype(int).tolist()
-        chosen = self._tier.kernel(kernel)
-        parts = [self._pool.submit(chosen, *arguments, *part) for part in itertools.pairwise(ends)]
-        for part in parts:
-            result_of(part, latest, self.halt)
+        self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], latest)
 
     def _stalled(self, particle: int, before: float) -> str:
         place = self.state.position[:, particle]

@@ -88,8 +88,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             there is neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops.
         compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
-            and once this and earlier runs of the process have taken about a second in it, the rest is compiled, in
-            later processes from the start. "always": compiled from the start. "never": plain Python only.
+            and once this and earlier runs of the process have taken about a second in it, the rest is compiled.
+            "always": compiled from the start. "never": plain Python only.
         seed: of the random numbers of thermal walls, from 0 to 2**64 - 1: the same seed gives the same bits.
         cluster: where to run: None for this machine; "local:N", N worker processes on it; the address of a scheduler of
             Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. Needs a trajectory, and the packages of the

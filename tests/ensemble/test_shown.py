@@ -1,13 +1,16 @@
 """The progress display of a sweep."""
 
+import time
+
 from swarm.ensemble import shown
 from swarm.ensemble.pool import Progress
+from swarm.run import progress
 
 
 def test_lines_say_how_far_the_sweep_is(monkeypatch, capsys):
     now = [0.0]
-    monkeypatch.setattr(shown.time, "monotonic", lambda: now[0])
-    show = shown.lines(60.0)
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    show = shown.show_by(progress.in_lines(60.0))
     show(
         Progress(10, 0, 0, 2, 0.0, "compiling the kernel of flights and impacts (1 of 2) for this kind of scene, once")
     )
@@ -28,7 +31,7 @@ def test_nothing_is_shown_without_progress(capsys):
 
 
 def test_without_a_terminal_there_are_lines(monkeypatch, capsys):
-    monkeypatch.setattr(shown, "_A_MINUTE", 0.0)
+    monkeypatch.setattr(progress, "_A_MINUTE", 0.0)
     with shown.shown(True) as show:
         show(Progress(10, 3, 0, 2, 1.0, ""))
     assert capsys.readouterr().err == "40.0%  3/10 runs  2 running\n"

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 
 import swarm
-from swarm.output import colours, playback, recording, sheet, viewer
+from swarm.output import colours, drawing, playback, plots, recording, sheet, viewer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 METHOD = swarm.Impact()
@@ -35,6 +35,29 @@ def run(tmp_path_factory):
         trajectory=folder / "run.h5", recording=folder / "run.rrd", record_particles=100,
     )  # fmt: skip
     return folder, result
+
+
+def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
+    """The order of the curves of a plot, whatever that of the file is."""
+    scene = swarm.Scene([swarm.Sphere(0.5, restitution=0.9), *(swarm.Plane((1.0, k, 0.0), 0.4) for k in range(1, 12))])
+    scene = swarm.Scene(scene.surfaces, (0.0, 0.0, -9.81))
+    start = swarm.fill(scene, 3, speed=1.0, seed=1)
+    swarm.simulate(
+        scene, start, METHOD, until=1.0, every=0.5, trajectory=tmp_path / "run.h5", recording=tmp_path / "run.rrd"
+    )
+    drawn, draw = [], drawing.lines
+    monkeypatch.setattr(
+        drawing, "lines", lambda axes, view, log, curves: drawn.append(list(curves)) or draw(axes, view, log, curves)
+    )
+    held = playback.Playback(tmp_path / "run.rrd")
+    held.series = dict(sorted(held.series.items()))
+    sheet.draw(held, tmp_path / "sheet.png", [0.0], False)
+    in_sheet = drawn.copy()
+    drawn.clear()
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        plots.draw(trajectory, tmp_path / "plot.png")
+    assert drawn == in_sheet
+    assert drawn[0] == ["total", "kinetic", "potential", "dissipated"]
 
 
 def test_frames_come_back(run):

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import FileError, SwarmError
+from ...errors import SwarmError
 from ...output import paths
 from ...output.lock import only_writer
 from .. import machine
@@ -65,7 +65,9 @@ def advance(
     session = Session(options)
     _sessions.setdefault(token, set()).add(session)
     try:
-        _wait_for(target)
+        # The system of a worker that died may still hold it.
+        with only_writer(target, patience=_PATIENCE):
+            pass
         end = machine.carry_out(dataclasses.replace(task, options=options), session)
         shards.write_end(shards.end_of(folder, k), end)
     except KeyboardInterrupt:
@@ -90,19 +92,6 @@ def _reporting(report: Report, shards_at_once: int, compiling: Tell) -> Display:
             report(moment, until)
 
     return Display(lambda frame: within(frame.time, frame.until), within, _REPORTS, compiling)
-
-
-def _wait_for(target: Path) -> None:
-    """Wait for the lock of a trajectory: the system of a worker that died may still hold it."""
-    latest = time.monotonic() + _PATIENCE
-    while True:
-        try:
-            with only_writer(target):
-                return
-        except FileError:
-            if time.monotonic() > latest:
-                raise
-        time.sleep(_GLANCE)
 
 
 def stop(token: str) -> int:

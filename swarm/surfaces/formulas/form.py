@@ -52,18 +52,18 @@ class FormSurface(Surface):
             given[one.name] = common.pop(one.name, given.get(one.name, one.default))
         for name in common:
             raise SceneError(f"{type(self).__name__} has no argument {name!r}{checks.closest(name, given)}")
-        for name, value in given.items():
-            object.__setattr__(self, name, value)
+        checks.assign(self, **given)
         self.__post_init__()
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        box, length, curvature = _box_of(self.box), self.length, self.curvature
-        object.__setattr__(self, "box", box)
-        object.__setattr__(self, "length", None if length is None else checks.length("size", length))
-        checked = None if curvature is None else checks.at_least("curvature", curvature, 0.0)
-        object.__setattr__(self, "curvature", checked)
-        object.__setattr__(self, "_form", self._made())
+        checks.assign(
+            self,
+            box=_box_of(self.box),
+            length=None if self.length is None else checks.length("size", self.length),
+            curvature=None if self.curvature is None else checks.at_least("curvature", self.curvature, 0.0),
+        )
+        checks.assign(self, _form=self._made())
 
     def _made(self) -> "Form":
         raise NotImplementedError
@@ -74,7 +74,7 @@ class FormSurface(Surface):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        object.__setattr__(self, "_form", self._made())
+        checks.assign(self, _form=self._made())
 
     def numbers(self) -> Any:
         return self._form.numbers(self.own_center())

@@ -69,7 +69,7 @@ class Formula(FormSurface):
         return hash((*(parameters if f.name == "parameters" else getattr(self, f.name) for f in fields(self)),))
 
     def _made(self) -> Form:
-        object.__setattr__(self, "parameters", _checked(self.parameters))
+        checks.assign(self, parameters=_checked(self.parameters))
         names, values = tuple(self.parameters or ()), tuple((self.parameters or {}).values())
         code = derived(self.formula, names)
         exact = code.with_values(values)
