@@ -5,6 +5,7 @@ It makes vectors of loops, not of what is written out, and a loop over four it w
 
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -32,15 +33,16 @@ def over_block(table: Any, place: Any, x: Any, y: Any) -> Four:
     The place is a NamedTuple that begins with three indices; in plain Python these may be arrays.
     """
     i, j, k = place[0], place[1], place[2]
-    layers = (
-        _weighted(y, [[table[i + a, j + b, k + c] for c in range(4)] for b in range(4)])
-        for a in range(4)
-    )  # fmt: skip
-    return Four(*_weighted(x, list(layers)))
+    if np.ndim(i) == 0:
+        block = table[i : i + 4, j : j + 4, k : k + 4]
+    else:
+        a, b, c = np.indices((4, 4, 4)).reshape(3, 4, 4, 4, *[1] * np.ndim(i))
+        block = table[i + a, j + b, k + c]
+    return Four(*_weighted(x, _weighted(y, block.swapaxes(0, 1))))
 
 
-def _weighted(w: Any, rows: Any) -> list[Any]:
-    return [(w.a * p + w.b * q) + (w.c * s + w.d * t) for p, q, s, t in zip(*rows, strict=True)]
+def _weighted(w: Any, parts: Any) -> Any:
+    return (w.a * parts[0] + w.b * parts[1]) + (w.c * parts[2] + w.d * parts[3])
 
 
 def _type_of_sums(table, place, x, y):

@@ -5,6 +5,7 @@ A wall that is given at rest as the points xi is at time t where
 with the displacement d, and the rotation A about the centre c, both of one motion or of the sum of several.
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -65,7 +66,7 @@ class Path(Given):
             raise SceneError(f"positions must be one for each of the {len(times)} times, got {len(places)}")
         checks.assign(self, times=times, positions=places)
         with np.errstate(all="ignore"):
-            large = ~(np.abs(self.cubics()) <= checks.LARGEST).all(axis=(0, 1))
+            large = ~(np.abs(self.cubics) <= checks.LARGEST).all(axis=(0, 1))
         if large.any():
             k = int(large.argmax())
             raise SceneError(
@@ -77,6 +78,7 @@ class Path(Given):
         times, positions = (", ".join(shortened(values)) for values in (self.times, self.positions))
         return f"Path(times=({times}), positions=({positions}))"
 
+    @functools.cached_property
     def cubics(self) -> Floats:
         """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""
         t, x = np.array(self.times), np.array(self.positions).T
@@ -96,7 +98,7 @@ class Path(Given):
     def displacement(self, time: float) -> Floats:
         """The displacement (3,) at a time [s]."""
         k = min(max(int(np.searchsorted(self.times, time, "right")) - 1, 0), len(self.times) - 2)
-        s, (a, b, c, d) = time - self.times[k], self.cubics()[:, :, k]
+        s, (a, b, c, d) = time - self.times[k], self.cubics[:, :, k]
         return np.asarray(a + s * (b + s * (c + s * d)))
 
 

@@ -211,7 +211,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             jerk += amplitude * led.rate**3
             jerks += np.abs(one.amplitude) * led.rate**3
         elif isinstance(one, motions.Path):
-            cubics = one.cubics()
+            cubics = one.cubics
             track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
             # Within a piece the velocity is largest at an end or where the second derivative is 0.
             h = np.diff(one.times)

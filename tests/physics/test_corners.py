@@ -82,10 +82,10 @@ def test_a_wedge_costs_a_bounded_number_of_impacts(angle):
     part = np.linspace(0.1, 0.9, 20) * angle
     start = np.array([np.cos(part), np.sin(part), 0.0 * part])
     for velocity in (-start, np.array([[-1.0], [0.0], [0.1]]) + 0.0 * start):
-        result = checked(wedge(angle), swarm.Particles(start, velocity), 3.0)
+        result = checked(wedge(angle), swarm.Particles(start, velocity), 3.0, "always")
         assert result.observables["impacts"][-1] / 20 <= 4.0 * math.pi / angle + 1e4
     from_edge = swarm.Particles(np.zeros((3, 3)), [[-1.0, -1.0, 0.0], [0.0, -1.0, 0.0], [0.1, 0.1, 1.0]])
-    checked(wedge(angle), from_edge, 3.0)
+    checked(wedge(angle), from_edge, 3.0, "always")
 
 
 @pytest.mark.parametrize("angle", [0.3, 0.01, 1e-4, 1e-6])

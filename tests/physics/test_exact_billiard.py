@@ -73,8 +73,8 @@ def test_run_back_finds_the_start(name, crossing):
     """Elastic impacts are reversible; in these integrable shapes round-off grows slowly: 100 impacts, 1e-10."""
     scene = scene_of(name)
     start = swarm.fill(scene, 60, speed=0.5, seed=3)
-    there = run(scene, start, swarm.Impact(), 100.0 * crossing)
-    back = run(scene, reversed_motion(there.particles), swarm.Impact(), 100.0 * crossing)
+    there = run(scene, start, swarm.Impact(), 100.0 * crossing, compile="always")
+    back = run(scene, reversed_motion(there.particles), swarm.Impact(), 100.0 * crossing, compile="always")
     assert there.observables["impacts"][-1] >= 60 * 95
     assert np.abs(back.particles.position - start.position).max() <= 1e-10
     assert np.abs(back.particles.velocity + start.velocity).max() <= 1e-10
@@ -96,7 +96,7 @@ def test_impact_keeps_energy_and_walls(name, particles):
     """A reflection keeps |v|, and the step ends on the wall: thousands of impacts each, 1e-12 and 4 ulp."""
     scene = scene_of(name)
     start = swarm.fill(scene, particles, speed=0.5, seed=4)
-    result = run(scene, start, swarm.Impact(), 3000.0, 10.0, "always" if particles > 100 else "never")
+    result = run(scene, start, swarm.Impact(), 3000.0, 10.0, "always")
     assert result.observables["impacts"][-1] >= particles * 2000
     assert result.observables["energy_error"].max() <= 1e-12
     assert worst_energy(start, result.particles) <= 1e-12

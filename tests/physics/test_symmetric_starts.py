@@ -4,6 +4,7 @@ A plain event loop says when the flight first leaves the admissible side: until 
 and meets nothing, and just after it has met something.
 """
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,11 @@ STARTS = [
 TIMES = np.linspace(0.0, LONGEST, 201)[1:]
 
 
+@functools.cache
+def poses_of(motion):
+    return [pose(MOTIONS[motion], time) for time in TIMES.tolist()]
+
+
 def first_exit(scene, still, poses, fall):
     """When the flight first leaves the admissible side, by looking; infinite if not soon."""
 
@@ -67,8 +73,7 @@ def first_exit(scene, still, poses, fall):
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_a_flight_is_as_long_as_it_is(motion, surface, gravity, monkeypatch):
     scene, still = (swarm.Scene([SURFACES[surface](one)], gravity=gravity) for one in (MOTIONS[motion], None))
-    poses = [pose(MOTIONS[motion], time) for time in TIMES.tolist()]
-    pull = np.array(gravity or (0.0, 0.0, 0.0))
+    poses, pull = poses_of(motion), np.array(gravity or (0.0, 0.0, 0.0))
     for start, speed in STARTS:
         r, v = np.array(start), np.array(speed)
 

@@ -1,5 +1,6 @@
 """Walls that move: the same physics in every frame, hits that none skips, work that is booked, contacts that last."""
 
+import functools
 import math
 import re
 
@@ -142,6 +143,16 @@ def first_hit_by_scan(scene, rest, r, v, pull, start, times, poses):
     return brentq(lambda t: scene.gaps(place(t), start + t).max(), low, high, xtol=1e-15, rtol=9e-16)
 
 
+def moments(span):
+    return np.linspace(0.0, span, 500)
+
+
+@functools.cache
+def poses_of(motion, start, span):
+    """The poses of a motion at the moments after a start."""
+    return [pose(MOTIONS[motion], start + t) for t in moments(span).tolist()]
+
+
 @pytest.mark.parametrize("pull", [(0.0, 0.0, 0.0), (0.3, 0.0, -2.0)], ids=["straight", "falling"])
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", [*CAVITIES, *SOLIDS])
@@ -149,15 +160,14 @@ def test_the_first_hit_is_found(name, motion, pull):
     made, still = ((CAVITIES | SOLIDS)[name](one) for one in (MOTIONS[motion], None))
     scene, rest = swarm.Scene([made]), swarm.Scene([still])
     rng, found, start, span = np.random.default_rng(5), 0, 0.6, 2.5
-    walls, times = scene.walls(start + span), np.linspace(0.0, span, 500)
-    poses = [pose(MOTIONS[motion], start + t) for t in times.tolist()]
+    walls, times = scene.walls(start + span), moments(span)
+    poses, gravity = poses_of(motion, start, span), swarm.Scene([made], pull).pull()
     for _ in range(60):
         r, v = rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
         if name in SOLIDS:
             v = 0.2 * v - rng.uniform(0.5, 2.0) * r
         if not (scene.gaps(r[:, None], start) < -1e-3).all():
             continue
-        gravity = swarm.Scene([made], pull).pull()
         with np.errstate(all="ignore"):
             hit = safe.first_hit(walls, gravity, vec(r), vec(v), span)
         wanted = first_hit_by_scan(scene, rest, r, v, pull, start, times, poses)
