@@ -8,7 +8,7 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm
 from .reflection import from_relative, given, relative, wall_velocity
 
-# A law may leave a particle on its wall, by so much of its speed.
+# Speed into the wall that is none, as a part of the speeds before and after.
 _ROUND_OFF = 1e-15
 
 
@@ -47,7 +47,7 @@ def exchange(laws, walls, wall, arriving, mass, random):
         if acts:
             own = relative(moving, one.leave(v, -1.0 * n, ZERO if moving is None else moving, random, mass))
             # What is no velocity, or one into the wall, ends the run when lanes are looked at (lanes/block.py).
-            into = _ROUND_OFF * norm(own)
+            into = _ROUND_OFF * (norm(v) + norm(own))
             after = select(dot(own, n) <= into, own, Vec(math.nan, math.nan, math.nan))
         happens = happens | acts
     work = given(moving, after - before)
