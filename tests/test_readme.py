@@ -13,7 +13,6 @@ import pytest
 from test_cli import command
 
 from swarm import scene_file
-from swarm.run import tiers
 from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
@@ -87,11 +86,11 @@ def test_ci_runs_the_readme_test_command():
 
 
 def copy_examples(folder):
-    """The scenes and sweeps of the examples with few particles, which compile less: how they are run is tested here."""
+    """The scenes and sweeps of the examples with two particles, in plain Python: how they are run is tested here."""
     for name in ("scenes", "sweeps"):
         shutil.copytree(ROOT / "examples" / name, folder / "examples" / name)
         for path in (folder / "examples" / name).glob("*.toml"):
-            path.write_text(re.sub(r"^count = [\d_]+", "count = 5", path.read_text(), flags=re.MULTILINE))
+            path.write_text(re.sub(r"^count = [\d_]+", "count = 2", path.read_text(), flags=re.MULTILINE))
 
 
 @pytest.mark.physics
@@ -143,9 +142,7 @@ def settings():
 
 
 @pytest.mark.physics
-def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
-    # As users have it: scenes of 2000 particles and more, all of which are compiled in the end.
-    monkeypatch.setattr(tiers, "_PATIENCE", 1.0)
+def test_the_commands_run_in_their_order(tmp_path):
     copy_examples(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')
