@@ -38,9 +38,9 @@ class MirrorNumbers(contract.MethodNumbers):
         return self
 
     def land(self, walls, gravity, lane, hit):
-        t = select(hit.time < lane.left, hit.time, lane.left)
+        t = select(hit.time < lane.remaining, hit.time, lane.remaining)
         r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
-        return contract.Flight(r, v, lane.left - t, select(hit.time <= lane.left, hit.wall, -1.0))
+        return contract.Flight(r, v, lane.remaining - t, select(hit.time <= lane.remaining, hit.wall, -1.0))
 
     def contact(self, walls, gravity, lane, wall, solution):
         n = walls.unit_normal(wall, lane.r)
@@ -48,7 +48,7 @@ class MirrorNumbers(contract.MethodNumbers):
         # v1 = v0 - 2 (v0.n) n where v0.n > 0
         impulse = select((wall >= 0.0) & (b > 0.0), 2.0 * b, 0.0)
         hits = select(wall >= 0.0, 1.0, 0.0)
-        return contract.Contact(lane.r, lane.v - impulse * n, lane.left, wall, impulse, hits, 0.0, False)
+        return contract.Contact(lane.r, lane.v - impulse * n, lane.remaining, wall, impulse, hits, 0.0, False)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import gc
 import os
 import resource
 import signal
@@ -55,6 +56,11 @@ def pytest_ignore_collect(collection_path, config):
     """Files of the long ring take seconds to import: not where `-m` is as in pyproject.toml and no file is named."""
     is_long = collection_path.name == "long" and config.option.markexpr == "not long"
     return True if is_long and not any("long" in argument for argument in config.args) else None
+
+
+def pytest_collection_finish():
+    """What is collected and imported stays to the end: no garbage collection looks at it again."""
+    gc.freeze()
 
 
 def rarely(*values):

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from children import python
 
 from bench import compare, compiling, report
 from swarm.kernel import cache
@@ -21,9 +22,7 @@ pytestmark = pytest.mark.physics
 def printed(name):
     """What `python -m bench NAME --quick` prints."""
     root = Path(__file__).parents[1]
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", name, "--quick"], cwd=root, capture_output=True, text=True, timeout=3600
-    )
+    done = python("-m", "bench", name, "--quick", cwd=root, timeout=3600)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -5,7 +5,6 @@ import io
 import json
 import os
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from unittest import mock
 
 import numba
 import pytest
+from children import python
 from test_scene_file import GOOD
 
 import swarm
@@ -27,9 +27,7 @@ pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 def process(*args, cwd, **more):
     """A command in a process of its own."""
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm", *args], cwd=cwd, capture_output=True, text=True, timeout=600, **more
-    )
+    done = python("-m", "swarm", *args, cwd=cwd, **more)
     # Whether it compiles depends on what ran before.
     lines = done.stderr.splitlines(keepends=True)
     done.stderr = "".join(line for line in lines if not line.startswith("compiling"))
@@ -220,8 +218,7 @@ def test_json_is_printed_at_every_end(folder):
     done = command("run", "other.toml", "--json", cwd=folder)
     assert (done.returncode, json.loads(done.stdout)["status"]) == (2, "failed")
     # A limit of the size of files stands in for a full disk.
-    full = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
-    code, failed = told("-o", "failed.h5", preexec_fn=full)
+    code, failed = told("-o", "failed.h5", file_size=20_000)
     assert (code, failed["status"]) == (1, "failed")
     assert failed["error"].startswith("cannot write frame 0 to failed.h5: ")
 
@@ -305,9 +302,7 @@ from swarm.commands import run
 run._stopped = lambda *about: signal.raise_signal(signal.SIGINT)
 from swarm.__main__""",
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600
-    )
+    done = python("-c", code, "run", "scene.toml", cwd=folder)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("compiling")]
     assert (done.returncode, lines) == (130, ["interrupted"])
 
@@ -317,10 +312,7 @@ def test_what_compiles_is_said(folder):
     """A short run compiles nothing; of those that compile the first says so, and the second finds its kernels."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
     for words, expected in (([], False), (["--compile", "always"], True), (["--compile", "always"], False)):
-        done = subprocess.run(
-            [sys.executable, "-m", "swarm", "run", "scene.toml", "--overwrite", *words],
-            cwd=folder, capture_output=True, text=True, timeout=600, env=environment,
-        )  # fmt: skip
+        done = python("-m", "swarm", "run", "scene.toml", "--overwrite", *words, cwd=folder, env=environment)
         assert done.returncode == 0
         assert (
             "compiling the kernel of flights and impacts (1 of 2) for this kind of scene, once" in done.stderr
@@ -437,14 +429,10 @@ def test_a_full_disk_is_exit_code_1_and_the_run_goes_on_later(folder):
     text = GOOD.replace("count = 10", "count = 200").replace("until = 1.0", "until = 250.0\ncheckpoint = 3600.0")
     (folder / "scene.toml").write_text(text)
     # The kernels are not to be what is too large.
-    whole = command("run", "scene.toml", "-o", "whole.h5", "--quiet", cwd=folder)
+    whole = command("run", "scene.toml", "-o", "whole.h5", "--quiet", "--compile", "always", cwd=folder)
     assert (whole.returncode, whole.stderr) == (0, "")
     # The frames that are written at once, up to a hundred, fit; all do not.
-    limit = 2_000_000
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm", "run", "scene.toml"], cwd=folder, capture_output=True, text=True, timeout=600,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
-    )  # fmt: skip
+    done = python("-m", "swarm", "run", "scene.toml", cwd=folder, file_size=2_000_000)
     assert done.returncode == 1
     assert done.stderr.startswith("error: cannot write frame ")
     assert len(done.stderr.splitlines()) == 1

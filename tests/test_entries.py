@@ -1,13 +1,12 @@
 """Compiled kernels on disk: what is found again of classes that a script, a cell or a module of the user's defines."""
 
 import os
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
 import numba
 import pytest
+from children import python
 
 import swarm
 from swarm.kernel import cache, jit
@@ -194,7 +193,7 @@ def test_a_script_that_is_started_again_compiles_nothing(tmp_path):
 
     def run(start, surfaces):
         file.write_text(f"{start}\nsurfaces = {surfaces}\n{SCRIPT}")
-        done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True, check=False)
+        done = python(file, env=environment)
         assert done.returncode == 0, done.stderr[-3000:]
         return done.stdout.strip()
 

@@ -3,12 +3,12 @@
 import ast
 import importlib.util
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numba
 import pytest
+from children import python
 from conftest import METHODS, SURFACES, every_surface
 
 import swarm
@@ -53,7 +53,7 @@ for case, pull in {gravity!r}.items():
 def in_plain_python(*arguments):
     """What Python prints without the compiler: each method would compile kernels of its own."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=False)
+    done = python(*arguments, env=environment)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 
@@ -114,8 +114,7 @@ def test_a_kernel_of_an_edited_surface_is_never_an_old_one(tmp_path):
 
     def run(old="", new=""):
         (tmp_path / "own_surface.py").write_text(text.replace(old, new))
-        command = [sys.executable, str(tmp_path / "main.py")]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        done = python(tmp_path / "main.py", env=environment)
         assert done.returncode == 0, done.stderr[-3000:]
         time, hits = done.stdout.split()
         return pytest.approx(float(time), rel=1e-12), int(hits)
@@ -135,7 +134,7 @@ def test_the_second_start_compiles_nothing(file, tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     written = []
     for _ in range(2):
-        done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True, check=False)
+        done = python(file, env=environment)
         assert done.returncode == 0, done.stderr[-3000:]
         written.append({path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")})
     assert written[0] == written[1]

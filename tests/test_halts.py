@@ -4,12 +4,11 @@ Runs without end are made by force: in plain Python steps of kernels are replace
 compiled ones a kernel is. So they stay without end when scenes that were are mended.
 """
 
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
+from children import python
 
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
@@ -163,9 +162,7 @@ report(scene, start, swarm.Impact(), until=1.0, every=every, compile=tier)
 
 def assert_all_end(script):
     """Nothing but the test itself ends what does not end."""
-    done = subprocess.run(
-        [sys.executable, "-c", ENDS + script], capture_output=True, text=True, timeout=300, check=False
-    )
+    done = python("-c", ENDS + script, timeout=300)
     assert done.stdout == ALL_END, done.stderr
 
 

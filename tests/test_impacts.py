@@ -1,12 +1,12 @@
 """The log of impacts: a row for every one that is counted, the same for any threads, after a halt and a kill."""
 
-import subprocess
 import sys
 import textwrap
 
 import h5py
 import numpy as np
 import pytest
+from children import python
 from conftest import files_limited_to
 from test_sessions import halted_after, stopped_at
 from typer.testing import CliRunner
@@ -325,7 +325,7 @@ def test_kill_9_loses_nothing_that_was_reported(tmp_path):
     """At random moments, until a run is through: every row once, and with every frame that is reported its impacts."""
     path, log = tmp_path / "run.h5", tmp_path / "i.h5"
     code = textwrap.dedent(KILLED).format(path=str(path), log=str(log))
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
+    told = python("-c", code)
     assert (told.returncode, told.stderr) == (0, "")
     assert int(told.stdout.split()[1]) >= 5
     start = swarm.fill(SPHERE, 50, speed=1.0, seed=1)

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 import pytest
+from children import python
 from conftest import LAWS, METHODS, call, compiled, every_surface, numbers_of, rarely, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
@@ -285,7 +286,7 @@ swarm.simulate(scene, swarm.fill(scene, 9, speed=1.0, seed=1), swarm.Impact(), u
 assert not re.search(r"call[^\\n]*NRT_", kernel)
 assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 """
-    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+    python("-c", code, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}).check_returncode()
 
 
 @_jit.outlined
@@ -426,7 +427,7 @@ assert sys.getrecursionlimit() == 1000
 )
 def test_a_script_runs_in_the_most_walls(laws, gravity, tmp_path):
     code = MANY_PLANES.format(tests=str(Path(__file__).parent), laws=laws, gravity=gravity)
-    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+    python("-c", code, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}).check_returncode()
 
 
 # --- The cache -------------------------------------------------------------------------------------------
@@ -563,10 +564,8 @@ def test_an_edit_of_comments_compiles_nothing_and_one_of_code_does(copied):
     source = file.read_text()
     for text in (source, "# edited\n\n" + source, source.replace("0.5 * square(v)", "1.5 * square(v)")):
         file.write_text(text)
-        done = subprocess.run(
-            [sys.executable, "-c", EDITED.format(root=str(package.parent))],
-            env={**os.environ, "PYTHONPATH": ""}, capture_output=True, text=True, check=True, cwd=package.parent,
-        )  # fmt: skip
+        done = python("-c", EDITED.format(root=str(package.parent)), env={**os.environ, "PYTHONPATH": ""})
+        assert done.returncode == 0, done.stderr
         told.append((float(done.stdout), done.stderr.count("once: observe")))
     assert told == [(0.5, 1), (0.5, 0), (1.5, 1)]
 

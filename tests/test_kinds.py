@@ -49,8 +49,8 @@ def large(n, y):
     return [swarm.Sphere(0.15, (x, y, 0.1 * y), "outside") for x in np.linspace(-0.8, 0.8, n)]
 
 
-def phial(a):
-    return swarm.Formula("x**2/a + y**2/0.09 + z**4/0.13 - 1", parameters={"a": a})
+def phial(a, b="0.09"):
+    return swarm.Formula(f"x**2/a + y**2/{b} + z**4/0.13 - 1", parameters={"a": a})
 
 
 def sampled(dtype=np.float64, order="C"):
@@ -83,7 +83,8 @@ def start_of(made):
 DUMBBELL = swarm.dumbbell(0.2, 1.0)
 ROD = {"method": swarm.Impact(dt=1e-2), "body": DUMBBELL}
 STEP = {"dt": 1e-2, "penalty": 1e3}
-# What a user calls the same but for numbers, as arguments of `kinds`: (surfaces, others) twice.
+# What a user calls the same but for numbers, as arguments of `kinds`: (surfaces, others) twice. A formula takes a third
+# of a second to make, so those that have one are made by their tests.
 SAME = {
     "order": ([VESSEL, plane(), ball(), egg()], [egg(), ball(), plane(), VESSEL]),
     "order of fields": (
@@ -171,7 +172,7 @@ SAME = {
     ),
     "bodies among few and many": ([VESSEL, balls(7)], [VESSEL, balls(100)], ROD),
     "length of a list": ([VESSEL, *listed(7)], [VESSEL, *listed(20)]),
-    "parameters of a formula": ([phial(0.1)], [phial(1)]),
+    "parameters of a formula": (lambda: [phial(0.1)], lambda: [phial(1)]),
     "samples": ([sampled()], [sampled(np.float32, "F")]),
     "threads": ([VESSEL], [VESSEL], {"threads": 1}, {"threads": 2}),
     "particles": ([VESSEL], [VESSEL], {"n": 1}, {"n": 3000}),
@@ -184,7 +185,9 @@ SAME = {
     "types of arrays": (
         [VESSEL], [VESSEL], {"start": start_of(np.float32)}, {"start": start_of(lambda a: (9.0 * a).astype(">i4"))}
     ),
-    "another process": ([VESSEL, balls(60), plane(), phial(1.0)], moved([VESSEL, balls(60), plane(), phial(1.0)])),
+    "another process": (
+        lambda: [VESSEL, balls(60), plane(), phial(1.0)], lambda: moved([VESSEL, balls(60), plane(), phial(1.0)])
+    ),
     "samples in another process": ([sampled()], moved([sampled()])),
 }  # fmt: skip
 # Kinds of their own, some of which are the same to a user: with vectors for all slabs, or a grid of few
@@ -215,7 +218,7 @@ OWN = {
         [VESSEL, swarm.Ellipsoids(PLACES[:24], (0.05, 0.04, 0.03))],
         [VESSEL, swarm.Ellipsoids(PLACES[:25], (0.05, 0.04, 0.03))],
     ),
-    "text of a formula": ([phial(1.0)], [swarm.Formula("x**2/a + y**2/0.08 + z**4/0.13 - 1", parameters={"a": 1.0})]),
+    "text of a formula": (lambda: [phial(1.0)], lambda: [phial(1.0, "0.08")]),
     "method": ([VESSEL], [VESSEL], {}, {"method": swarm.Penalty(**STEP)}),
     "exponent": (
         [VESSEL], [VESSEL], {"method": swarm.Penalty(**STEP)}, {"method": swarm.Penalty(**STEP, exponent=1.5)}
@@ -224,6 +227,7 @@ OWN = {
 
 
 def of_pair(first, second, more=None, others=None):
+    first, second = (made() if callable(made) else made for made in (first, second))
     more = more or {}
     return kinds(first, **more), kinds(second, **(more if others is None else others))
 

@@ -136,10 +136,10 @@ def test_what_several_walls_hold_leaves_where_one_of_them_is_open():
         held._moment = 3.0
         share = held._shared(1.0, held._drawing())
         share.phase[:] = CAREFUL
-        held.state.contacts.left[:], held.state.contacts.met[:] = 0.75, 0.0
+        held.state.contacts.remaining[:], held.state.contacts.met[:] = 0.75, 0.0
         with np.errstate(all="ignore"):
             for p in (0, 1):
-                contact_events._step(held._numbers, held._chain, held._gravity, share, p)
+                contact_events._step(held._numbers, held._walls, held._gravity, share, p)
         assert held.state.escape_time[0] == 2.25
         assert np.isnan(held.state.escape_time[1])
         assert share.phase[0] == ARRIVED

@@ -1,6 +1,5 @@
 """What only some systems have is hidden, and what only some refuse is refused: runs, recordings, kills and resumes."""
 
-import subprocess
 import sys
 import textwrap
 import tomllib
@@ -9,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from children import python
 
 import swarm
 
@@ -16,8 +16,10 @@ pytestmark = pytest.mark.physics  # processes are too slow for the unit ring
 
 # As on Windows: no fcntl, no pread and pwrite, no affinity; a trajectory that is open is neither renamed nor removed.
 OTHER = """
-    import os, signal, sys
+    import os, signal, sys, warnings
     sys.modules["fcntl"] = None
+    assert "filelock" not in sys.modules
+    warnings.filterwarnings("ignore", "only soft file lock")  # filelock says that it has the locks of no system
     for name in ("pread", "pwrite", "preadv", "pwritev", "sched_getaffinity", "sched_setaffinity", "fork"):
         delattr(os, name)
     os.O_BINARY = 0
@@ -54,25 +56,20 @@ OTHER = """
 
 def elsewhere(folder, code):
     program = textwrap.dedent(OTHER) + textwrap.dedent(code)
-    # Where fcntl is hidden, filelock has the locks of no system, and says so.
-    quiet = ["-W", "ignore:only soft file lock"]
-    return subprocess.run(
-        [sys.executable, *quiet, "-c", program], cwd=folder, capture_output=True, text=True, timeout=600
-    )
+    return python("-c", program, cwd=folder)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="what is open is looked up in /proc")
 def test_a_run_is_recorded_killed_and_resumed(tmp_path):
-    whole = elsewhere(tmp_path, "run('whole.h5', recording='whole.rrd')\nprint(swarm.load('whole.h5').times[-1])")
-    assert (whole.returncode, whole.stdout, whole.stderr) == (0, "4.0\n", "")
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["whole.h5", "whole.rrd"]
     stopped = elsewhere(tmp_path, "run('run.h5', 2, signal.SIGTERM)")
     assert "KeyboardInterrupt" in stopped.stderr
     assert (tmp_path / "run.h5.checkpoint").exists()
     killed = elsewhere(tmp_path, "run('run.h5', 5, signal.SIGKILL, resume=True)")
     assert (killed.returncode, killed.stderr) == (-9, "")
-    resumed = elsewhere(tmp_path, "run('run.h5', resume=True)")
-    assert (resumed.returncode, resumed.stderr) == (0, "")
+    whole = "run('whole.h5', recording='whole.rrd')\nprint(swarm.load('whole.h5').times[-1])"
+    resumed = elsewhere(tmp_path, f"run('run.h5', resume=True)\n{whole}")
+    assert (resumed.returncode, resumed.stdout, resumed.stderr) == (0, "4.0\n", "")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["run.h5", "whole.h5", "whole.rrd"]
     with swarm.load(tmp_path / "run.h5") as one, swarm.load(tmp_path / "whole.h5") as other:
         assert one.times.tolist() == other.times.tolist() == [0.5 * k for k in range(9)]
         assert np.array_equal(one.frame(-1).position, other.frame(-1).position)

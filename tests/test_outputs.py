@@ -3,11 +3,11 @@
 import argparse
 import importlib
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from children import python
 
 from bench import report
 from examples import asked
@@ -64,9 +64,7 @@ for name in names:
 def test_by_default_they_write_there():
     """In a process of its own: `main` is not run, its parser is asked."""
     names = [*DRAWN, "examples.paper.__main__", "bench.reference"]
-    done = subprocess.run(
-        [sys.executable, "-c", PARSERS, *names], capture_output=True, text=True, cwd=ROOT, check=False
-    )
+    done = python("-c", PARSERS, *names, cwd=ROOT)
     assert done.returncode == 0, done.stderr[-2000:]
     assert [Path(line).parts[0] for line in done.stdout.split()] == [str(asked.OUT)] * len(names)
 
@@ -85,8 +83,7 @@ def test_benchmarks_write_there(tmp_path, monkeypatch):
 def test_they_leave_nothing_beside_it(name, tmp_path):
     before = files(ROOT / "examples"), files(ROOT / "bench")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", name, *SHORT[name]]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    done = python("-m", name, *SHORT[name], cwd=tmp_path, env=environment)
     assert done.returncode == 0, done.stderr[-3000:]
     assert sorted(files(tmp_path)) == [f"{asked.OUT}/{name.split('.')[1]}.png"]
     assert (files(ROOT / "examples"), files(ROOT / "bench")) == before

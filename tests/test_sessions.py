@@ -3,14 +3,13 @@
 import itertools
 import json
 import signal
-import subprocess
-import sys
 import textwrap
 import time
 
 import h5py
 import numpy as np
 import pytest
+from children import python
 from conftest import METHODS, rarely
 
 import swarm
@@ -537,7 +536,7 @@ def test_kill_9_at_random_moments(tmp_path):
     """Each child is killed for good and the next goes on from its checkpoint, until one is through."""
     path = tmp_path / "run.h5"
     code = textwrap.dedent(KILLED).format(path=str(path), farthest=FARTHEST)
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
+    told = python("-c", code)
     assert (told.returncode, told.stderr) == (0, "")
     *pairs, last = told.stdout.splitlines()
     print(last, *pairs, sep="; ")

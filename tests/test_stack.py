@@ -1,10 +1,9 @@
 """Threads of large kernels: their stack holds the scratch arrays, where one of the usual size would end the process."""
 
-import subprocess
-import sys
 import threading
 
 import numpy as np
+from children import python
 
 from swarm.run.bodies import threads_with
 
@@ -32,7 +31,7 @@ with threads_with(2, 8 * size) as pool:
 
 
 def test_scratch_arrays_of_128_megabytes_fit():
-    done = subprocess.run([sys.executable, "-c", LARGE], capture_output=True, text=True, timeout=300, check=False)
+    done = python("-c", LARGE, timeout=300)
     assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
 
 

@@ -52,9 +52,9 @@ def test_they_are_the_rows_of_the_log(tmp_path, name):
 
 def test_they_are_the_same_alone_and_of_any_threads_and_blocks():
     scene = MANY["restless"]
-    one = run(scene, 1100, 0.2)
+    one = run(scene, 600, 0.2)
     for threads, size in ((2, 512), (3, 1)):
-        require_same(run(scene, 1100, 0.2, threads=threads, block_size=size), one)
+        require_same(run(scene, 600, 0.2, threads=threads, block_size=size), one)
     assert (one.member_impacts[1] > 0).sum() > 6
     assert sum(counts.sum() for counts in one.member_impacts) == one.observables["impacts"][-1]
 

@@ -1,13 +1,12 @@
 """Two tiers with the same bits: which of them a run is in, and where it may change from one to the other."""
 
 import os
-import subprocess
-import sys
 from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
+from children import python
 from conftest import METHODS, SPENT, SURFACES, every_surface
 
 import swarm
@@ -161,10 +160,8 @@ def test_kernels_of_another_process_are_found(tmp_path):
     """By what Numba does not document: this fails when it changes."""
     told = {}
     for k, compile in enumerate(("auto", "always", "auto")):
-        done = subprocess.run(
-            [sys.executable, "-c", FOUND.format(compile=compile)],
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True,
-        )  # fmt: skip
+        done = python("-c", FOUND.format(compile=compile), env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+        assert done.returncode == 0, done.stderr
         told[k] = done.stdout.strip(), "compiling the kernel of flights and impacts (1 of 2)" in done.stderr
     assert told == {0: ("[False, False]", False), 1: ("[False, False, True, False]", True), 2: ("[True, True]", False)}
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import psutil
 import pytest
+from test_cli import command
 
 import swarm
 from swarm.run import machine
@@ -195,7 +196,7 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     address = client.scheduler.address
     scene, output = tmp_path / "scene.toml", tmp_path / "run.h5"
     scene.write_text(SCENE.replace("UNTIL", "8.0"))
-    command = [sys.executable, "-m", "swarm", "run", str(scene), "-o", str(output), "--cluster", address]
+    words = ["run", str(scene), "-o", str(output), "--cluster", address]
     reached = threading.Event()
 
     async def reach(event):
@@ -204,7 +205,7 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     client.subscribe_topic("held", reach)
     # A shell that starts the tests in the background has told them to ignore this signal, and they who they start.
     process = subprocess.Popen(
-        [*command, "--shards", "3"], stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "swarm", *words, "--shards", "3"], stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     while not reached.wait(1.0):
@@ -214,14 +215,14 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     assert process.returncode == 130, said
     assert "--resume" in said
     held()
-    again = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
+    again = command(*words, "--resume", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     with swarm.load(output) as joined, swarm.load(alone[1]) as single:
         for name, values in single.observables.items():
             assert values.tobytes() == joined.observables[name].tobytes(), name
         assert joined.frame(-1).position.tobytes() == single.frame(-1).position.tobytes()
     assert len(list((tmp_path / "run.shards").iterdir())) == 3
-    complete = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=100, check=False)
+    complete = command(*words, "--resume", cwd=tmp_path)
     assert (complete.returncode, "is complete" in complete.stderr) == (0, True), complete.stderr
 
 

@@ -1,23 +1,16 @@
 """examples/cluster: what can be run without SLURM and without a cloud."""
 
 import importlib.util
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from children import python
 
 ROOT = Path(__file__).parents[2]
 
 
 def printed(name, *words):
-    done = subprocess.run(
-        [sys.executable, "-m", f"examples.cluster.{name}", *words],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
+    done = python("-m", f"examples.cluster.{name}", *words, cwd=ROOT, timeout=100)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

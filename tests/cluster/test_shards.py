@@ -1,11 +1,10 @@
 """Shards against the single run, bit for bit. They run here, one after the other, as they would on workers."""
 
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from children import python
 
 import swarm
 from swarm.output import paths
@@ -222,7 +221,7 @@ def test_a_kill_in_the_middle_of_a_join_leaves_no_half_of_a_trajectory(tmp_path)
     path = tmp_path / "run.h5"
 
     def session(*how):
-        done = subprocess.run([sys.executable, "-c", KILLED, str(path), *how], capture_output=True, text=True)
+        done = python("-c", KILLED, path, *how)
         return done.returncode, done.stderr
 
     assert session("begin", "7") == (-signal.SIGKILL, "")

@@ -142,7 +142,7 @@ def test_the_wall_time_ends_a_sweep(tmp_path, monkeypatch):
     monkeypatch.setattr(sweeping, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
     path.write_text(path.read_text().replace("every = 0.5\n", ""))
-    outcome = carry_out(path, SweepOptions(tmp_path / "out", walltime=3600.0))
+    outcome = carry_out(path, SweepOptions(tmp_path / "out", 1, walltime=3600.0))
     assert outcome.stopped == "walltime"
     assert [row["state"] for row in outcome.results.rows()] == ["waiting", "waiting"]
     assert (tmp_path / "out" / "results.csv").exists()

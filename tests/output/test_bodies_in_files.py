@@ -2,12 +2,11 @@
 
 import importlib.util
 import itertools
-import subprocess
-import sys
 
 import h5py
 import numpy as np
 import pytest
+from children import python
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 import swarm
@@ -117,8 +116,7 @@ def test_mdanalysis_takes_the_bonds(tmp_path):
         pytest.skip("MDAnalysis is not installed")
     start = swarm.place(BOX, BODIES["chain"], 5, speed=0.3, spin=2.0, seed=3)
     write(tmp_path / "run.h5", [start, moved(start, 1.0)])
-    command = [sys.executable, "-c", MDANALYSIS, str(tmp_path / "run.h5")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = python("-c", MDANALYSIS, tmp_path / "run.h5")
     assert done.returncode == 0, done.stderr
     pieces, *lengths = done.stdout.split()
     assert int(pieces) == 5

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import rerun as rr
+from children import python
 
 import swarm
 from swarm.output import colours, drawing, playback, plots, recording, sheet, viewer
@@ -270,7 +271,7 @@ def test_a_full_disk_ends_the_run(tmp_path):
         "except swarm.FileError as error:\n"
         "    print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    done = python("-c", code, cwd=tmp_path)
     assert "recording run.rrd" in done.stdout, done.stderr
 
 

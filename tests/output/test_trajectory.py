@@ -8,6 +8,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from children import python
 
 import swarm
 
@@ -221,8 +222,7 @@ def test_other_programs_read_it_while_the_run_goes_on(tmp_path):
     def look(frame):
         if frame.number == 3:
             wait_for(path, 4)
-            command = [sys.executable, "-c", OTHERS, str(path), *with_mdanalysis]
-            told.append(subprocess.run(command, capture_output=True, text=True))
+            told.append(python("-c", OTHERS, path, *with_mdanalysis))
 
     particles = swarm.fill(SCENE, 30, speed=0.3)
     swarm.simulate(SCENE, particles, METHOD, until=0.05, every=0.01, trajectory=path, progress=look)

@@ -2,10 +2,9 @@
 
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
+from children import python
 
 import swarm
 from swarm.output import plots, recording
@@ -73,7 +72,7 @@ with swarm.load(sys.argv[1]) as trajectory:
 def test_a_kill_in_the_middle_of_an_export_leaves_the_old_file_and_the_next_one_tidies(run, tmp_path, kind):
     path = tmp_path / f"run.{kind}"
     path.write_text("older")
-    done = subprocess.run([sys.executable, "-c", KILLED, str(run.path), str(path)], check=False)
+    done = python("-c", KILLED, run.path, path)
     assert done.returncode == -signal.SIGKILL
     assert path.read_text() == "older"
     run.export(path, surfaces=False, overwrite=True)
