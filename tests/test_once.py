@@ -102,7 +102,7 @@ def test_of_processes_that_start_together_one_compiles(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     import twice as module
 
-    kernel = cache.kept(module.twice, {})
+    kernel = cache.cached(module.twice, {})
     assert cache.is_compiled(kernel, (3,))
     assert cache.is_compiled(kernel, (1.5,))
     assert not cache.is_compiled(kernel, (1j,))
@@ -114,17 +114,17 @@ def test_of_processes_that_start_together_one_compiles(tmp_path, monkeypatch):
 def test_an_entry_without_its_file_is_not_compiled(tmp_path, monkeypatch):
     """A kill may come between the two."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.kept(twice, {})
+    kernel = cache.cached(twice, {})
     assert kernel(3) == 6
     for path in tmp_path.rglob("*.nbc"):
         path.unlink()
-    assert not cache.is_compiled(cache.kept(twice, {}), (3,))
+    assert not cache.is_compiled(cache.cached(twice, {}), (3,))
 
 
 @compiled_only
 def test_a_compilation_that_fails_gives_its_lock_back(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.kept(wrong, {})
+    kernel = cache.cached(wrong, {})
     for _ in range(2):
         with pytest.raises(TypingError):
             kernel(3)
@@ -135,7 +135,7 @@ def test_a_compilation_that_fails_gives_its_lock_back(tmp_path, monkeypatch):
 @pytest.mark.parametrize("failing", ["save_overload", "lock"])
 def test_a_disk_that_takes_nothing_costs_time_alone(tmp_path, monkeypatch, failing):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.kept(twice, {})
+    kernel = cache.cached(twice, {})
 
     def full(*_args):
         raise OSError(28, "No space left on device")

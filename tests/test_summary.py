@@ -88,9 +88,9 @@ def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
         observed(path, **values)
         with swarm.load(path) as trajectory:
             recording.record(trajectory, recorded, recording.Settings(), overwrite=True)
-            plots.draw(trajectory, path.with_suffix(".png"))
+            plots.draw_plot(trajectory, path.with_suffix(".png"))
         by_plot, _ = dict(drawn), drawn.clear()
-        sheet.draw(playback.Playback(recorded), path.with_suffix(".png"), None, False)
+        sheet.draw_sheet(playback.Playback(recorded), path.with_suffix(".png"), None, False)
         for found in (by_plot, dict(drawn)):
             assert ("sliding" in found) == bool(values)
             assert list(found["heat"]) == ["0_sphere"]

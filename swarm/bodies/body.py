@@ -125,7 +125,7 @@ class Body:
         cavities: Iterable[tuple[Surface, int, int]] = (),
         faces: Iterable[Sequence[int]] = (),
     ) -> None:
-        places = checked.points("points", points)
+        places = checked.places("points", points)
         count = len(places)
         led = holding.anchors(anchors, count)
         touching = checked.contacts(contacts, count, led)

@@ -22,7 +22,7 @@ _ROUND_OFF = 1e-12
 _ANY_POINT = 1 << 31
 
 
-def points(name: str, value: ArrayLike) -> Floats:
+def places(name: str, value: ArrayLike) -> Floats:
     """`value` as (P, 3) places."""
     rows = checks.array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):

@@ -106,7 +106,7 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
     """Nodes, elements and the volumes of these."""
     if not isinstance(mesh, (tuple, list)) or len(mesh) != 2:
         raise SceneError(f"mesh must be two arrays (nodes, elements), got {type(mesh).__name__}")
-    nodes = checked.points("nodes", mesh[0])
+    nodes = checked.places("nodes", mesh[0])
     elements = checked.numbers("elements", mesh[1], 4, len(nodes))  # type: ignore[arg-type]
     if not len(elements):
         raise SceneError("elements must hold at least one tetrahedron, got none")

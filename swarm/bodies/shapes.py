@@ -116,7 +116,7 @@ def rigid(
     >>> float(cube.mass_matrix.sum().round(12))  # kg
     6.0
     """
-    corners = checked.points("vertices", vertices)
+    corners = checked.places("vertices", vertices)
     room.require(4, contacts=len(corners))
     density = checks.positive("density", density)
     triangles = _hull(corners) if faces is None else _closed(corners, faces)
@@ -139,7 +139,7 @@ def _between(corners: Floats, triangles: Pairs, contacts: ArrayLike | None) -> F
         return np.zeros((0, 3))
     if checks.array("contacts", contacts).ndim == 0:
         return covering.points(corners, triangles, checks.length("contacts", contacts))
-    return checked.points("contacts", contacts)
+    return checked.places("contacts", contacts)
 
 
 def _flat(corners: Floats) -> SceneError:

@@ -57,7 +57,7 @@ def view(
 
     target = output or file.with_suffix(".png")
     _check_picture(target, file)
-    by = sheet.draw(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
+    by = sheet.draw_sheet(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
     print(f"written to {target}; drawn by {by}")
 
 
@@ -72,7 +72,7 @@ def plot(file: TrajectoryFile, output: Picture = None) -> None:
     target = output or file.with_suffix(".png")
     _check_picture(target, file)
     with load(file) as trajectory:
-        plots.draw(trajectory, target)
+        plots.draw_plot(trajectory, target)
     print(f"written to {target}")
 
 

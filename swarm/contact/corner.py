@@ -80,14 +80,14 @@ def _sweep(walls, form, law, multipliers, step, reactions):
 
 
 @outlined
-def add_impulses(reactions, h, impulse, lane):
+def add_reaction_impulses(reactions, h, impulse, lane):
     """Add the impulse per mass of each wall in a step of length h, |2/h reaction|, to impulse[wall, lane]."""
     for k in range(reactions.shape[0]):
         impulse[k, lane] += 2.0 / h * norm(_reaction_of(reactions, k))
 
 
 @outlined
-def add_works(moving, walls, factor, reactions, impulse, lane):
+def add_reaction_works(moving, walls, factor, reactions, impulse, lane):
     """Add the work per mass of each wall, `factor` reaction.displacement, to its row of `impulse`; the sum.
 
     The rows of work are behind those of impulses; where no wall moves there are none.

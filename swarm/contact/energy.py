@@ -56,7 +56,7 @@ def energy_uncertainty(walls, law, over_mass, r, s):
     return found
 
 
-def restored(law, walls, after, gravity, budget, ends):
+def restoring_factor(law, walls, after, gravity, budget, ends):
     """Factor of v after a contact step that restores the energy of the particle, and whether only round-off is missing.
 
     Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
@@ -89,7 +89,7 @@ def strength(law, surface, q):
     return select(g > 0.0, push * slope, 0.0)
 
 
-def force(walls, law, r):
+def walls_force(walls, law, r):
     """The force of all walls [N]."""
     found = ZERO
     for wall in reversed(walls.each):

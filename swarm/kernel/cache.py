@@ -104,7 +104,7 @@ def is_disabled() -> bool:
     return bool(_CONFIG.DISABLE_JIT)
 
 
-def kept(function: Callable[..., Any], flags: dict[str, Any], compiled: Callable[..., Any] | None = None) -> Any:
+def cached(function: Callable[..., Any], flags: dict[str, Any], compiled: Callable[..., Any] | None = None) -> Any:
     """The kernel of a function: Numba compiles it, or `compiled` in its place, where no earlier process has."""
     if is_disabled():
         return function

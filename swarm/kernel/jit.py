@@ -79,7 +79,7 @@ def _kernel(function: F, compiler: Any) -> F:
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )
     prepare(traced, _INLINE, outlined=False, is_kernel=True)
-    compiled: F = cache.kept(function, {**_KERNEL, "pipeline_class": compiler}, cache.calling(traced))
+    compiled: F = cache.cached(function, {**_KERNEL, "pipeline_class": compiler}, cache.calling(traced))
     return compiled
 
 

@@ -50,9 +50,9 @@ def _first_hit(met, walls, gravity, lane, lanes, i):
     if _has_fields(met):
         return hit_of_lane(lanes, i)
     if isinstance(met, Strided):
-        return strides.end(lanes.course, i)
+        return strides.met(lanes.course, i)
     if isinstance(met, Marched):
-        return safe.first_hit(walls, gravity, lane.r, lane.v, lane.remaining)
+        return safe.first_hit_moving(walls, gravity, lane.r, lane.v, lane.remaining)
     if _is_closed(gravity, walls):
         return flights.first_hit(walls.at(lane.remaining), gravity, lane.r, lane.v)
     return flights.end(walls.at(lane.remaining), lanes.course, 0, i)
@@ -73,7 +73,7 @@ def _stride(walls, gravity, lanes, live):
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        strides.begin(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
+        strides.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
         lane = lanes.lane(i)
         strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)

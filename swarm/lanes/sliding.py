@@ -49,7 +49,7 @@ class Sliding(Advanced):
     ALL = _named.count
 
 
-class Lanes(Record):
+class SlidingLanes(Record):
     """Arrays of one column a lane."""
 
     rows: Array  # (Sliding.ALL, stride)
@@ -71,10 +71,10 @@ class Lanes(Record):
         self.particle[target] = self.particle[source]
 
 
-def empty(period: Any = None, openings: Any = None) -> Lanes:
+def empty_sliding(period: Any = None, openings: Any = None) -> SlidingLanes:
     """Lanes for one block."""
     particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
-    return Lanes(table(Sliding.ALL), particle, unsolved, event, *table(2), period, openings)
+    return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), period, openings)
 
 
 class Slide(Record):
@@ -85,7 +85,7 @@ class Slide(Record):
     walls: Any
     gravity: Any
     state: Any
-    lanes: Lanes
+    lanes: SlidingLanes
 
     def phase(self):
         """The phase of particles that one wall holds, or two."""

@@ -118,7 +118,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         contact = *reaction_needs(self.gradient), "gap_scale", *CHORD_NEEDS, *SLIDING_NEEDS
         return *super().needs(scene), *contact
 
-    def numbers(self, scene: Scene) -> steps.Numbers:
+    def numbers(self, scene: Scene) -> steps.StepNumbers:
         kind = steps.CutSteps if self.adaptive else steps.FixedSteps
         return kind(
             self.dt,

@@ -51,7 +51,7 @@ class SoftWalls(base.Method):
         asked: tuple[Any, ...] = flights.of_steps(scene.gravity is not None)
         return asked
 
-    def record(self, kind: type["Numbers"], scene: Scene, factor: float, form: Any = None) -> "Numbers":
+    def record(self, kind: type["SoftNumbers"], scene: Scene, factor: float, form: Any = None) -> "SoftNumbers":
         """The numbers of this description, of a kind that divides such a factor by the mass."""
         return kind(self.dt, self.law(), longest_step(scene, self.dt), factor, form, moves(scene))
 
@@ -207,7 +207,7 @@ class Steps(contract.MethodNumbers):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
         dt = self.dt
         # One too many by round-off starts a contact 1e-16 deep: harmless.
-        steps = np.floor(safe.free_time(walls, gravity, lane.r, lane.v, lane.remaining * dt) * (1.0 / dt))
+        steps = np.floor(safe.free_time_moving(walls, gravity, lane.r, lane.v, lane.remaining * dt) * (1.0 / dt))
         steps = select(steps < lane.remaining, steps, lane.remaining)
         t = steps * dt
         start = contract.Lane(
@@ -223,7 +223,7 @@ class Steps(contract.MethodNumbers):
         return contract.Flight(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
 
 
-class Numbers(Steps):
+class SoftNumbers(Steps):
     """A method with soft walls as kernels know it; each method has its own subclass."""
 
     dt: float

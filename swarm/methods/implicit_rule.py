@@ -107,7 +107,7 @@ class RuleStep(NamedTuple):
     kick: Vec
 
 
-class RuleNumbers(fixed_step.Numbers):
+class RuleNumbers(fixed_step.SoftNumbers):
     """An implicit rule as kernels know it: the part of a step at its point, `reach`, and these two."""
 
     def end(self, before, gravity, lane, s, push):

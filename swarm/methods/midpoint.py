@@ -38,7 +38,7 @@ class Midpoint(fixed_step.SoftWalls):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         return *super().needs(scene), *implicit_rule.NEEDS
 
-    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+    def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
         # h^2/(4m) of equation (I) in implicit_rule.py
         return self.record(MidpointNumbers, scene, 0.25 * self.dt * self.dt)
 
@@ -62,5 +62,7 @@ class MidpointNumbers(implicit_rule.RuleNumbers):
 
     def add_impulses(self, walls, lane, reactions, impulse, i):
         h = self.dt
-        corner.add_impulses(reactions, 0.5 * h, impulse, i)
-        return corner.add_works(self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, impulse, i)
+        corner.add_reaction_impulses(reactions, 0.5 * h, impulse, i)
+        return corner.add_reaction_works(
+            self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, impulse, i
+        )

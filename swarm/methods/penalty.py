@@ -57,7 +57,7 @@ class Penalty(fixed_step.SoftWalls):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         return *super().needs(scene), *reaction_needs(self.gradient)
 
-    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+    def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
         # h^2/(2m) of equation (K) in contact/impulse.py
         return self.record(PenaltyNumbers, scene, 0.5 * self.dt * self.dt, form_of(self.gradient))
 
@@ -140,8 +140,8 @@ class GradientSteps(fixed_step.Steps):
     def reacted(self, walls, gravity, lane, h, end, reactions, impulse, i):
         """The `Pushed` step with these reactions of all walls; adds their impulses and works to `impulse`."""
         over, reaction = self.over(walls, lane.remaining), corner.total(reactions)
-        corner.add_impulses(reactions, h, impulse, i)
-        work = corner.add_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
+        corner.add_reaction_impulses(reactions, h, impulse, i)
+        work = corner.add_reaction_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
         v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
         force = 1.0 / h * (2.0 / h * norm(reaction))
         return self._restored(walls, gravity, lane, h, Pushed(end, v1, over, None, 0.0, work, False), force)
@@ -152,11 +152,11 @@ class GradientSteps(fixed_step.Steps):
         energy = 0.5 * lane.own.twice_energy + end.work
         budget = energies.Budget(self.over_mass(lane), energy, force if self.multiplies else 0.0)
         ends = energies.Ends(lane.r, end.r, end.v, h)
-        factor, balanced = energies.restored(self.law, end.over, after, gravity, budget, ends)
+        factor, balanced = energies.restoring_factor(self.law, end.over, after, gravity, budget, ends)
         return end._replace(v=end.v * factor, after=after, balanced=balanced)
 
 
-class PenaltyNumbers(GradientSteps, fixed_step.Numbers):
+class PenaltyNumbers(GradientSteps, fixed_step.SoftNumbers):
     """The step with the composite discrete gradient, or with the mean-value one."""
 
     def free(self, gravity, lane, h):

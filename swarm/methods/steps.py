@@ -32,7 +32,7 @@ _MOST_BOUNCES = 1000
 _ROUND_OFF = 1e-13
 
 
-class Numbers(penalty.GradientSteps):
+class StepNumbers(penalty.GradientSteps):
     """The method as kernels know it, and what is different between its two kinds of steps."""
 
     multiplies = True
@@ -153,7 +153,7 @@ def _after(r, v, remaining, hits):
     return contract.Contact(r, v, remaining, 0.0, 0.0, hits, 0.0, False)
 
 
-class FixedSteps(Numbers):
+class FixedSteps(StepNumbers):
     """The method with steps of fixed length."""
 
     def is_new(self, walls, r):
@@ -184,7 +184,7 @@ class FixedSteps(Numbers):
         return _after(r, v, lane.remaining, hits), Status.STALLED.value
 
 
-class CutSteps(Numbers):
+class CutSteps(StepNumbers):
     """The method with steps that begin at the impact, without gravity."""
 
     def cut(self, remaining):

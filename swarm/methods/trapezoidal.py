@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..contact import corner
-from ..contact.energy import add_impulses, add_works, force
+from ..contact.energy import add_impulses, add_works, walls_force
 from ..kernel.gravity import accelerated, displacement
 from ..scene import Scene
 from . import fixed_step, implicit_rule
@@ -39,7 +39,7 @@ class Trapezoidal(fixed_step.SoftWalls):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         return *super().needs(scene), *implicit_rule.NEEDS
 
-    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+    def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
         # h^2/(4m) of equation (I) in implicit_rule.py
         return self.record(TrapezoidalNumbers, scene, 0.25 * self.dt * self.dt)
 
@@ -52,19 +52,19 @@ class TrapezoidalNumbers(implicit_rule.RuleNumbers):
 
     def reach(self, before, gravity, lane):
         # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
-        return displacement(gravity, lane.v, self.dt) + lane.own.over_mass * force(before, self.law, lane.r)
+        return displacement(gravity, lane.v, self.dt) + lane.own.over_mass * walls_force(before, self.law, lane.r)
 
     def end(self, before, gravity, lane, s, push):
         # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
-        kick = 2.0 / self.dt * (push - lane.own.over_mass * force(before, self.law, lane.r))
+        kick = 2.0 / self.dt * (push - lane.own.over_mass * walls_force(before, self.law, lane.r))
         return implicit_rule.RuleStep(s, accelerated(gravity, lane.v, self.dt) - kick, kick)
 
     def add_impulses(self, walls, lane, reactions, impulse, i):
         h, law, moving = self.dt, self.law, self.moving
         before, over = self.before(walls, lane.remaining), self.over(walls, lane.remaining)
-        corner.add_impulses(reactions, h, impulse, i)
+        corner.add_reaction_impulses(reactions, h, impulse, i)
         # h/(2m) |F0|
         factor = 2.0 * lane.own.over_mass / h
         add_impulses(before, law, factor, lane.r, impulse, i)
         work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
-        return work + corner.add_works(moving, over, -2.0 / (h * h), reactions, impulse, i)
+        return work + corner.add_reaction_works(moving, over, -2.0 / (h * h), reactions, impulse, i)

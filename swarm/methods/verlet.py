@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..contact.energy import NEEDS as FORCE_NEEDS
-from ..contact.energy import add_impulses, add_works, force, work
+from ..contact.energy import add_impulses, add_works, walls_force, work
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
@@ -41,7 +41,7 @@ class Verlet(fixed_step.SoftWalls):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         return *super().needs(scene), *FORCE_NEEDS
 
-    def numbers(self, scene: Scene) -> fixed_step.Numbers:
+    def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
         # h/(2m)
         return self.record(VerletNumbers, scene, 0.5 * self.dt)
 
@@ -58,17 +58,17 @@ class VerletStep(NamedTuple):
     work: float
 
 
-class VerletNumbers(fixed_step.Numbers):
+class VerletNumbers(fixed_step.SoftNumbers):
     """The rule."""
 
     def step(self, walls, gravity, lane):
         """The `VerletStep` of a lane."""
         h, over_mass = self.dt, lane.own.over_mass
         before, over, after = self.times(walls, lane.remaining)
-        f0 = force(before, self.law, lane.r)
+        f0 = walls_force(before, self.law, lane.r)
         # h^2/(2m) F0
         r1 = lane.r + (displacement(gravity, lane.v, h) + (h * over_mass) * f0)
-        kick = over_mass * (f0 + force(after, self.law, r1))
+        kick = over_mass * (f0 + walls_force(after, self.law, r1))
         given = work(self.moving, over, before, self.law, lane.r) + work(self.moving, over, after, self.law, r1)
         return VerletStep(r1, accelerated(gravity, lane.v, h) + kick, kick, over_mass / h * given)
 

@@ -28,7 +28,7 @@ h5py.register_driver(NAME, _driver)
 _opened: list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]] = []
 
 
-def opened(path: Path, mode: str, **options: Any) -> h5py.File:
+def open_by(path: Path, mode: str, **options: Any) -> h5py.File:
     """Open a file by this driver."""
     file = h5py.File(path, mode, driver=NAME, **options)
     _opened[:] = [*_open(), (weakref.ref(file), paths.identity(path))]
@@ -38,7 +38,7 @@ def opened(path: Path, mode: str, **options: Any) -> h5py.File:
 def opened_to_write(path: Path, mode: str, **options: Any) -> h5py.File:
     """Open a file to write it."""
     try:
-        return opened(path, mode, **options)
+        return open_by(path, mode, **options)
     except OSError:
         # A reader of swarm has it open by this driver.
         return h5py.File(path, mode, **options)

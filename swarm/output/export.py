@@ -56,7 +56,7 @@ def export(
             with needed_by("an export with surfaces, which --no-surfaces or surfaces=False leaves out,", "plot"):
                 from . import walls
             drawn = walls.shapes(chosen)
-            walls.write(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
+            walls.write_walls(chosen, drawn, stack.enter_context(named_when_whole(targets[1])))
         form.write(chosen, stack.enter_context(named_when_whole(target)))
     return targets
 

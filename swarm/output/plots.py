@@ -45,7 +45,7 @@ class Content:
     frames: dict[str, Particles]
 
 
-def draw(trajectory: Any, target: Path) -> None:
+def draw_plot(trajectory: Any, target: Path) -> None:
     """Draw the time series of a trajectory, its speeds, and its particles at the end.
 
     Raises:

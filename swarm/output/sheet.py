@@ -15,7 +15,7 @@ from .replaced import named_when_whole
 _COLUMNS = 3
 
 
-def draw(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
+def draw_sheet(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
     """Draw the frames nearest to these times (None: the first, the middle and the last); returns what drew them.
 
     Args:

@@ -27,7 +27,7 @@ class Stored:
     def __init__(self, path: str | Path, what: str, opener: str) -> None:
         self.path, self._opener = paths.given("path", path), opener
         require_file(self.path, what)
-        self._file = opened(self.path)
+        self._file = open_stored(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -97,7 +97,7 @@ class Stored:
             return layout.text(file[f"parameters/{name}"], self.path)
 
 
-def opened(path: Path) -> h5py.File:
+def open_stored(path: Path) -> h5py.File:
     """The file, open for reading.
 
     Raises:
@@ -109,7 +109,7 @@ def opened(path: Path) -> h5py.File:
     try:
         try:
             if not driver.has_open(path):
-                return driver.opened(path, "r", **options)
+                return driver.open_by(path, "r", **options)
         except OSError as error:
             if _STILL_WRITTEN not in str(error):
                 raise
@@ -119,7 +119,7 @@ def opened(path: Path) -> h5py.File:
             return file
         # The sources of virtual datasets are opened by the driver of the file that names them.
         file.close()
-        return driver.opened(path, "r", **options)
+        return driver.open_by(path, "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
             raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
@@ -131,7 +131,7 @@ def opened(path: Path) -> h5py.File:
 def is_log(path: Path) -> bool:
     """Whether an HDF5 file is a log of impacts, and no trajectory."""
     require_file(path, "a trajectory or a log of impacts (.h5)")
-    with opened(path) as file, contextlib.suppress(*DAMAGE):
+    with open_stored(path) as file, contextlib.suppress(*DAMAGE):
         return "impacts" in file and "h5md" not in file
     return False  # what is damaged is said by who reads more of it
 

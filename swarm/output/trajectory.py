@@ -22,7 +22,7 @@ from ..errors import SceneError
 from ..particles import Particles
 from . import layout
 from .presented import Presented
-from .stored import finite, opened, times_of, whole
+from .stored import finite, open_stored, times_of, whole
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
@@ -49,7 +49,7 @@ class Trajectory(Presented):
             with self._reading("its structure") as file:
                 foreign = layout.missing(file)
                 self._frames = 0 if foreign else layout.frames(file, self.path)
-                layout.require_shards(file, self._frames, self.path, opened)
+                layout.require_shards(file, self._frames, self.path, open_stored)
             if foreign:
                 raise SceneError(f"{self.path} is an HDF5 file, but not a trajectory of swarm: it has no {foreign}")
         except SceneError:

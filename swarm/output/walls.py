@@ -22,7 +22,7 @@ def shapes(chosen: Exported) -> list[Shape]:
     return shapes_of(chosen.trajectory.scene, positions, most=_MOST)
 
 
-def write(chosen: Exported, drawn: list[Shape], path: Path) -> None:
+def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
     """Write the walls."""
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
     triangles = np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])

@@ -143,7 +143,7 @@ class Freedom(Record):
 
 def march(wall, flight, longest):
     """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
-    found = safe.march(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    found = safe.march_moving(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
     return found.time, found.wall >= 0.0
 
 

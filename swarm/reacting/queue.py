@@ -81,7 +81,7 @@ def _aim(scenery, queue, i, end):
     """Find when particle i meets a wall that does not react, from where it is."""
     walls, t, r, v = scenery.given, queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     if isinstance(walls, Marched):
-        hit = safe.first_hit(walls, scenery.pull, r, v, end - t)
+        hit = safe.first_hit_moving(walls, scenery.pull, r, v, end - t)
     else:
         hit = flights.first_hit(walls.at(end - t), scenery.pull, r, v)
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall

@@ -73,7 +73,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     _require_motions(scene, times.until)
     _require_inside(scene, particles)
     _require_normals(scene, particles)
-    workload.check(scene, particles, method, times.until, times.every)
+    workload.require_few_impacts(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
 
 
@@ -92,7 +92,7 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     for point, motion in bodies.body.anchors.items():
         require_angles(f"anchors[{point}]", motion, options.times.until)
     assert method.dt is not None  # type: ignore[attr-defined]
-    passing.check(scene, bodies.body)
+    passing.warn(scene, bodies.body)
     workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
     if options.compile != "never":

@@ -75,7 +75,7 @@ class Columns:
         return {name: np.concatenate([part[name] for part in self._packed]) for name in names}
 
 
-def carry_out(task: Task, session: Session) -> End:
+def carry_out_task(task: Task, session: Session) -> End:
     """Carry out a run that is checked."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()

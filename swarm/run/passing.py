@@ -21,7 +21,7 @@ _ENTERS = 0.25
 _GAP = 1.25 / math.sqrt(3.0)
 
 
-def check(scene: Scene, body: Body) -> None:
+def warn(scene: Scene, body: Body) -> None:
     """Warn where a solid can enter a face of the body, or pass it, without touching a contact point."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if _is_solid(surface)]
     if not solids or not len(body.faces):

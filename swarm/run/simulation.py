@@ -121,7 +121,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
 def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Result:
     """`simulate` with its keywords as `RunOptions`."""
-    carried: Callable[[Task, Any], machine.End] = machine.carry_out
+    carried: Callable[[Task, Any], machine.End] = machine.carry_out_task
     session: Session
     if options.cluster is None:
         session = Session(options)

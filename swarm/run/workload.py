@@ -35,7 +35,7 @@ class Flights(NamedTuple):
     wall: int
 
 
-def check(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
+def require_few_impacts(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
     """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
     impact = method.time_of_impact()
     # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.

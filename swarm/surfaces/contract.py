@@ -171,7 +171,7 @@ class Smooth(AtRest):
         if self.gives("near"):
             level = self.near(Gravity(pull.x, pull.y, pull.z), r, v)
             return select(level.c > 0.0, 0.0, level.first_step()[0])
-        return march.safe_time(self, r, v, pull) if self.gives("hessian_bounds") else 0.0
+        return march.safe_time_by_steps(self, r, v, pull) if self.gives("hessian_bounds") else 0.0
 
     def entry(self, gravity, r, v):
         """A time until which a flight surely stays admissible: (time, whether it does no longer then).

@@ -104,7 +104,7 @@ def march(surface, r, v, pull):
     return time, wall >= 0.0
 
 
-def safe_time(surface, r, v, pull):
+def safe_time_by_steps(surface, r, v, pull):
     """A time during which the flight surely stays admissible."""
     level, _half, step, _way, _steepness = _safe_step(surface, r, v, pull, 0.0)
     return select(level > 0.0, 0.0, step)

@@ -131,7 +131,7 @@ class ToWalls(Search):
 
 
 @outlined
-def march(walls, flight, longest):
+def march_moving(walls, flight, longest):
     """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
     return Hit(*first_met(ToWalls(walls, flight, longest)))
 
@@ -139,13 +139,13 @@ def march(walls, flight, longest):
 @outlined
 def march_alone(walls, r, v, pull, remaining):
     """The same of a flight that has so much of the frame left [s]."""
-    return march(walls, flight_of(r, v, pull, remaining), remaining)
+    return march_moving(walls, flight_of(r, v, pull, remaining), remaining)
 
 
 # --- Free time -------------------------------------------------------------------------------------------
 
 
-def free_time(walls, gravity, r, v, remaining):
+def free_time_moving(walls, gravity, r, v, remaining):
     """A time during which a flight surely stays admissible, with so much of the frame left [s].
 
     0 for a particle that is in contact now.
@@ -172,11 +172,11 @@ def _free_of(wall, gravity, r, v):
 
 
 @outlined
-def first_hit(walls, gravity, r, v, remaining):
+def first_hit_moving(walls, gravity, r, v, remaining):
     """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
     found = closed_hit(walls.at(remaining), gravity, r, v)
     longest = select(found.time < remaining, found.time, remaining)
-    met = march(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
+    met = march_moving(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
     return found

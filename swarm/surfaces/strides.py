@@ -23,7 +23,7 @@ _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
 _AHEAD = 32.0
 
 
-def begin(walls, gravity, course, lane, r, v, remaining):
+def start(walls, gravity, course, lane, r, v, remaining):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
     found = closed_hit(walls.at(remaining), gravity, r, v)
     course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
@@ -49,7 +49,7 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     course[_MET, lane] = select(under_way & meets & (time <= within), wall, met)
 
 
-def end(course, lane):
+def met(course, lane):
     """The first `Hit` of a lane, if its strides have found it."""
     t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
     # No wall in any motion before the closed hit

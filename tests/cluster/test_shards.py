@@ -103,7 +103,7 @@ def on_a_cluster(monkeypatch):
             folder, bounds = session.begin(task, count)
             for k in range(len(bounds) - 1):
                 assert worker.advance(folder, k) == ("complete", "")
-            observables = joined.write(folder, task, bounds, session.identity)
+            observables = joined.join(folder, task, bounds, session.identity)
             end = shards.joined_end(folder, task, bounds)
             session.finish()
         written = machine.read_back(options.trajectory)
@@ -131,7 +131,7 @@ def alone(tmp_path_factory):
             scene, start, method = make()
             options = RunOptions(**{"until": 0.4, "every": 0.2, "compile": "never"} | keywords, trajectory=path)
             task = task_of(scene, start, method, options)
-            known[name] = machine.carry_out(task, Session(options)), path
+            known[name] = machine.carry_out_task(task, Session(options)), path
         return known[name]
 
     return carried

@@ -137,7 +137,7 @@ def test_virtual_datasets_are_read_beside_their_sources(tmp_path, name):
         after = READERS[name](path)
         np.testing.assert_array_equal(file["position"][-1].T, result.particles.position)
         # What joins files is not opened as a Python object, of which HDF5 makes no path.
-        with stored.opened(joined) as again:
+        with stored.open_stored(joined) as again:
             np.testing.assert_array_equal(again["position"][-1].T, result.particles.position)
     assert frames_of(before) == frames_of(after) == 6
     before.close()

@@ -328,9 +328,9 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
     monkeypatch.setattr(drawing, "colour_bar", lambda picture, axes, *meaning: cells.append(axes))
     with swarm.load(path) as trajectory:
         recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
-        plots.draw(trajectory, tmp_path / "plot.png")
+        plots.draw_plot(trajectory, tmp_path / "plot.png")
     by_plot, _ = dict(drawn), drawn.clear()
-    sheet.draw(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", [float(FRAMES - 1)], False)
+    sheet.draw_sheet(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", [float(FRAMES - 1)], False)
     for found in (by_plot, dict(drawn)):
         times, errors = found["link_error"]["of a link"]
         np.testing.assert_array_equal(times, np.arange(FRAMES))

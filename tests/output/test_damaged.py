@@ -271,7 +271,7 @@ def test_one_frame_is_drawn_recorded_and_told(whole):
     cut_to(whole, 1)
     assert summary.of_trajectory(whole)["frames"] == "1, 0 s to 0 s"
     with swarm.load(whole) as trajectory:
-        plots.draw(trajectory, whole.with_suffix(".png"))
+        plots.draw_plot(trajectory, whole.with_suffix(".png"))
         recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
     assert whole.with_suffix(".png").stat().st_size > 20_000
     pictures.view(whole.with_suffix(".rrd"), whole.with_suffix(".pdf"), None, False)
@@ -285,7 +285,7 @@ def test_no_frame_is_a_sentence(whole):
         for read in (
             lambda: trajectory.frame(0),
             lambda: trajectory.frame(-1),
-            lambda: plots.draw(trajectory, whole.with_suffix(".png")),
+            lambda: plots.draw_plot(trajectory, whole.with_suffix(".png")),
             lambda: recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings()),
         ):
             with pytest.raises(swarm.SceneError, match=r"run\.h5 holds no frame: its run ended before the first one"):

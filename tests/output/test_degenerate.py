@@ -57,7 +57,7 @@ def test_a_picture_a_film_and_tables_of_nothing_in_particular(run, tmp_path):
 def test_a_recording_and_its_sheet(run, tmp_path):
     _result, trajectory = run
     recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
-    sheet.draw(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", None, False)
+    sheet.draw_sheet(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", None, False)
     assert (tmp_path / "sheet.png").stat().st_size
 
 

@@ -100,7 +100,7 @@ def test_pictures_show_the_walls_of_their_time(run, tmp_path, monkeypatch):
         lambda axes, *rest: drawn.append([wires for _solid, wires in rest[2]]) or draw(axes, *rest),
     )
     held = playback.Playback(folder / "run.rrd")
-    sheet.draw(held, tmp_path / "sheet.png", [0.0, 0.5, 1.0], False)
+    sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 0.5, 1.0], False)
     for k, wires in zip((0, 2, 4), drawn, strict=True):
         for (_solid, curves), shown in zip(held.wires_at(k), wires, strict=True):
             np.testing.assert_array_equal(np.vstack(shown), np.vstack(curves))
@@ -111,7 +111,7 @@ def test_pictures_show_the_walls_of_their_time(run, tmp_path, monkeypatch):
         stays &= (seen["wall_orientation"][0, i] == seen["wall_orientation"][-1, i]).all()
         assert (way == 0.0) == stays
     with swarm.load(folder / "run.h5") as trajectory:
-        plots.draw(trajectory, tmp_path / "run.png")
+        plots.draw_plot(trajectory, tmp_path / "run.png")
     still = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1]) if scene.reacts() else scene
     for i, wires in enumerate(drawn[3]):
         if wires:

@@ -52,7 +52,7 @@ def test_a_recording_keeps_the_centre(tmp_path, name):
                 at = trajectory.times[k]
                 gaps = scene.gaps(balls.T, float(at))[1]
                 assert np.abs(gaps).max() < 2e-3
-    assert sheet.draw(held, tmp_path / "sheet.png", [0.0, 1.0], False).startswith("matplotlib")
+    assert sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 1.0], False).startswith("matplotlib")
 
 
 def test_a_recording_near_the_origin_is_what_it_was(tmp_path):

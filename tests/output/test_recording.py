@@ -52,11 +52,11 @@ def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
     )
     held = playback.Playback(tmp_path / "run.rrd")
     held.series = dict(sorted(held.series.items()))
-    sheet.draw(held, tmp_path / "sheet.png", [0.0], False)
+    sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0], False)
     in_sheet = drawn.copy()
     drawn.clear()
     with swarm.load(tmp_path / "run.h5") as trajectory:
-        plots.draw(trajectory, tmp_path / "plot.png")
+        plots.draw_plot(trajectory, tmp_path / "plot.png")
     assert drawn == in_sheet
     assert drawn[0] == ["total", "kinetic", "potential", "dissipated"]
 
@@ -316,22 +316,22 @@ def test_live_reaches_a_viewer(tmp_path, request):
 def test_a_sheet_says_what_drew_it(run, tmp_path, monkeypatch):
     held = playback.Playback(run[0] / "run.rrd")
     monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "none.json"))
-    told = sheet.draw(held, tmp_path / "sheet.png", [0.0, 3.1], None)
+    told = sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 3.1], None)
     assert "matplotlib" in told
     assert ("Vulkan" in told) == (sys.platform == "linux")
     assert (tmp_path / "sheet.png").stat().st_size > 20_000
     assert sheet._chosen(held, [0.0, 3.1]) == [0, 6]
     assert sheet._chosen(held, None) == [0, 20, 40]
     with pytest.raises(swarm.SceneError, match="times must lie between 0 and 20 s, got 21"):
-        sheet.draw(held, tmp_path / "sheet.png", [21.0], None)
+        sheet.draw_sheet(held, tmp_path / "sheet.png", [21.0], None)
     if sys.platform == "linux":
         with pytest.raises(swarm.RunError, match="the Rerun viewer cannot draw here: there is no Vulkan driver"):
-            sheet.draw(held, tmp_path / "sheet.png", None, True)
+            sheet.draw_sheet(held, tmp_path / "sheet.png", None, True)
 
 
 @pytest.mark.physics
 @pytest.mark.skipif(viewer.no_driver() is not None, reason="no Vulkan driver")
 def test_the_viewer_draws(run, tmp_path):
     held = playback.Playback(run[0] / "run.rrd")
-    assert sheet.draw(held, tmp_path / "sheet.png", None, True) == "the Rerun viewer"
+    assert sheet.draw_sheet(held, tmp_path / "sheet.png", None, True) == "the Rerun viewer"
     assert os.stat(tmp_path / "sheet.png").st_size > 20_000

@@ -22,7 +22,7 @@ def run(tmp_path):
 def test_a_picture_or_an_export_that_cannot_be_written_is_a_sentence(run, tmp_path):
     """For any user, also for root: until it is whole the file has a longer name, which the system does not take."""
     name = "a" * 245
-    for write in (lambda path: plots.draw(run, path.with_suffix(".png")), lambda path: run.export(f"{path}.xyz")):
+    for write in (lambda path: plots.draw_plot(run, path.with_suffix(".png")), lambda path: run.export(f"{path}.xyz")):
         with pytest.raises(swarm.FileError, match=f"cannot write .*{name}.*: .*too long"):
             write(tmp_path / name)
     assert [one.name for one in tmp_path.iterdir()] == ["run.h5"]

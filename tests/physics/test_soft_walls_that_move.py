@@ -284,7 +284,7 @@ def test_free_steps_are_free(name, motion, gravity):
         if not (scene.gaps(r[:, None], start) < 0.0).all():
             continue
         with np.errstate(all="ignore"):
-            free = safe.free_time(walls, scene.pull(), vec(r), vec(v), span)
+            free = safe.free_time_moving(walls, scene.pull(), vec(r), vec(v), span)
         times = np.linspace(0.0, min(free, span), 50)
         poses = [pose(MOTIONS[motion], start + t) for t in times.tolist()]
         places = np.transpose([r + v * t + 0.5 * t * t * pull for t in times])

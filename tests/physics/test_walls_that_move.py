@@ -169,7 +169,7 @@ def test_the_first_hit_is_found(name, motion, pull):
         if not (scene.gaps(r[:, None], start) < -1e-3).all():
             continue
         with np.errstate(all="ignore"):
-            hit = safe.first_hit(walls, gravity, vec(r), vec(v), span)
+            hit = safe.first_hit_moving(walls, gravity, vec(r), vec(v), span)
         wanted = first_hit_by_scan(scene, rest, r, v, pull, start, times, poses)
         if not hit.time < span:
             # Not within the span, or still under way: never past the hit.
@@ -192,7 +192,7 @@ def test_a_hit_of_a_wall_that_comes_and_goes():
         floor = swarm.Plane((0, 0, -1), offset=gap * amplitude, motion=swarm.Oscillation((0, 0, amplitude), 1.0))
         walls = swarm.Scene([floor]).walls(0.6)
         with np.errstate(all="ignore"):
-            found = safe.first_hit(walls, None, rest, ZERO, 0.6)
+            found = safe.first_hit_moving(walls, None, rest, ZERO, 0.6)
         assert (found.time < 0.6) == hits
         if hits:
             # amplitude sin(2 pi t) = gap amplitude, a little before the top
@@ -547,6 +547,8 @@ def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
     gravity = swarm.Scene([floor], DOWN).pull()
     for left in (0.0, 0.5):
         with np.errstate(all="ignore"):
-            hit = safe.first_hit(walls, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left)
+            hit = safe.first_hit_moving(
+                walls, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left
+            )
         assert hit.time == 0.0
         assert scene.owners()[int(hit.wall)] == 0

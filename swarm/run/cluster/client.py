@@ -138,7 +138,7 @@ class _Run:
         finally:
             self._client.unsubscribe_topic(self._token)
             self._client.cancel(list(self._left))
-        seen = joined.write(self.folder, self._task, self.bounds, self._session.identity)
+        seen = joined.join(self.folder, self._task, self.bounds, self._session.identity)
         self._follow()
         frames = len(seen["time"]) if seen else 0
         moment = float(seen["time"][-1]) if seen else 0.0

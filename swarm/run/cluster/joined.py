@@ -118,7 +118,7 @@ class JoinedWriter(TrajectoryWriter):
         group.create_virtual_dataset("value", layout)
 
 
-def write(folder: Path, task: Task, bounds: list[int], identity: dict[str, Any]) -> dict[str, NDArray[Any]]:
+def join(folder: Path, task: Task, bounds: list[int], identity: dict[str, Any]) -> dict[str, NDArray[Any]]:
     """Write the frames that every shard holds in place of an earlier file: their observables.
 
     If there is none nothing is written.

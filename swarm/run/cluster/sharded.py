@@ -66,7 +66,7 @@ class Sharded(Session):
             shards.clear(folder)
             self._trajectory.unlink(missing_ok=True)
             self.keep(0, 0.0)
-        shards.write(folder, task, self._bounds, self.identity["start"])
+        shards.prepare(folder, task, self._bounds, self.identity["start"])
         return folder, self._bounds
 
     def keep(self, frame: int, moment: float) -> None:

@@ -71,7 +71,7 @@ def bounds_of(n: int, shards: int) -> list[int]:
 # --- What the client writes -----------------------------------------------------------------------------
 
 
-def write(folder: Path, task: Task, bounds: list[int], start: str) -> None:
+def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     """Write what is run, and its start."""
     import cloudpickle
 

@@ -68,7 +68,7 @@ def advance(
         # The system of a worker that died may still hold it.
         with only_writer(target, patience=_PATIENCE):
             pass
-        end = machine.carry_out(dataclasses.replace(task, options=options), session)
+        end = machine.carry_out_task(dataclasses.replace(task, options=options), session)
         shards.write_end(shards.end_of(folder, k), end)
     except KeyboardInterrupt:
         return "stopped", ""

@@ -19,7 +19,7 @@ _MAGIC = b"\x93NUMPY"
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError, EOFError)
 
 
-def read(path: str | Path) -> Floats:
+def read_samples(path: str | Path) -> Floats:
     """The samples in a .npy file, or in the one dataset with three axes of an HDF5 file.
 
     Raises:

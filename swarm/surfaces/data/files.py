@@ -7,7 +7,7 @@ from typing import Any
 from ...checks import closest, listed
 from ...errors import SceneError
 from ..surface import Surface
-from .arrays import read
+from .arrays import read_samples
 from .mesh import from_mesh
 
 _MESH = ("kind", "file", "spacing", "side", "scale", "weld", *(one.name for one in fields(Surface)))
@@ -35,7 +35,7 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
         if kind == "sampled":
             if "values" in table:
                 raise SceneError(f"values: cannot be combined with file = {name!r}; remove one of them")
-            return {**given, "values": read(path.parent / name)}
+            return {**given, "values": read_samples(path.parent / name)}
         for key in table:
             if key not in _MESH:
                 raise SceneError(f"{key}: unknown key of a mesh, expected {listed(_MESH)}{closest(key, _MESH)}")

@@ -64,7 +64,7 @@ def from_mesh(
     spacing, scale = checks.length("spacing", spacing), checks.length("scale", scale)
     if weld is not None:
         weld = checks.magnitude("weld", weld)
-    mesh = triangles.read(Path(path), scale, weld)
+    mesh = triangles.read_mesh(Path(path), scale, weld)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     counts = np.ceil((high - low) / spacing) + 2.0 * _MARGIN + 1.0
     size = float(counts.prod()) * _SAMPLE

@@ -15,7 +15,7 @@ from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from . import spline
-from .arrays import read
+from .arrays import read_samples
 from .cells import Cells, cells_of, eigenvalues, least_at_border
 from .flight import SampledNumbers
 from .spline import Spline
@@ -187,7 +187,7 @@ def _spacing(value: Any) -> Vector:
 def _samples(values: Any) -> Floats:
     """The argument `values`, checked: an array or a path."""
     if isinstance(values, str | Path):
-        values = read(values)
+        values = read_samples(values)
     found = checks.array("values", values)
     if found.ndim != 3 or min(found.shape) < spline.LEAST:
         raise SceneError(

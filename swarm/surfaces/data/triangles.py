@@ -41,7 +41,7 @@ class Mesh(NamedTuple):
     weld: float
 
 
-def read(path: Path, scale: float, weld: float | None) -> Mesh:
+def read_mesh(path: Path, scale: float, weld: float | None) -> Mesh:
     """The mesh in a file.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.surfaces.data.arrays import read
+from swarm.surfaces.data.arrays import read_samples
 
 AXIS = np.linspace(-1.0, 1.0, 8)
 VALUES = AXIS[:, None, None] ** 2 + AXIS[:, None] ** 2 + AXIS**2 - 0.64
@@ -72,7 +72,7 @@ def test_a_numpy_file_that_lies(name, tmp_path):
     tracemalloc.start()
     try:
         with pytest.raises(swarm.SceneError, match=r"phi\.npy") as caught:
-            read(path)
+            read_samples(path)
         assert tracemalloc.get_traced_memory()[1] < 5e6
     finally:
         tracemalloc.stop()
@@ -89,7 +89,7 @@ def test_any_damage_of_a_header_is_one_sentence(seed, tmp_path):
         path.write_bytes(damaged)
         said = ""
         try:
-            assert read(path).nbytes <= VALUES.nbytes
+            assert read_samples(path).nbytes <= VALUES.nbytes
         except swarm.SceneError as error:
             said = str(error)
         assert "\n" not in said
@@ -110,7 +110,7 @@ def test_an_hdf5_file_that_lies(name, tmp_path):
     with h5py.File(tmp_path / "phi.h5", "w") as file:
         file.create_dataset("phi", **({"dtype": float} | SHAPES[name]))
     with pytest.raises(swarm.SceneError, match=r"phi\.h5 must (hold|fit)") as caught:
-        read(tmp_path / "phi.h5")
+        read_samples(tmp_path / "phi.h5")
     assert "\n" not in str(caught.value)
 
 
@@ -122,7 +122,7 @@ def test_a_truncated_hdf5_file(share, tmp_path):
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(swarm.SceneError, match=r"cannot read the samples in .*phi\.h5"):
-        read(path)
+        read_samples(path)
 
 
 def test_what_is_whole_is_read(tmp_path):
@@ -131,11 +131,11 @@ def test_what_is_whole_is_read(tmp_path):
         file.create_dataset("phi", data=VALUES, compression="gzip", chunks=(4, 4, 4))
         file["constant"] = 1.0
     for name in ("phi.npy", "phi.h5"):
-        assert (read(tmp_path / name) == VALUES).all()
+        assert (read_samples(tmp_path / name) == VALUES).all()
     # Samples that are the same everywhere pack well, but not a thousand times.
     with h5py.File(tmp_path / "same.h5", "w") as file:
         file.create_dataset("phi", data=np.ones((100, 100, 100)), compression="gzip", compression_opts=9)
-    assert read(tmp_path / "same.h5").shape == (100, 100, 100)
+    assert read_samples(tmp_path / "same.h5").shape == (100, 100, 100)
 
 
 LONG = ["particles/all/mass", "particles/all/id", "particles/all/position/value", "particles/all/velocity/value"]

@@ -1,0 +1,35 @@
+"""A word means one thing: what two modules of a package define by one name is one interface."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+import swarm
+
+ROOT = Path(swarm.__file__).parent
+PACKAGES = sorted({path.parent.relative_to(ROOT) for path in ROOT.rglob("*.py")}, key=str)
+DEFINITIONS = ast.FunctionDef | ast.ClassDef
+
+
+def definitions(package):
+    """Name -> (module, arguments of the function, or of the methods of the class) of what modules define for others."""
+    found = defaultdict(list)
+    for path in sorted((ROOT / package).glob("*.py")):
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, DEFINITIONS) and not node.name.startswith("_"):
+                found[node.name].append((path.name, arguments(node)))
+    return found
+
+
+def arguments(node):
+    if isinstance(node, ast.FunctionDef):
+        return tuple(one.arg for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs))
+    return tuple(sorted(one.name for one in node.body if isinstance(one, ast.FunctionDef)))
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=str)
+def test_a_name_has_one_meaning_in_a_package(package):
+    other = {name: found for name, found in definitions(package).items() if len({what for _, what in found}) > 1}
+    assert not other
