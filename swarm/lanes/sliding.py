@@ -71,10 +71,10 @@ class SlidingLanes(Record):
         self.particle[target] = self.particle[source]
 
 
-def empty_sliding(period: Any = None, openings: Any = None) -> SlidingLanes:
-    """Lanes for one block."""
+def empty_sliding(state: Any) -> SlidingLanes:
+    """Lanes for one block of a state."""
     particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
-    return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), period, openings)
+    return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), state.period, state.openings)
 
 
 class Slide(Record):

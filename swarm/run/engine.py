@@ -235,11 +235,7 @@ class Run(BaseRun):
         common = self._numbers, self._walls, self._gravity, share
         if _KINDS[phase] is None:
             return contact_events.meet_block if phase == EVENT else contact_events.careful_block, common
-        return slide.slide_block, (
-            _KINDS[phase],
-            *common,
-            sliding.empty_sliding(self.state.period, self.state.openings),
-        )
+        return slide.slide_block, (_KINDS[phase], *common, sliding.empty_sliding(self.state))
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""

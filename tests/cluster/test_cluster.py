@@ -337,7 +337,9 @@ def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
 def test_what_a_worker_compiles_is_told(tmp_path, monkeypatch):
     told, path = [], tmp_path / "run.h5"
     monkeypatch.setattr(shards, "task_of", lambda folder, k: (task_of(*cavity(), RunOptions(1.0, trajectory=path)), 1))
-    monkeypatch.setattr(machine, "carry_out", lambda task, session: task.options.progress.compiling("compiling it"))
+    monkeypatch.setattr(
+        machine, "carry_out_task", lambda task, session: task.options.progress.compiling("compiling it")
+    )
     monkeypatch.setattr(shards, "write_end", lambda path, end: None)
     assert worker.advance(tmp_path, 0, compiling=told.append) == ("complete", "")
     assert told == ["compiling it"]

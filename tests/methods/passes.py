@@ -92,7 +92,7 @@ def run(method, scene, position, velocity, remaining, mass=1.0, restores=True):
     """Passes until nothing of the frame is left."""
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     if not restores:
-        with mock.patch.object(energies, "restored", return_value=(1.0, True)):
+        with mock.patch.object(energies, "restoring_factor", return_value=(1.0, True)):
             return run(method, scene, position, velocity, remaining, mass)
     energy = energy_of(method, scene, position, velocity, mass)
     passes = [Pass(position, velocity, remaining, -1.0, False, np.zeros(len(scene.surfaces)), 0.0)]
