@@ -145,11 +145,7 @@ def settings():
 
 @pytest.mark.physics
 def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
-<<<<<<< HEAD
-    # As users have it. Of the drum two particles take 15 s in plain Python, and 5 s where it is compiled after a second.
-=======
     # As users have it. Two particles in the drum take 15 s in plain Python, and 5 s if it is compiled after a second.
->>>>>>> t1
     monkeypatch.setattr(tiers, "_PATIENCE", 1.0)
     copy_examples(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
