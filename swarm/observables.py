@@ -73,7 +73,7 @@ def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: F
 
 
 def energy_scale(scene: Scene, start: Energies) -> Floats:
-    """What energy errors are relative to: kinetic + contact + m |G| size at the start, per mass."""
+    """The scale of energy errors: kinetic + contact + m |G| size at the start, per mass."""
     size, pull = scene.finite_size(), scene.pull()
     weight = abs(potential(pull, Vec(size, 0.0, 0.0))) + abs(potential(pull, Vec(0.0, size, 0.0)))
     weight += abs(potential(pull, Vec(0.0, 0.0, size)))
@@ -181,7 +181,7 @@ def drift(seen: dict[str, Any]) -> float:
 
 
 def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
-    """What is summed over particles, of each chunk of them: (quantities, chunks).
+    """The sums over the particles of each chunk: (quantities, chunks).
 
     The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall
     with the work of walls that move behind it, and the heat of each wall. Chunks are summed on their own and in their

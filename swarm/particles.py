@@ -108,7 +108,7 @@ class Multipliers(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """What lasts of each particle's contacts, of methods in which a particle may slide.
+    """The lasting contacts of each particle, of methods in which a particle may slide.
 
     Attributes:
         phase: (N,) int8, how it begins the next frame: in flight, along one wall or two, or at rest (ARRIVED).

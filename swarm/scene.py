@@ -176,7 +176,7 @@ class Scene(Volume):
         return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
 
     def walls_of_rows(self) -> NDArray[np.int64]:
-        """How many walls of the scene each row of `owners` stands for: the members of a field, else one."""
+        """The number of walls of each row of `owners`: the members of a field, else one."""
         fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
         return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
@@ -278,7 +278,7 @@ class Scene(Volume):
 
     @cached_property
     def _groups(self) -> list[Members]:
-        """Those that kernels take as fields."""
+        """The surfaces that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
         return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
 

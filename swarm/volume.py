@@ -51,7 +51,7 @@ class Volume:
         return into_cell(self.period or (None, None, None), checks.array("points", points))
 
     def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
-        """Where particles are (3, N), with all cells that they have come through: position + image * period."""
+        """Places of particles (3, N), with all cells that they have come through: position + image * period."""
         if self.period is None or particles.image is None:
             return np.array(particles.position)
         lengths = np.array([length or 0.0 for length in self.period])
@@ -105,7 +105,7 @@ class Volume:
         return not np.isfinite(self.bounds()).all()
 
     def poses(self, time: float) -> list[motions.Pose]:
-        """Where every surface is at a time [s]."""
+        """The pose of every surface at a time [s]."""
         return [motions.pose(surface.motion, time) for surface in self.surfaces]
 
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:

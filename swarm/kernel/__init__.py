@@ -1,1 +1,1 @@
-"""What every kernel is made of: the compiler's flags, dispatch, vectors, gravity."""
+"""Parts of every kernel: the compiler's flags, dispatch, vectors, gravity."""

@@ -1,4 +1,4 @@
-"""What kernels have beyond Python for arrays and their elements: arrays of their own, rows, indices, tickets.
+"""Operations of kernels beyond Python, on arrays and their elements: arrays of their own, rows, indices, tickets.
 
 Each is an operation of the compiler with the same definition in plain Python.
 """

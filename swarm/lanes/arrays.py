@@ -33,7 +33,7 @@ class Flying(Advanced):
     ALL = _named.count
 
     def put_end(self, end):
-        """Where it is at the end of a flight or a contact, and how much of its frame is left."""
+        """Its place at the end of a flight or a contact, and the time that remains of its frame."""
         self.r, self.v, self.remaining = end.r, end.v, end.remaining
 
 
@@ -156,7 +156,7 @@ class Halted(Record):
 
 
 class Draws(NamedTuple):
-    """Where the particles of a block come from: draw k is of those from k size to (k + 1) size, for one thread alone.
+    """The source of the particles of a block: draw k is of those from k size to (k + 1) size, for one thread alone.
 
     A thread draws when a lane is free, so its lanes are full until there are no more: shares of fixed size, each with
     its own end, cost 14 % with 512 particles a share and 3 % with 4096, and leave a thread idle while the other has
@@ -170,7 +170,7 @@ class Draws(NamedTuple):
 
 
 class Place(Record):
-    """Where a thread is among the particles that it draws."""
+    """The position of a thread among the particles that it draws."""
 
     i: int  # the next particle
     stop: int  # after the last one of its draw
@@ -276,7 +276,7 @@ def take(draws: Draws, some: int) -> Array:
 
 
 def booked(walls):
-    """How many rows book what the walls give: their impulses, then the work of those that move."""
+    """The number of rows for what the walls give: their impulses, then the work of those that move."""
     return 2 * walls.length() if isinstance(walls, Carried) else walls.length()
 
 

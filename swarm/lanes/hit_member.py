@@ -24,7 +24,7 @@ class Picked(Record):
     number: float
 
     def count(self):
-        """How many walls it has."""
+        """The number of its walls."""
         return self.number
 
     def wall(self, number):

@@ -102,7 +102,7 @@ class Log(NamedTuple):
         return True if self.chosen is None else self.chosen[index(particle)]
 
     def _slip_of(self, method, walls, struck):
-        """How fast a particle slips along the wall that it strikes, where the log has that."""
+        """The speed of a particle along the wall that it strikes, where the log has that."""
         if self.slip is None:
             return ZERO
         now = walls.at(struck.remaining)
@@ -171,7 +171,7 @@ def keep_going(log, place, live, passes):
 
 
 def gone_on(log):
-    """Where a kernel goes on: (`Place`, live lanes, passes)."""
+    """The place where a kernel goes on: (`Place`, live lanes, passes)."""
     if log is None:
         return Place(0, 0, 0), 0, 0
     i, stop, drawn, live, passes = tuple(log.going[k] for k in range(GOING))

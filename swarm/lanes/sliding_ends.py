@@ -157,5 +157,5 @@ def _lift(phase, lane, none):
 
 
 def _part(start, end):
-    """Where a straight line from `start` falls through 0, if it does."""
+    """The place where a straight line from `start` falls through 0, if it does."""
     return start / (start - end) if end < 0.0 else 1.0

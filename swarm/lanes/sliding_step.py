@@ -77,7 +77,7 @@ def compose(slide, live):
 
 
 def _start(slide, i):
-    """How long the step of a lane is, by how much it may be off, and from where it goes."""
+    """The length of the step of a lane, its allowed error, and its start."""
     lane, method = slide.lanes.lane(i), slide.method
     v, a, r = lane.v, lane.a, lane.r
     h = select(lane.step < lane.remaining, lane.step, lane.remaining)
@@ -103,7 +103,7 @@ def _longest(slide, lane):
 
 
 def _when(lane, k):
-    """How much of the frame is left at the start and at the end of part k."""
+    """The time that remains of the frame at the start and at the end of part k."""
     remaining, h = lane.remaining, lane.h
     return remaining - slides.before(k) * h, remaining - (slides.before(k) + slides.part(k)) * h
 

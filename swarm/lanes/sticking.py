@@ -119,7 +119,7 @@ def _clear(slide, lane, low, high):
 
 @outlined
 def _carried(walls, lane, t):
-    """Where a lane that moves with its first wall is after a time."""
+    """The place after a time of a lane that moves with its first wall."""
     return walls.during(lane.remaining, lane.remaining - t).carry(lane.first, lane.r)
 
 

@@ -74,7 +74,7 @@ class Lane(Record):
 
 
 class Advanced(Lane):
-    """That of a particle on its way, whose rows say where it was when all lanes were looked at last."""
+    """The lane of a particle on its way, whose rows say where it was when all lanes were looked at last."""
 
     def stands(self, method, p):
         """Whether particle p, of this lane, has not gone on by what it must since a look."""
@@ -101,7 +101,7 @@ def copy_lane(source, i, target, k, count):
 
 
 def marked_lanes(lanes, live):
-    """How many lanes are marked; which, is in `order`.
+    """The number of marked lanes; which they are is in `order`.
 
     Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
     one were an eighth of the time of a frame with 75 impacts.

@@ -113,11 +113,11 @@ class Freedom(Record):
         raise NotImplementedError
 
     def away(self, walls):
-        """How far the velocity is from the middle of its lease."""
+        """The distance of the velocity from the middle of its lease."""
         raise NotImplementedError
 
     def keeps(self, walls, more):
-        """How long the wall stays in its lease [s] by what pulls it, while its velocity may change by so much more."""
+        """The time that the wall stays in its lease [s] by its pull, while its velocity may change by so much more."""
         raise NotImplementedError
 
     def renew(self, walls, t):
@@ -180,7 +180,7 @@ class Shifted(Freedom):
         return self.pull / (self.rate * self.rate)
 
     def swing(self, shift, velocity):
-        """How far it is from there, and its velocity over the rate."""
+        """Its distance from there, and its velocity over the rate."""
         return shift - self.equilibrium(), velocity / self.rate
 
     def drive(self, walls, t):

@@ -1,4 +1,4 @@
-"""What the three engines of a run have in common: of particles, of bodies, of walls that react."""
+"""The common part of the three engines of a run: of particles, of bodies, of walls that react."""
 
 import math
 import time
@@ -89,7 +89,7 @@ class BaseRun:
         raise NotImplementedError
 
     def share_done(self, span: float) -> float:
-        """How much of a frame that was cut short is done, on average over the particles, or bodies."""
+        """The share of a frame that was cut short that is done, on average over the particles, or bodies."""
         raise NotImplementedError
 
     def seen(self) -> dict[str, Any]:
@@ -101,7 +101,7 @@ class BaseRun:
         raise NotImplementedError
 
     def arrays(self) -> Arrays:
-        """What `restore` needs to continue with the same bits, not copied; to be called between calls of `advance`."""
+        """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
         raise NotImplementedError
 
     # --- What they share ---------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ class BaseRun:
         failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
 
     def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
-        """What a kernel of this tier returns for each of these arguments, in a thread each, halted at `latest`."""
+        """The results of a kernel of this tier for each of these arguments, in a thread each, halted at `latest`."""
         chosen = self._tier.kernel(kernel)
         shares = [self._pool.submit(chosen, *arguments) for arguments in calls]
         return [result_of(share, latest, self.halt) for share in shares]
@@ -134,7 +134,7 @@ class BaseRun:
 
 
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:
-    """What a thread returns, which is halted at `latest` [s of time.monotonic].
+    """The result of a thread, which is halted at `latest` [s of time.monotonic].
 
     In many short waits: Python takes up a signal between two of them, and one that comes just before a long wait (or to
     another thread) would be seen at its end only.

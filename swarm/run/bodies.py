@@ -159,7 +159,7 @@ class BodyRun(BaseRun):
         return np.asarray(np.sqrt(((tied[:, 0] - tied[:, 1]) ** 2).sum(axis=1)))
 
     def _out_of_own(self) -> Iterator[Floats]:
-        """How far points are out of the cavities that others carry."""
+        """The distance of points outside of the cavities that others carry."""
         r = self._bodies.position
         for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
             yield scene.distances_outside(r[:, point] - r[:, carrier])

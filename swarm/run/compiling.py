@@ -1,4 +1,4 @@
-"""What is compiled, in plain words: the kernel of what, and which of how many that the run needs."""
+"""Names of what is compiled, in plain words: the kernel of what, and which of how many that the run needs."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -36,7 +36,7 @@ class Compilations:
         self._begun = 0
 
     def sentence(self, kernel: Any) -> str:
-        """What is said before a kernel is compiled. What slides or rests on the way needs more of them."""
+        """The sentence before a kernel is compiled. What slides or rests on the way needs more of them."""
         left = sum(not cache.is_compiled(*call) for call in self.calls())
         self._begun += 1
         name = kernel.__name__

@@ -199,7 +199,7 @@ class Run(BaseRun):
         return float((self._phase == ARRIVED).sum() + (1.0 - remaining / span).sum()) / len(self._phase)
 
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
-        """How many threads of the pool advance a frame, and whether the caller's thread does too."""
+        """The number of threads of the pool that advance a frame, and whether the caller's thread does too."""
         work = self._pace * span if span > 0.0 else 0.0
         helps = work < _SHORT_FRAME * self._threads
         # A thread that writes for as long as one computes has a processor of its own: three threads that share two
@@ -219,7 +219,7 @@ class Run(BaseRun):
         return made._replace(before=table.table(impact_log.ROWS)) if watched else made
 
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
-        """What a thread shares with the others, and its counts."""
+        """The share of a thread, with the arrays of all, and its counts."""
         return lanes.Share(
             self.state, self._phase, np.zeros(PHASES, np.int64), self._halted, draws, self._watch.passes, span,
             self._seed, self._first, self._moment, None if self._impacts is None else self._impacts.example,

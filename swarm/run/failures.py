@@ -52,7 +52,7 @@ def require_admissible(
 
 
 def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
-    """Where a particle is that does not go on, and when, if its contacts may last: kernels leave that there."""
+    """The place of a particle that does not go on, and the time, if its contacts may last: kernels leave that there."""
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
     place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))

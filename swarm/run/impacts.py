@@ -142,7 +142,7 @@ class Page:
         self._log = impacts.empty(end)
 
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
-        """What a kernel returns; each time the log is full, it goes on with an empty one."""
+        """The result of a kernel; each time the log is full, it goes on with an empty one."""
         while True:
             given = [one._replace(log=self._log) if isinstance(one, Share) else one for one in arguments]
             status, particle, drawn = kernel(*given)

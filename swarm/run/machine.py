@@ -39,7 +39,7 @@ _UNWATCHED = Watched()
 
 
 class End(NamedTuple):
-    """How a run ended; `simulation.Result` describes each."""
+    """The end of a run; `simulation.Result` describes each."""
 
     particles: Particles
     observables: dict[str, NDArray[Any]]
@@ -69,7 +69,7 @@ class Columns:
             self._frames = []
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Those of all frames, in the order of a file: the time, then the others by their names."""
+        """The observables of all frames, in the order of a file: the time, then the others by their names."""
         self._pack()
         names = sorted(self._packed[0], key=lambda name: (name != "time", name)) if self._packed else []
         return {name: np.concatenate([part[name] for part in self._packed]) for name in names}

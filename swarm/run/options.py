@@ -31,7 +31,7 @@ def cores() -> int:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How long a run is, what it writes, and how it is carried out; `simulate` describes each.
+    """The length of a run, its files, and the way it is carried out; `simulate` describes each.
 
     Raises:
         SceneError: a value is out of its range, or two files are the same.
@@ -112,7 +112,7 @@ class RunOptions:
 
     @property
     def storage(self) -> Storage:
-        """What the trajectory keeps."""
+        """The parts that the trajectory keeps."""
         return Storage(self.frames, self.precision, self.compression)
 
     def files(self) -> dict[str, Path | None]:

@@ -1,4 +1,4 @@
-"""What a run writes: its trajectory, its recording, or both."""
+"""The files of a run: its trajectory, its recording, or both."""
 
 from typing import TYPE_CHECKING
 

@@ -53,7 +53,7 @@ def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Disp
 
 
 class Told(NamedTuple):
-    """Where it is told how far something is: by the share that is done and a line about it, or by a sentence."""
+    """A listener to progress: by the share that is done and a line about it, or by a sentence."""
 
     put: Callable[[float, str], None]
     say: Callable[[str], None]
@@ -163,7 +163,7 @@ class Pace:
         return now - began, value - before
 
     def eta(self, end: float) -> str:
-        """How long it takes from the last value to the end, if that is known."""
+        """The time from the last value to the end, if that is known."""
         elapsed, advanced = self.lately()
         if not (elapsed > 0.0 and advanced > 0.0):
             return ""

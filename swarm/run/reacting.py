@@ -106,7 +106,7 @@ class ReactingRun(BaseRun):
         return int(Status.INTERRUPTED), 0
 
     def _predict(self, rule: Rule, latest: float) -> bool:
-        """Where leases have ended new ones, and what is next for every particle; False where a halt came between.
+        """New leases where some have ended, and the next event of every particle; False where a halt came between.
 
         The clock keeps how many are done: what is left is done when the frame goes on.
         """

@@ -13,7 +13,7 @@ from ..scene import Scene
 
 
 class Seeding(NamedTuple):
-    """What random numbers depend on besides the impacts: the seed, and the number of the first particle of this run.
+    """The source of random numbers besides the impacts: the seed, and the number of the first particle of this run.
 
     That is 0 but for a shard: its particles are numbered as in the whole run.
     """

@@ -1,4 +1,4 @@
-"""How many impacts each member of each surface has had, counted by each thread by itself."""
+"""The number of impacts of each member of each surface, counted by each thread by itself."""
 
 import threading
 from typing import NamedTuple
@@ -19,7 +19,7 @@ class Tally:
         self._counts: dict[int, Counts] = {}
 
     def counts(self) -> Counts:
-        """Those of the thread that calls."""
+        """The counts of the thread that calls."""
         return self._counts.setdefault(threading.get_ident(), Counts(np.zeros(len(self._surface), np.int64)))
 
     def total(self) -> NDArray[np.int64]:
@@ -41,7 +41,7 @@ class Tally:
 
 
 class Watched(NamedTuple):
-    """What becomes of impacts besides what they do: their log and their tally, None where there is none."""
+    """The records of impacts: their log and their tally, None where there is none."""
 
     log: Impacts | None = None
     tally: Tally | None = None

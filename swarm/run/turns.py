@@ -19,7 +19,7 @@ End = tuple[int, int, Halted | None]
 
 
 class Turns:
-    """How often the kernels of a thread have been called in turn for the particles that it has drawn."""
+    """The turns of the kernels of a thread for the particles that it has drawn."""
 
     def __init__(self, phase: NDArray[np.int8], contacts: Contacts | None, draws: Draws, drawn: int) -> None:
         self._phase, self._contacts, self._draws, self._drawn = phase, contacts, draws, drawn
@@ -27,7 +27,7 @@ class Turns:
         self._particles, self._left = np.empty(0, np.int64), np.empty(0)
 
     def end(self, watch: Watch) -> End | None:
-        """How the turns end before the next one: by a halt, or by a particle for which no time passes; or None.
+        """The end of the turns before the next one: by a halt, or by a particle for which no time passes; or None.
 
         Each turn of few passes asks for the halt, since many of them are passes too.
         """
@@ -57,7 +57,7 @@ class Turns:
 
 
 def left_behind(before: Halted, phase: NDArray[np.int8], now: list[Halted]) -> Halted:
-    """What halts have left in the lanes: `now`, and `before` what no lane has taken since."""
+    """The particles that halts have left in the lanes: `now`, and `before` what no lane has taken since."""
     picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(remaining.particle for remaining in now)])
     waiting = ~np.isin(before.particle, picked_up)
     parts = [Halted(before.particle[waiting], before.rows[:, waiting]), *now]

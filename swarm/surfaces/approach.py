@@ -100,6 +100,6 @@ class Approach(Record):
 
 
 def place(gravity, r, v, t, last):
-    """Where the steps of a flight have led it, and its velocity there; its start where there are no more of them."""
+    """The place after the steps of a flight, and the velocity there; its start where there are no more of them."""
     s = select(under_way(t, last), t, 0.0)
     return r + displacement(gravity, v, s), accelerated(gravity, v, s)

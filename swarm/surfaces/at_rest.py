@@ -31,7 +31,7 @@ class AtRest(Record):
         return ZERO
 
     def carry(self, r):
-        """Where what is at a point of the wall at the start of a step is at its end."""
+        """The place at the end of a step of a point of the wall at its start."""
         return r
 
     def displacement(self):
@@ -55,7 +55,7 @@ class AtRest(Record):
         return math.inf
 
     def mean_velocity(self, r0, r1, h):
-        """How fast what the wall is made of moves in the mean of a step of length h from r0 to r1, both on it.
+        """The mean velocity of the wall's material in a step of length h from r0 to r1, both on it.
 
         As far as the surface changes with it: a rotation that leaves the surface as it is does not count.
         """
@@ -92,5 +92,5 @@ class AtRest(Record):
     flat = False
 
     def flat_normal(self):
-        """That normal, with either sign, or None."""
+        """The normal, with either sign, or None."""
         return

@@ -34,7 +34,7 @@ def length_of(length):
 
 
 def image_of(length, x):
-    """How many lengths to the cell a coordinate is."""
+    """The number of lengths from a coordinate to the cell."""
     if length is None:
         return 0.0
     length = length_of(length)
@@ -128,7 +128,7 @@ def time_far(length, x, v, pull):
 
 
 def room_along(length):
-    """How much farther along an axis a flight may end for the sake of its time."""
+    """The distance by which a flight may end farther along an axis for the sake of its time."""
     return _LATER * length if has_faces(length) else math.inf
 
 

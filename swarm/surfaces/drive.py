@@ -1,4 +1,4 @@
-"""How a wall moves: its motion as kernels take it in one frame, and where it is at one instant.
+"""The motion of a wall as kernels take it in one frame, and its pose at one instant.
 
 A wall xi of the frame is at x = c + d + A (xi - c), with the displacement d(t) and the rotation A(t) about c. Times
 count back from the end of the frame under way, so that they have the digits of a frame and not those of the run.
@@ -37,7 +37,7 @@ class Rows(Record):
 
 
 class Pose(Record):
-    """Where a wall is at one instant: d, d', d'' and the rows of A, or None."""
+    """The pose of a wall at one instant: d, d', d'' and the rows of A, or None."""
 
     shift: Vec
     velocity: Vec
@@ -181,7 +181,7 @@ class Drive(Record):
         return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
 
     def angular_speed(self):
-        """How fast the surface turns [rad/s]."""
+        """The angular speed of the surface [rad/s]."""
         return 0.0 if self.turn is None else abs(self.turn.rate)
 
 

@@ -44,7 +44,7 @@ class Gaps(Record):
 
 
 def _time_in(gap, length, x, v, pull):
-    """How long a coordinate stays in a gap; 0 where it is not in it, or there is none."""
+    """The time that a coordinate stays in a gap; 0 where it is not in it, or there is none."""
     if gap is None:
         return 0.0
     if isinstance(gap, Gap):
@@ -67,7 +67,7 @@ def _time_to_reach(pull, far, v, below):
 
 
 def _time_in_gaps(gaps, period, gravity, motion):
-    """How long a flight stays in a gap."""
+    """The time that a flight stays in a gap."""
     (r, v), (gx, gy, gz) = motion, pulls(gravity)
     x = _time_in(gaps.x, period.x, r.x, v.x, gx)
     y = _time_in(gaps.y, period.y, r.y, v.y, gy)
@@ -136,5 +136,5 @@ def _across(length, v):
 
 
 def _passed(length):
-    """How far it is from a face to the other; there is none where nothing repeats."""
+    """The distance from a face to the other; there is none where nothing repeats."""
     return math.inf if length is None else length_of(length)

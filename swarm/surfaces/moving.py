@@ -24,7 +24,7 @@ class Moving(Record):
     posed, accelerates = Posed, True
 
     def count(self):
-        """How many walls a field has."""
+        """The number of walls of a field."""
         return self.body.count()
 
     def during(self, remaining, after):

@@ -133,7 +133,7 @@ def _gap(surface: Surface, sign: float) -> Any:
 
 
 def _sign(opening: Surface) -> float:
-    """That of phi where the volume is not."""
+    """The distance that phi gives where the volume is not."""
     return 1.0 if isinstance(opening, Many) else side_of(opening)
 
 

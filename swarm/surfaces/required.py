@@ -1,4 +1,4 @@
-"""What a surface lacks for its use, methods or a box in which it is known: an error before anything is compiled."""
+"""Checks that a surface has the methods, and the box in which it is known, that its use needs, before compilation."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any

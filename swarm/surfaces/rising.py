@@ -34,7 +34,7 @@ class Flight(Record):
     weight: float  # |G|
 
     def place(self, t):
-        """Where the particle is after a time."""
+        """The place of the particle after a time."""
         return self.r + t * (self.v + (0.5 * t) * self.pull)
 
     def velocity(self, t):

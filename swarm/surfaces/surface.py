@@ -130,7 +130,7 @@ class Surface:
         return []
 
     def open_faces(self) -> list[HalfSpace]:
-        """Where the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
+        """The faces at which the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
         return []
 
     def known_in(self) -> Box | None:

@@ -18,7 +18,7 @@ class Field(Record):
     members: Any
 
     def count(self):
-        """How many they are."""
+        """Their number."""
         return self.members.count()
 
 
@@ -86,11 +86,11 @@ class Walls(Record):
         return Walls(tuple(wall for wall in self.each if not isinstance(wall, Field)))
 
     def count_in_fields(self):
-        """How many walls its fields have."""
+        """The number of walls of its fields."""
         return sum((wall.count() for wall in self.each if isinstance(wall, Field)), 0.0)
 
     def length(self):
-        """How many rows there are, one for a field: a constant for the compiler if none is `Listed`."""
+        """The number of rows, one for a field: a constant for the compiler if none is `Listed`."""
         rows = 0
         for wall in self.each:
             rows += int(wall.count()) if isinstance(wall, Listed) else 1

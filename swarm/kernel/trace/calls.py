@@ -55,7 +55,7 @@ def _extreme(function: Any, farther: Any, *values: Any) -> Any:
 
 
 def _extreme_of(farther: Any, values: Any) -> Any:
-    """That of an array which is not empty."""
+    """Reduction of an array which is not empty."""
     found = values[0]
     for k in range(1, values.shape[0]):
         found = select(farther(values[k], found), values[k], found)
@@ -156,7 +156,7 @@ def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> 
 
 
 def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    """What a Python function gives, noting what it does."""
+    """The result of a Python function, whose operations are noted."""
     frame = Frame(called)
     twin_of(function, frame)(*given, **named)
     return frame.result()

@@ -18,7 +18,7 @@ Put = Callable[[tuple[Any, ...]], None]
 
 
 class Decisions:
-    """What `twins.py` makes of `if`, `and`, `or`, `not`, `in` and `return` calls this.
+    """The function that `twins.py` calls for `if`, `and`, `or`, `not`, `in` and `return` calls this.
 
     The statements inside of `if` and loops are functions of no arguments that return NEXT, or DONE where the end is not
     reached; `get` and `put` are the variables that they assign.
@@ -46,7 +46,7 @@ class Decisions:
         return DONE
 
     def result(self) -> Any:
-        """What the function returns."""
+        """The value that the function returns."""
         if not self._gives:
             return self._only
         return self._met(self._exit, self._gives)

@@ -64,7 +64,7 @@ def _is_argument(given: Any) -> bool:
 
 
 def key_of(given: Any) -> Any:
-    """What tells one part of a helper from another: the types of its arguments, and what is known of them."""
+    """The key of a part of a helper: the types of its arguments, and what is known of them."""
     if isinstance(given, tuple):
         return (type(given), *map(key_of, given))
     return ("a number", kind_of(given)) if _is_argument(given) else (type(given), given)
@@ -81,7 +81,7 @@ def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
 
 
 class _Writer:
-    """Where notes are emitted: the values and the places that are known here."""
+    """The state of an emission: the values and the places that are known here."""
 
     def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
         self._context, self._builder, self._values = context, builder, values
@@ -182,7 +182,7 @@ class _Writer:
             store_item(self._context, self._builder, kind, self.cast(note.value, kind.dtype), place)
 
     def _address(self, array: Value, place: tuple[Any, ...]) -> Any:
-        """Where an element is. A negative index counts from the end, as in Numba."""
+        """The address of an element. A negative index counts from the end, as in Numba."""
         builder, model = self._builder, default_manager[array.kind]
 
         def field(name: str, *path: int) -> Any:

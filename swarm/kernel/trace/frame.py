@@ -179,7 +179,7 @@ class Range:
         self._given = start, stop, step
 
     def known(self) -> range | None:
-        """What it is in Python."""
+        """Its value in Python."""
         return None if has_value(self._given) else range(*map(int, self._given))
 
     def __iter__(self) -> Iterator[int]:

@@ -46,7 +46,7 @@ class Helper:
         self.errors: dict[Any, Exception] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
-        """What a call of it gives, in a trace."""
+        """The result of a call of it, in a trace."""
         if named or len(given) < len(self.signature.parameters):
             bound = self.signature.bind(*given, **named)
             bound.apply_defaults()
@@ -80,7 +80,7 @@ class Helper:
         return self._whole[kinds]
 
     def known(self, kinds: tuple[Any, ...]) -> Part | None:
-        """What `whole` has found."""
+        """The result of `whole`."""
         return self._whole.get(kinds)
 
     def _part(self, given: Any) -> Part | None:
@@ -124,7 +124,7 @@ def _tell(function: Any, error: Exception) -> None:
 
 
 def leaving(options: Any) -> Callable[[Any, Exception], None]:
-    """What a trace does with a function of the user's that it cannot trace: Numba compiles it with these options."""
+    """The way of a trace with a function of the user's that it cannot trace: Numba compiles it with these options."""
 
     def leave(function: Any, error: Exception) -> None:
         _tell(function, error)
@@ -182,7 +182,7 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_ke
 
 
 def _definition(function: Any, body: Any) -> Any:
-    """What Numba asks for the function to compile, for the types of arguments."""
+    """The function that Numba compiles for the types of arguments."""
 
     @functools.wraps(function)
     def compiled(*kinds: Any, **named: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What is noted of a helper: operations, and the ways through it."""
+"""Notes of a helper: operations, and the ways through it."""
 
 import contextlib
 import threading

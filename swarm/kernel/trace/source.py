@@ -54,7 +54,7 @@ def _inner(code: types.CodeType) -> types.CodeType:
 
 
 def _told(code: types.CodeType) -> Any:
-    """What tells two functions of one line apart; code itself depends on what the file imports."""
+    """The difference of two functions of one line; code itself depends on what the file imports."""
     return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
 
 

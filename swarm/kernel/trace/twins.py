@@ -145,7 +145,7 @@ class _Writer(Expressions, ast.NodeTransformer):
         return TraceError(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
 
     def visit(self, node: Any) -> Any:
-        """What stands in the twin for a node."""
+        """The node of the twin for a node."""
         if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
             raise self._refused(node, f"`{type(node).__name__.lower()}`")
         return super().visit(node)
@@ -185,7 +185,7 @@ class _Writer(Expressions, ast.NodeTransformer):
         return [get, definition(f".put{number}", arguments(".values"), body)]
 
     def _goes_on(self, call: ast.expr) -> ast.If:
-        """What follows is reached only where the call says so."""
+        """The statements that are reached only where the call says so."""
         test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(load(FRAME), "NEXT", ast.Load())])
         return ast.If(test, [ast.Return(ast.Constant(False))], [])
 

@@ -195,7 +195,7 @@ def is_defined(value: Any) -> bool:
 
 
 def leaves(value: Any) -> list[Any]:
-    """What a record is made of, in its order."""
+    """The parts of a record, in its order."""
     return [leaf for part in value for leaf in leaves(part)] if isinstance(value, tuple) else [value]
 
 

@@ -209,7 +209,7 @@ def _try(contacts, state):
 
 
 def _begin_trial(contacts, state):
-    """How long the steps of a trial are, and from where its first stage goes."""
+    """The lengths of the steps of a trial, and the start of its first stage."""
     rule, lanes, pace = contacts.rule, contacts.lanes, contacts.pace
     for i in range(pace.h.size):
         whole = select(pace.remaining[i] <= _SAME * rule.dt, pace.remaining[i], rule.dt)

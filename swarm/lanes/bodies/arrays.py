@@ -69,7 +69,7 @@ class Touching(NamedTuple):
         return first, last
 
     def width(self, name, found):
-        """How many directions of each contact matter: the normal, or the tangents too, where there is friction."""
+        """The number of directions of each contact: the normal, or the tangents too, where there is friction."""
         rough = False
         for a in range(found):
             rough = rough or self.friction[name[a, 1]] > 0.0
@@ -77,7 +77,7 @@ class Touching(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """How a step is taken."""
+    """The rule of a step."""
 
     dt: float
     stages: Any  # (S,) lengths of the stages of a composed step, in units of the step

@@ -46,7 +46,7 @@ class Constrained(Record):
     active: Held
 
     def launch(self):
-        """Where the stage would end without ties, p, and D for that."""
+        """The end p of the stage without ties, and D for that."""
         ties, lanes, pace = self.ties, self.lanes, self.pace
         count = pace.h.size
         for row in range(lanes.p.shape[0]):
@@ -147,7 +147,7 @@ class Constrained(Record):
     # --- Newton's method
 
     def residual(self, turn):
-        """How far each tie is from its equation, as an error of |y1|^2; which lanes need one correction at most."""
+        """The residual of each tie, as an error of |y1|^2; which lanes need one correction at most."""
         ties, lanes, pace = self.ties, self.lanes, self.pace
         f, count, rows = lanes.f, pace.h.size, ties.ends.shape[0]
         links, soft = ties.links, ties.links + ties.springs
@@ -286,7 +286,7 @@ class Constrained(Record):
         return (2.0 if row < self.ties.ends.shape[0] else 1.0) * column(self.lanes.y1, 3 * row, i)
 
     def worst(self, i):
-        """How far ties and guides are from their equations: the worst, in units of round-off."""
+        """The worst residual of ties and guides, in units of round-off."""
         error, f = self.pace.error[i] / self.rule.noise, self.lanes.f
         for row in range(f.shape[0] - self.touching.guides, f.shape[0]):
             error = max(error, abs(f[row, i]) / self.rule.room)

@@ -154,7 +154,7 @@ class Contacts(Constrained):
 
 
 def count_at(walls, span, c):
-    """How many walls of a span a point may be at: of a field those of its cell."""
+    """The number of walls of a span that a point may be at: of a field those of its cell."""
     first, last = span
     fields = walls.fields()
     if len(fields) == 0 or first > 0:

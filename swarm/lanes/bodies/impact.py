@@ -180,7 +180,7 @@ class Blow(Record):
                 system[a, b] = s / system[b, b] if b < a else math.sqrt(s)
 
     def respond(self):
-        """How the velocities of contacts answer impulses at them."""
+        """The Delassus matrix: the answer of the velocities of contacts to impulses at them."""
         couplings, system, answer, schur = self.bodies.ties.couplings, self.system, self.answer, self.schur
         rows, m = answer.shape
         for a in range(rows):

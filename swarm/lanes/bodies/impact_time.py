@@ -29,7 +29,7 @@ def halve(bodies, i):
 
 @outlined
 def look(bodies, i, larger):
-    """Where to cut a step that ends outside; contacts that last may end outside by `larger`."""
+    """The time at which a step that ends outside is cut; contacts that last may end outside by `larger`."""
     touching, walls, rule, lanes, pace = bodies.touching, bodies.walls, bodies.rule, bodies.lanes, bodies.pace
     tau = pace.step[i]
     pace.stuck[i] += 1

@@ -153,7 +153,7 @@ class _Run:
         return seen
 
     def _outcome(self, future: Any, k: int) -> tuple[str, str]:
-        """What became of a shard: its state, and the sentence of a failure."""
+        """The end of a shard: its state, and the sentence of a failure."""
         if future.status == "finished":
             state, sentence = future.result()
             return state, sentence

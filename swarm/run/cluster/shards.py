@@ -32,7 +32,7 @@ _ARRAYS = ("position", "velocity", "mass", "image")
 
 
 class Whole(NamedTuple):
-    """What all shards of a run have in common; the start is in files."""
+    """The common part of all shards of a run; the start is in files."""
 
     scene: Scene
     method: Method
@@ -118,7 +118,7 @@ def clear(folder: Path) -> None:
 
 
 def _names(name: str) -> set[str]:
-    """What the first word of our files may be; those of locks and of parts begin with a point."""
+    """The first words of our files; those of locks and of parts begin with a point."""
     word = name.partition(".")[0]
     return {"", "whole", *_ARRAYS, *([word] if word.isdigit() else [])}
 
@@ -174,7 +174,7 @@ def write_end(path: Path, end: End) -> None:
 
 
 def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
-    """How all shards ended; without observables and wall time."""
+    """The end of all shards; without observables and wall time."""
     n = bounds[-1]
     whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
     members: list[NDArray[np.int64]] = []

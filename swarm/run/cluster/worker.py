@@ -1,4 +1,4 @@
-"""What runs on a worker: one shard, from its start or from its checkpoint; and what the client asks of a worker."""
+"""The work of a worker: one shard, from its start or from its checkpoint; and what the client asks of a worker."""
 
 import contextlib
 import dataclasses

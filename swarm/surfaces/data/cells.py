@@ -162,7 +162,7 @@ def _grown(cells: Mask) -> Mask:
 
 
 def _distance(grown: Mask, width: Floats) -> NDArray[np.float32]:
-    """How far each cell is at least from those that `grown` was grown from: as far as centres are from `grown`."""
+    """The least distance of each cell from those that `grown` was grown from: as far as centres are from `grown`."""
     farthest = float(_FARTHEST * width.min())
     squares = np.where(grown, np.float32(0.0), np.float32(farthest * farthest))
     for axis in range(3):

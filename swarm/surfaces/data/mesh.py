@@ -97,7 +97,7 @@ def _distance(axes: list[Floats], mesh: triangles.Mesh) -> Floats:
 
 
 def _error(made: Sampled, mesh: triangles.Mesh) -> float:
-    """How far the surface is from the vertices, the middles of the edges and of the triangles of the mesh."""
+    """The distance of the surface from the vertices, the middles of the edges and of the triangles of the mesh."""
     from scipy.spatial import KDTree
 
     corners = mesh.vertices[mesh.triangles]

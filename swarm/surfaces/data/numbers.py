@@ -165,7 +165,7 @@ class CellNumbers(contract.Smooth):
         return t
 
     def _free_time(self, cell, r, v, pull):
-        """How long a flight surely meets no surface, from outside of the grid or from a cell that has none."""
+        """A time in which a flight surely meets no surface, from outside of the grid or from a cell that has none."""
         if not cell.inside:
             return self._until_in(r, v, pull) if self.closed > 0.0 else math.inf
         if cell.clear > 0.0:

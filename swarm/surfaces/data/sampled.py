@@ -82,7 +82,7 @@ class Sampled(Surface):
             object.__setattr__(self, "_made", Samples(self.values, self.spacing))
 
     def __repr__(self) -> str:
-        """How many samples there are, and where."""
+        """The number of samples, and their place."""
         shape = " x ".join(map(str, self.values.shape))
         parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
         named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]

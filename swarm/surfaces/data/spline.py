@@ -25,7 +25,7 @@ MARGIN = 1e-6
 
 
 def coefficients(values: Floats) -> Floats:
-    """Those of the spline through samples, along each axis."""
+    """The coefficients of the spline through samples, along each axis."""
     found = values
     for axis in range(3):
         found = along(found, axis)
@@ -33,7 +33,7 @@ def coefficients(values: Floats) -> Floats:
 
 
 def along(values: Floats, axis: int) -> Floats:
-    """Those of the splines through samples along one axis, in which the outermost two cells share one polynomial.
+    """The coefficients of the splines along one axis, in which the outermost two cells share one polynomial.
 
     (c[i] + 4 c[i+1] + c[i+2])/6 = f[i]; with c[0] - 4 c[1] + 6 c[2] - 4 c[3] + c[4] = 0 the third derivative has no
     jump next to the end ("not a knot"), and the error is of order 4 up to it.

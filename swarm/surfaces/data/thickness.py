@@ -109,7 +109,7 @@ def _normals(mesh: Mesh) -> tuple[Floats, Floats]:
 
 
 def _thin_places(mesh: Mesh, normals: Floats, areas: Floats, spacing: float) -> _Thin:
-    """Where a ball that touches the mesh, as wide as a wall that is resolved, meets another side of it."""
+    """The place where a ball that touches the mesh, as wide as a wall that is resolved, meets another side of it."""
     counts = np.maximum(np.ceil(_DENSITY * areas / spacing**2), 1.0).astype(np.int64)
     at = np.repeat(np.arange(len(areas)), counts)
     # Across all triangles, not in each: small ones have one point.

@@ -76,7 +76,7 @@ class Order(NamedTuple):
         return [*many, *((i, -1) for group in self.groups for i in group), *walls]
 
     def compiled(self, surfaces: Sequence[Surface]) -> int:
-        """How many walls kernels are compiled for."""
+        """The number of walls that kernels are compiled for."""
         return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.others)
 
 

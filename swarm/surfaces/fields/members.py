@@ -48,7 +48,7 @@ class Members(Record):
         return math.inf
 
     def count(self):
-        """How many they are."""
+        """Their number."""
         return float(self.table.shape[0])
 
     def wall(self, number):
@@ -67,7 +67,7 @@ class Members(Record):
     # --- Of those in the cell of a point ---
 
     def count_in_cell(self, r):
-        """How many they are."""
+        """Their number."""
         first, stop = _entries_at(self.grid, r)
         return int(stop - first)
 
@@ -97,7 +97,7 @@ class Few(Members):
 
 
 def _entries_at(grid, r):
-    """Where the entries of the cell of a point begin and end."""
+    """The begin and the end of the entries of the cell of a point."""
     cell = index(cell_of(grid, r).number)
     return grid.first[cell], grid.first[cell + 1]
 
@@ -124,7 +124,7 @@ def gathered(like, table, m, k):
 
 
 def width(like):
-    """How many columns it takes: a constant for the compiler."""
+    """The number of columns: a constant for the compiler."""
     if isinstance(like, SphereNumbers):
         return 4
     return sum(map(width, like)) if isinstance(like, tuple) else 0 if like is None else 1

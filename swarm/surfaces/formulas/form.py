@@ -124,7 +124,7 @@ class Form:
         )  # fmt: skip
 
     def reach(self) -> float:
-        """How far the surface goes from its center."""
+        """The reach of the surface from its center."""
         if self.box is None:
             return self.size if math.isfinite(self.size) else 1.0
         return max(farthest(corner) for corner in self.box)
