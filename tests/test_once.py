@@ -37,7 +37,7 @@ caching.IndexDataCacheFile._save_index = late
 sys.path.insert(0, sys.argv[1])
 from twice import twice
 
-kernel = cache.kept(twice, {})
+kernel = cache.cached(twice, {})
 argument = {"int": 3, "float": 1.5}[sys.argv[2]]
 print("ready", flush=True)
 sys.stdin.readline()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .export import Exported, Moment
+from .exported import Exported, Moment
 from .origin import origin_of
 
 

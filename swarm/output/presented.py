@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from .export import Progress
+    from .exported import Progress
 
 
 class Presented(Stored):

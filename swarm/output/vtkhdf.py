@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .export import Exported
+from .exported import Exported
 
 VERSION = (2, 0)
 # In the order of the columns of CellOffsets and ConnectivityIdOffsets.

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from . import vtkhdf
-from .export import Exported
+from .exported import Exported
 from .shapes import Shape, shapes_of, since_start
 
 # Bodies of one surface that are drawn: each has some 200 vertices.

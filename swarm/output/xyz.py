@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from .export import Exported
+from .exported import Exported
 
 # The names that readers know; others stay as they are.
 _NAMES = {"position": "pos", "velocity": "velo", "mass": "mass"}

@@ -211,7 +211,7 @@ with session:
     folder, bounds = session.begin(task, 2)
     for k in range(2):
         assert worker.advance(folder, k) == ("complete", "")
-    joined.write(folder, task, bounds, session.identity)
+    joined.join(folder, task, bounds, session.identity)
     session.finish()
 """
 
