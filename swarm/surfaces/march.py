@@ -78,7 +78,6 @@ def first_met(flight):
     return t, -1.0
 
 
-@outlined
 def bisected(flight, low, high, wall):
     """(the last time between two at which a flight is past no wall, that which it is past then)."""
     for _i in range(_BISECTIONS):

@@ -135,7 +135,8 @@ class OwnNumbers(contract.Smooth):
         # least <= v.side H v <= most
         most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
         least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
-        time, wall = first_met(Straight(self, r, v, ZERO, t, end, least, most, math.sqrt(speed2)))
+        speed = math.sqrt(speed2)
+        time, wall = first_met(Straight(self, r, v, ZERO, t, end, least, most, speed, 2.0 * _EPSILON / speed))
         return time, wall >= 0.0
 
     def _in_box(self, r, v):
@@ -159,20 +160,22 @@ class Straight(Search):
     least: float
     most: float
     speed: float
+    resolved: float  # 2 eps over the speed
 
     def look(self, t, is_first):
         surface, p, speed = self.surface, self.r + t * self.v, self.speed
         level = surface.side * surface.phi(p)
         half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
-        # By round-off, or because the surface bends more than was said.
-        is_past = level > 0.0 and half > 0.0 and not is_first
+        if level > 0.0 and half > 0.0 and not is_first:
+            # By round-off, or because the surface bends more than was said.
+            return Look(t, 0.0, -1.0, 0.0)
         step = rise_time(level, half, self.most)
+        if not t + step <= self.end or not step < math.inf:
+            return Look(t, math.inf, -1.0, -1.0)
         # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
         rising = half + self.least * step
-        shortest = 2.0 * _EPSILON / speed * (total(absolute(p)) + speed * step)
+        shortest = self.resolved * (total(absolute(p)) + speed * step)
         arrives = (not is_first or rising > 0.0 or step == 0.0) and (
             step <= shortest or (self.most - self.least) * step * step <= 2.0 * shortest * rising
         )
-        is_over = not t + step <= self.end or not step < math.inf
-        wall = select(arrives and not is_over, 0.0, -1.0)
-        return Look(t, select(is_over, math.inf, step), wall, select(is_past, 0.0, -1.0))
+        return Look(t, step, select(arrives, 0.0, -1.0), -1.0)
