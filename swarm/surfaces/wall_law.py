@@ -11,9 +11,8 @@ from ..kernel.random import Stream
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot
 
-# Impacts with which a law is tried before a run.
-_TRIED = 64
-_ROUND_OFF = 1e-15
+# Impacts with which a law is tried before a run, and the speed into the wall that is none, as a part of that of these.
+_TRIED, _ROUND_OFF = 64, 1e-15
 
 
 class WallLaw(Record):
@@ -24,6 +23,10 @@ class WallLaw(Record):
     thermal wall of the particles that this does not accommodate. A particle that it leaves so slowly that it is back at
     once (`shortest_flight` of `Impact`) slides or rests, by the restitution and the friction of the surface. What it
     changes of the energy is heat that the wall gives.
+
+    Raises:
+        SceneError: by the surface: no `leave`, a field that is no finite number, a velocity into the wall in a trial.
+        RunError: such a velocity during a run.
 
     Example:
         >>> import swarm

@@ -104,6 +104,49 @@ def test_a_restitution_of_ones_own_is_that_of_the_package(name, gravity):
     assert own.observables["impulse"][-1] == pytest.approx(known.observables["impulse"][-1], rel=1e-9, abs=1e-12)
 
 
+HOLE = swarm.Sphere(0.15, (0.0, 0.0, 0.5))
+SCENES = {
+    "cell": lambda **law: swarm.Scene([swarm.Sphere(0.3, (0.1, 0, 0), "outside", **law)], None, (1.0, 1.0, 1.0)),
+    "cell over a floor": lambda **law: swarm.Scene(
+        [swarm.Slab((0, 0, 1), 0.5, **law), swarm.Sphere(0.3, (0.1, 0, 0), "outside", **law)], G, (1.0, 1.0, None)
+    ),
+    "opening": lambda **law: swarm.Scene([swarm.Sphere(0.5, openings=[HOLE], **law)], (0.5, 0.0, -1.0)),
+    "opening, straight": lambda **law: swarm.Scene([swarm.Sphere(0.5, openings=[HOLE], **law)]),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_in_cells_through_openings_and_in_the_log_too(name, tmp_path):
+    results, logs = [], []
+    for k, law in enumerate(({"laws": [Restitution(0.9)]}, {"restitution": 0.9})):
+        scene = SCENES[name](**law)
+        start = swarm.fill(scene, 40, speed=1.0, seed=2)
+        log = tmp_path / f"{k}.h5"
+        results.append(swarm.simulate(scene, start, swarm.Impact(), until=1.0, impacts=log, compile="never"))
+        logs.append(swarm.load_impacts(log))
+    own, known = results
+    assert own.particles.position == pytest.approx(known.particles.position, abs=1e-12)
+    impacts, escaped = (own.observables[name][-1] for name in ("impacts", "escaped"))
+    assert impacts == known.observables["impacts"][-1] > 10
+    assert escaped == known.observables["escaped"][-1]
+    # An escape has a row of its own.
+    assert len(logs[0]) == len(logs[1]) == impacts + escaped
+    lost = known.observables["dissipated_energy"][-1]
+    assert -own.observables["wall_heat"][-1].sum() == pytest.approx(lost, rel=1e-9)
+
+
+def test_a_run_is_not_resumed_by_another_law(tmp_path):
+    start = swarm.fill(swarm.Scene([swarm.Sphere(0.5)]), 5, speed=1.0, seed=1)
+
+    def simulate(e, **options):
+        scene = swarm.Scene([swarm.Sphere(0.5, laws=[Restitution(e)])])
+        return swarm.simulate(scene, start, swarm.Impact(), trajectory=tmp_path / "run.h5", every=0.5, **options)
+
+    simulate(0.9, until=1.0)
+    with pytest.raises(swarm.SwarmError, match=r"Restitution|scene"):
+        simulate(0.8, until=2.0, resume=True)
+
+
 @pytest.mark.parametrize(
     ("name", "laws", "gravity"),
     [
