@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         Ellipsoid,
         Ellipsoids,
         Formula,
+        Intersection,
         OwnSurface,
         Paraboloid,
         Plane,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
         Sphere,
         Spheres,
         Torus,
+        Union,
     )  # fmt: skip
     from .surfaces.data.mesh import from_mesh
     from .surfaces.wall_law import WallLaw
@@ -76,7 +78,8 @@ _HOMES = {
     "surfaces.data.mesh": ("from_mesh",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
+        "Intersection", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
+        "Union",
     ),
     "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
@@ -85,11 +88,11 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty",
-    "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres",
-    "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Verlet", "WallLaw", "WallTimeError",
-    "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts",
-    "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "Impact", "ImpactLog", "Intersection", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path",
+    "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere",
+    "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet",
+    "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh",
+    "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

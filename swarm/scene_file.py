@@ -192,15 +192,15 @@ def _with_bodies(surfaces: Any, path: Path) -> Any:
     """The tables of the surfaces, with the bodies of those that take them from a file."""
     if not isinstance(surfaces, list):
         return surfaces
-    return [
-        _bodies_of(samples_of(table, f"surface[{i}]", path), f"surface[{i}]", path) for i, table in enumerate(surfaces)
-    ]
+    return [_bodies_of(table, f"surface[{i}]", path) for i, table in enumerate(surfaces)]
 
 
 def _bodies_of(table: Any, where: str, path: Path) -> Any:
-    if isinstance(table, dict) and isinstance(table.get("openings"), list):
-        volumes = [_bodies_of(one, f"{where}.openings[{k}]", path) for k, one in enumerate(table["openings"])]
-        table = {**table, "openings": volumes}
+    table = samples_of(table, where, path)
+    for key in tables.NESTED if isinstance(table, dict) else ():
+        if isinstance(table.get(key), list):
+            nested = [_bodies_of(one, f"{where}.{key}[{k}]", path) for k, one in enumerate(table[key])]
+            table = {**table, key: nested}
     if not isinstance(table, dict) or "from" not in table or table.get("kind") not in ALL_FIELDS:
         return table
     kind, name = ALL_FIELDS[table["kind"]], table["from"]

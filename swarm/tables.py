@@ -21,6 +21,8 @@ from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
 
 T = TypeVar("T")
+# What in the table of a surface are tables of surfaces.
+NESTED = ("openings", "part")
 # An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
 _LONG, _ARRAY = 1000, "sha256:"
 
@@ -34,13 +36,13 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None) -> Scene:
 
 
 def _surface_of(table: Any, where: str) -> Surface:
-    """A surface from its table, in which those of its openings may be."""
-    if isinstance(table, Mapping) and "openings" in table:
-        given = table["openings"]
-        if not isinstance(given, list):
-            raise SceneError(f"{where}.openings: expected [[surface.openings]] tables, got {given!r:.200}")
-        openings = [_surface_of(one, f"{where}.openings[{k}]") for k, one in enumerate(given)]
-        table = {**table, "openings": openings}
+    """A surface from its table, in which those of its openings and of its parts may be."""
+    for key in NESTED if isinstance(table, Mapping) else ():
+        if key in table:
+            given = table[key]
+            if not isinstance(given, list):
+                raise SceneError(f"{where}.{key}: expected [[surface.{key}]] tables, got {given!r:.200}")
+            table = {**table, key: [_surface_of(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
     return of_kind(table, where, ALL_SURFACES)
 
 
@@ -55,24 +57,26 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     Of a long array it holds the name, a digest, under which `arrays` get it; None: the numbers themselves.
     """
     if isinstance(described, OwnSurface):
-        return _with_openings(described.table(), described, arrays)
+        return _with_nested(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
     table = {key: value for key, value in given.items() if value is not None}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
-    return _with_openings({"kind": kinds[type(described)], **table}, described, arrays)
+    return _with_nested({"kind": kinds[type(described)], **table}, described, arrays)
 
 
-def _with_openings(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
-    """The table of a surface, with those of its openings if it has any, and the names of laws of one's own."""
+def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    """The table of a surface, with those of its openings and parts, and the names of laws of one's own."""
     if isinstance(described, Surface):
         del table["openings"], table["laws"]
         if described.laws:
             table["laws"] = [law if isinstance(law, str) else repr(law) for law in described.laws]
         if described.openings:
             table["openings"] = [table_of(opening, arrays) for opening in described.openings]
+        if "part" in table:
+            table["part"] = [table_of(part, arrays) for part in table["part"]]
     return table
 
 
@@ -96,8 +100,9 @@ def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
         raise SceneError(
             f"surface.values: expected the samples, got {held['values']!r:.80}; a trajectory names no file"
         )
-    if "openings" in held:
-        held["openings"] = [with_arrays(opening, arrays) for opening in held["openings"]]
+    for key in NESTED:
+        if key in held:
+            held[key] = [with_arrays(one, arrays) for one in held[key]]
     return held
 
 

@@ -24,6 +24,7 @@ from .shapes.slab import Slab
 from .shapes.sphere import Sphere
 from .shapes.torus import Torus
 from .surface import Surface
+from .union import Intersection, Union
 
 __all__ = [
     "ALL_FIELDS",
@@ -38,6 +39,7 @@ __all__ = [
     "Ellipsoid",
     "Ellipsoids",
     "Formula",
+    "Intersection",
     "OwnSurface",
     "Paraboloid",
     "Plane",
@@ -48,6 +50,7 @@ __all__ = [
     "Spheres",
     "Surface",
     "Torus",
+    "Union",
 ]
 
 # Many bodies of one kind.
@@ -72,5 +75,7 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "slab": Slab,
     "formula": Formula,
     "sampled": Sampled,
+    "union": Union,
+    "intersection": Intersection,
     **ALL_FIELDS,
 }

@@ -1,0 +1,313 @@
+"""Vessels of several parts: where a particle is admissible in any of them (`Union`), or in all (`Intersection`).
+
+Nested ones are flattened: what is admissible is a union of *rooms*, each the intersection of the admissible sides of
+surfaces. The *gap* of a part is its phi with the sign of its side, that of a room the largest gap of its surfaces, and
+that of the whole the least gap of its rooms.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import motion as motions
+from ..checks import Vector
+from ..errors import SceneError
+from .instant import box_of, has_room, planes_of, side_of
+from .polyhedron import polyhedron_bounds
+from .shapes.plane import Plane
+from .surface import UNBOUNDED, Box, Surface
+
+Floats = NDArray[np.float64]
+Room = tuple[Surface, ...]
+
+# Most rooms: each is compiled into the kernels.
+_MOST_ROOMS = 64
+# What is given to the whole holds for those of its parts that leave it at its default.
+_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion")
+# Of the extent, how far a room without end is searched for a point in it.
+_REACH = 2.0
+
+
+@dataclass(frozen=True, repr=False)
+class _Joined(Surface):
+    """What `Union` and `Intersection` have in common."""
+
+    parts: Any = field(metadata={"key": "part"})
+    side: str = "inside"
+
+    # The operation of the gaps of parts.
+    _of_gaps: ClassVar[Any] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        name = type(self).__name__
+        object.__setattr__(self, "parts", _parts(self.parts, name))
+        for what in ("rotation", "mass", "inertia"):
+            if getattr(self, what) is not None:
+                raise SceneError(
+                    f"{what} must be None for {name}, got {getattr(self, what)!r:.200}; give it to each of its parts"
+                )
+        for k, part in enumerate(self.parts):
+            if part.reacts():
+                raise SceneError(
+                    f"parts[{k}] must have no mass and no inertia, got {part!r:.200}: impacts move surfaces of the "
+                    "scene only; give it a motion"
+                )
+            if self.motion is not None and _moves(part):
+                raise SceneError(
+                    f"parts[{k}] must have no motion of its own where the {name} has one, got {part!r:.200}; give "
+                    "each part its motion, or the whole one"
+                )
+        if len(self.rooms) > _MOST_ROOMS:
+            raise SceneError(
+                f"parts must leave at most {_MOST_ROOMS} rooms, which are unions of parts taken together, got "
+                f"{len(self.rooms)}; list what they have in common as a surface of the scene"
+            )
+        _require_room(self)
+
+    @cached_property
+    def rooms(self) -> tuple[Room, ...]:
+        """The admissible side as a union of intersections of surfaces that are none of these, with their laws."""
+        rooms = [tuple(dict.fromkeys(room)) for room in self._rooms(self.side == "outside")]
+        # What parts have in common may be nothing.
+        return tuple(room for room in rooms if _may_have_volume(room)) if len(rooms) > 1 else tuple(rooms)
+
+    def _rooms(self, turned: bool) -> list[Room]:
+        """`rooms`, or those of what is not admissible."""
+        parts = [_handed_down(self, part) for part in self.parts]
+        given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, _Joined)
+                 else [(_turned(one) if turned else one,)] for one in parts]  # fmt: skip
+        if (self._of_gaps is np.minimum) ^ turned:
+            return [room for rooms in given for room in rooms]
+        if math.prod(map(len, given)) > _MOST_ROOMS:
+            raise SceneError(
+                f"parts must leave at most {_MOST_ROOMS} rooms, which are unions of parts taken together, got "
+                f"{math.prod(map(len, given))}; list what they have in common as a surface of the scene"
+            )
+        return [tuple(itertools.chain(*rooms)) for rooms in itertools.product(*given)]
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The surfaces of all rooms, one after the other."""
+        return tuple(itertools.chain(*self.rooms))
+
+    def walls(self) -> tuple[Any, ...]:
+        """The walls of these."""
+        return tuple(itertools.chain(*(surface.walls() for surface in self.surfaces())))
+
+    # --- For users ---------------------------------------------------------------------------------------
+
+    def size(self) -> float:
+        return float(min(part.size() for part in self.parts))
+
+    def extent(self) -> float:
+        return float(max(part.extent() for part in self.parts))
+
+    def bounds(self) -> Box:
+        if self.is_solid():
+            return UNBOUNDED
+        # The motion of the whole is none of its bounds.
+        still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
+        boxes = list(map(room_bounds, still))
+        low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def shifted(self, shift: Vector) -> "Surface":
+        return replace(self, parts=tuple(part.shifted(shift) for part in self.parts))
+
+    def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
+        return all(part.is_unturned_by(axis, center) for part in self.parts)
+
+    def phi(self, points: ArrayLike, time: float = 0.0) -> Floats:
+        """The least gap of the parts of a union, the largest one of an intersection, at points (3, N); shape (N,).
+
+        Where the surface moves, it is that of a time [s].
+        """
+        rows = self._own_points(points, time)
+        return np.asarray(self._of_gaps.reduce(self._gaps(rows, time)))
+
+    def gradient(self, points: ArrayLike, time: float = 0.0) -> Floats:
+        """Gradient of that phi, of the part whose gap it is, at points (3, N); shape (3, N)."""
+        rows = self._own_points(points, time)
+        gaps = self._gaps(rows, time)
+        least = (np.argmin if self._of_gaps is np.minimum else np.argmax)(gaps, axis=0)
+        found = np.zeros(rows.shape)
+        for k, part in enumerate(self.parts):
+            found = np.where(least == k, side_of(part) * part.gradient(rows, time), found)
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+
+    def _gaps(self, rows: Floats, time: float) -> Floats:
+        """The gaps of the parts; where one has no value it is not there."""
+        gaps = np.array([side_of(part) * part.phi(rows, time) for part in self.parts])
+        return np.where(np.isnan(gaps), math.inf, gaps)
+
+    def _own_points(self, points: ArrayLike, time: float) -> Floats:
+        rows = self._own_rows(points, time)
+        return np.array(np.broadcast_arrays(*rows))
+
+
+@dataclass(frozen=True, repr=False)
+class Union(_Joined):
+    """A vessel of several parts, which may overlap: who is in one of them is in the vessel.
+
+    A wall is there where it is in no other part. Parts that do not touch are separate rooms, and so are parts that
+    touch without overlapping: between them is a wall of no thickness. Each part has its laws, temperature, motion and
+    openings; what is given to the union holds for the parts that leave it out.
+
+    In a scene file: kind = "union" and [[surface.part]] tables.
+
+    Args:
+        parts: surfaces of any kinds, also unions and intersections; each with its own `side`.
+        side: "inside", or "outside": a solid of several parts.
+
+    Raises:
+        SceneError: no part, one without a volume, or a union without an inside.
+
+    >>> import swarm
+    >>> Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))]).phi([[0.3, 1.2], [0.0, 0.0], [0.0, 0.0]])
+    array([-0.2,  0.1])
+    """
+
+    _of_gaps: ClassVar[Any] = np.minimum
+
+
+@dataclass(frozen=True, repr=False)
+class Intersection(_Joined):
+    """What several parts have in common, as one of the parts of a `Union`, or of a scene.
+
+    The surfaces of a scene are an intersection already. Each part has its laws, temperature, motion and openings; what
+    is given to the intersection holds for the parts that leave it out.
+
+    In a scene file: kind = "intersection" and [[surface.part]] tables.
+
+    Args:
+        parts: surfaces of any kinds, also unions and intersections; each with its own `side`.
+        side: "inside", or "outside": the space around what they have in common, a solid.
+
+    Raises:
+        SceneError: no part, or parts that have no volume in common.
+
+    >>> import swarm
+    >>> post = swarm.Cylinder(0.1, side="outside")
+    >>> Intersection([swarm.Sphere(0.5), post]).phi([[0.3, 0.05], [0.0, 0.0], [0.0, 0.0]]).round(3)
+    array([-0.2  ,  0.037])
+    """
+
+    _of_gaps: ClassVar[Any] = np.maximum
+
+
+# --- Their parts -----------------------------------------------------------------------------------------
+
+
+def _parts(value: Any, name: str) -> tuple[Surface, ...]:
+    """The argument `parts`, checked."""
+    if isinstance(value, (Surface, str, bytes)) or not isinstance(value, Iterable):
+        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
+    given = tuple(value)
+    if not given:
+        raise SceneError(f"parts must hold at least one surface of the {name}, got none")
+    for k, part in enumerate(given):
+        if not isinstance(part, Surface):
+            raise SceneError(f"parts[{k}] must be a surface such as swarm.Sphere, got {part!r:.200}")
+    return given
+
+
+def _moves(part: Surface) -> bool:
+    return part.motion is not None or (isinstance(part, _Joined) and any(map(_moves, part.parts)))
+
+
+def _handed_down(whole: Surface, part: Surface) -> Surface:
+    """A part with what is given to the whole, where it leaves that at its default."""
+    defaults = {one.name: one.default for one in fields(Surface)}
+    given = {
+        name: getattr(whole, name)
+        for name in _HANDED_DOWN
+        if getattr(part, name) == defaults[name] != getattr(whole, name)
+    }
+    if part.temperature is not None:
+        given.pop("accommodation", None)
+    if whole.openings:
+        given["openings"] = (*part.openings, *whole.openings)
+    return replace(part, **given) if given else part
+
+
+def _turned(surface: Surface) -> Surface:
+    """The same wall, admissible on its other side."""
+    if isinstance(surface, Plane):
+        x, y, z = surface.normal
+        return replace(surface, normal=(-x, -y, -z), offset=-surface.offset)
+    if not hasattr(surface, "side"):
+        raise SceneError(
+            f'side must be "inside" for parts of which one has no other side, got "outside" and {surface!r:.200}'
+        )
+    try:
+        return replace(surface, side="inside" if surface.is_solid() else "outside")  # type: ignore[call-arg]
+    except SceneError as error:
+        raise SceneError(
+            f"parts must have an other side where the whole is turned, got {surface!r:.200}: {error}"
+        ) from None
+
+
+# --- Their rooms -----------------------------------------------------------------------------------------
+
+
+def room_bounds(room: Sequence[Surface], time: float = 0.0) -> tuple[Floats, Floats]:
+    """The corners of a box around a room at a time [s], infinite where it is open."""
+    boxes = np.array([box_of(surface, time) for surface in room])
+    low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
+    planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
+    return polyhedron_bounds(planes, low, high) if planes else (low, high)
+
+
+def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
+    """The gap of every surface of a room at points (3, N)."""
+    return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
+
+
+def _require_room(whole: _Joined) -> None:
+    """Raise a `SceneError` where a part, or the whole, has no volume."""
+    for k, part in enumerate(whole.parts):
+        if not isinstance(part, _Joined) and not _has_volume((part,)):
+            raise SceneError(f"parts[{k}] must have a volume, got {part!r:.200}, of which no point is admissible")
+    if not any(map(_has_volume, whole.rooms)):
+        came = ", ".join(f"{part!r:.80}" for part in whole.parts)
+        if whole._of_gaps is np.maximum and not whole.is_solid():
+            raise SceneError(
+                f"parts must have a volume in common, got {came}, whose admissible sides have no point in common; "
+                "check their `side`, or leave one out"
+            )
+        raise SceneError(
+            f'parts must leave an inside of a {type(whole).__name__} with side="{whole.side}", got {came}, of which no '
+            "point is admissible; check their `side`"
+        )
+
+
+def _ends(room: Room) -> tuple[Floats, Floats]:
+    """The corners of the box in which a room is searched for a point."""
+    low, high = room_bounds(room)
+    reach = _REACH * max(surface.extent() for surface in room) or 1.0
+    return np.maximum(low, -reach), np.minimum(high, reach)
+
+
+def _may_have_volume(room: Room) -> bool:
+    low, high = _ends(room)
+    return bool((low < high).all())
+
+
+def _has_volume(room: Room) -> bool:
+    low, high = _ends(room)
+    gaps, gradients = _gaps_of(room), _gradients_of(room)
+    return bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients)
+
+
+def _gaps_of(room: Room) -> Callable[[Floats], Floats]:
+    return lambda points: room_gaps(room, points)
+
+
+def _gradients_of(room: Room) -> Callable[[int, Floats], Floats]:
+    return lambda i, points: side_of(room[i]) * room[i].gradient(points)
