@@ -32,16 +32,18 @@ def fill(
         speed: |v| of every particle [m/s], from 0 to 1e100, in a direction uniform on the sphere; or
         temperature: k_B T [J], from 0 to 1e100: each component of v is normal with variance temperature/mass. The mean
             kinetic energy of n particles is 3/2 of it by expectation only, with a relative standard deviation of
-            sqrt(2/(3 n)): 26 % of 10 particles, 0.8 % of 10 000.
+            sqrt(2/(3 n)): 26 % of 10 particles, 0.8 % of 10 000. In a scene with a plane there are two components, the
+            energy is k_B T, and its deviation sqrt(1/n).
         mass: one number or (n,) [kg], above 0.
         seed: the same seed gives the same particles.
-        exact: True: the velocities are scaled together, so that the mean kinetic energy is 3/2 temperature to
-            round-off. Their mean momentum stays as it is drawn, of the order of sqrt(mass temperature/n): walls change
-            it, and to take it out would leave fewer than 3 n degrees of freedom.
+        exact: True: the velocities are scaled together, so that the mean kinetic energy is 3/2 temperature (in a plane
+            1 temperature) to round-off. Their mean momentum stays as it is drawn, of the order of
+            sqrt(mass temperature/n): walls change it, and to take it out would leave fewer than 3 n degrees of freedom.
         radius: None: particles are points and do not meet one another.
 
     Returns:
-        The particles; their `volume` is the admissible volume [m^3], estimated from the random points.
+        The particles; their `volume` is the admissible volume [m^3], estimated from the random points; in a scene with
+        a plane all of them are in it, and it is the admissible area [m^2].
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
@@ -72,13 +74,14 @@ def fill(
     particles = Particles(points, np.zeros((3, n)), mass)
     particles.volume = volume
     particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
-    normal = random.standard_normal((3, n))
+    normal = np.zeros((3, n))
+    normal[scene.axes()] = random.standard_normal((len(scene.axes()), n))
     if speed is not None:
         particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))
     elif temperature is not None:
         if exact:
-            # Of each component, sum(m v^2)/3n = T where the sum of the squares is 3 n.
-            normal *= np.sqrt(normal.size / (normal**2).sum())
+            # Of each component, sum(m v^2)/3n = T where the sum of the squares is 3 n; of two in a plane 2 n.
+            normal *= np.sqrt(len(scene.axes()) * n / (normal**2).sum())
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
     return particles
 
@@ -98,9 +101,11 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
     """Admissible points, and the volume from their share of the random points of the bounding box."""
     low, high = bounding_box(scene, "fill", "the particles as arrays or a CSV file")
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
-    box = float(np.prod(high - low))
+    axes = scene.axes()
+    box = float(np.prod((high - low)[axes]))
     while found < n:
-        trial = low + (high - low) * random.random((3, _BATCH))
+        trial = np.zeros((3, _BATCH))
+        trial[axes] = low[axes] + (high - low)[axes] * random.random((len(axes), _BATCH))
         inside = trial[:, scene.admits(trial)]
         admissible += inside.shape[1]
         inside = inside[:, : n - found]
@@ -110,7 +115,7 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
         if tried >= _TRIES and found < 1e-6 * tried:
             raise SceneError(
                 f"fill found {found} admissible points in {tried} tries, a volume of about "
-                f"{box * found / tried:.2g} m^3: the admissible part of the box {low.ravel()} to {high.ravel()} "
-                "is below 1e-6 of it; give the particles as arrays or a CSV file"
+                f"{box * found / tried:.2g} m^{len(axes)}: the admissible part of the box {low.ravel()} to "
+                f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
             )
     return points, box * admissible / tried

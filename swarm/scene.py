@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks, notebook
 from . import motion as motions
-from .contact.laws import NONE, Laws, Moves, Owned, Span, Thermal
+from . import plane as planes
+from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
@@ -25,6 +26,7 @@ from .surfaces.moving import carried
 from .surfaces.openings import Opening, openings_in, require_few, volumes_of
 from .surfaces.period import Period, cell_in
 from .surfaces.surface import Surface
+from .surfaces.upright import upright
 from .surfaces.walls import Walls
 from .volume import Volume
 
@@ -46,10 +48,13 @@ class Scene(Volume):
             solid that reaches over a face is there on the other side too; a cavity is within the cell; and any other
             surface is the same all along the period, as a plane or an endless cylinder along it, and may move along
             it. Flights go on over any number of cells where no wall that repeats is in the way.
+        plane: None, or "x", "y" or "z": a billiard of two dimensions, whose particles stay in the plane x, y or z = 0.
+            Walls stand upright on it. `fill` and all pictures are of the plane, and what is said of volumes and areas
+            holds for areas and lengths: `Particles.volume` is an area [m^2], pressures are per length [N/m].
 
     Raises:
         SceneError: no surface, more than 24 walls with their images, surfaces that leave no volume, or one that does
-            not go with the period.
+            not go with the period or leans out of the plane.
 
     >>> import swarm
     >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
@@ -59,6 +64,7 @@ class Scene(Volume):
     surfaces: tuple[Surface, ...]
     gravity: checks.Vector | None
     period: Lengths | None
+    plane: str | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
     # The volumes in which every surface is open.
@@ -69,6 +75,7 @@ class Scene(Volume):
         surfaces: Sequence[Surface],
         gravity: Sequence[float] | None = None,
         period: Sequence[float | None] | None = None,
+        plane: str | None = None,
     ) -> None:
         surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
         if not surfaces:
@@ -80,10 +87,10 @@ class Scene(Volume):
         pull = None if gravity is None else checks.vector("gravity", gravity)
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
-        lengths = lengths_of(period)
+        lengths, plane = lengths_of(period), planes.checked(plane)
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
-        checks.assign(self, surfaces=surfaces, period=lengths, _images=images)
+        checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
         checks.assign(self, volumes=tuple(volumes_of(one, lengths, name) for one, name in named))
         self._require_few_walls("")
         require_few(self.volumes)
@@ -94,6 +101,8 @@ class Scene(Volume):
                 f"by one, at most {MOST_WALLS} walls in all"
             )
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
+        if plane is not None:
+            planes.require_all(plane, surfaces, pull, lengths)
         required.require_known(surfaces, lambda held: self._bounds(0.0, held))
         if not self._has_volume():
             raise SceneError(
@@ -103,8 +112,8 @@ class Scene(Volume):
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults, with the first of many surfaces."""
-        given = {"gravity": self.gravity, "period": self.period}
-        rest = "".join(f", {name}={value}" for name, value in given.items() if value is not None)
+        given = {"gravity": self.gravity, "period": self.period, "plane": self.plane}
+        rest = "".join(f", {name}={value!r}" for name, value in given.items() if value is not None)
         return f"Scene([{', '.join(notebook.shortened(self.surfaces))}]{rest})"
 
     def _repr_html_(self) -> str:
@@ -112,6 +121,7 @@ class Scene(Volume):
         rows = [("" if text.startswith("<") else f"surfaces[{i}]", text) for i, text in enumerate(texts)]
         rows += [("gravity", "none" if self.gravity is None else f"{self.gravity} m/s^2")]
         rows += [] if self.period is None else [("period", f"{self.period} m")]
+        rows += [] if self.plane is None else [("plane", f"{self.plane} = 0")]
         return notebook.table("Scene", rows)
 
     def _require_few_walls(self, why: str) -> None:
@@ -161,7 +171,7 @@ class Scene(Volume):
                 rows = tuple(map(tuple, rotations.matrix(turn).tolist()))
                 held = motions.Placed(tuple(np.array(positions)[i].tolist()), turn, rows)
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
-        return Scene(surfaces, self.gravity, self.period)
+        return Scene(surfaces, self.gravity, self.period, self.plane)
 
     def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
         """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
@@ -170,7 +180,7 @@ class Scene(Volume):
         """
         if self.moves():
             fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
-            return carried(fields, others, moment)
+            return self._upright(carried(fields, others, moment))
         if own is None:
             return self._walls
         return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
@@ -199,27 +209,9 @@ class Scene(Volume):
             self._of_walls([surface.friction for surface in self.surfaces], 0.0),
             self._of_walls([_thermal(surface) for surface in self.surfaces], _NO_HEAT),
             Moves(0.0) if self.moves() else None,
-            self._own_laws(),
+            owned_in([(self.owners_of_pieces[i], n) for i, n in self.order.spans(self._pieces)], self.surfaces),
         )
-        return None if laws == NONE else laws
-
-    def _own_laws(self) -> tuple[Owned, ...] | None:
-        """`Owned` of every surface that has laws of one's own, None where there is none."""
-        owned: list[Owned] = []
-        first = 0
-        for i, walls in self.order.spans(self._pieces):
-            laws = self.surfaces[self.owners_of_pieces[i]].laws
-            if any(isinstance(law, str) for law in laws):
-                raise SceneError(
-                    f"surfaces[{self.owners_of_pieces[i]}].laws: {laws[0]!r} is Python, of which a file holds the "
-                    "name; build the scene in Python, as the run's script does"
-                )
-            if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
-                owned[-1] = owned[-1]._replace(after=float(first + walls))
-            elif laws:
-                owned.append(Owned(laws, float(first), float(first + walls)))
-            first += walls
-        return tuple(owned) or None
+        return None if laws == NONE else laws.in_plane(self.across())
 
     def openings(self) -> tuple[Opening, ...] | None:
         """The openings of every wall of the scene as kernels take them, None where there are none."""
@@ -255,7 +247,12 @@ class Scene(Volume):
         def taken(members: Members) -> Members:
             return in_straight_flights(members, self.period is not None) if self.gravity is None else members
 
-        return walls_in(self.order, self._pieces, self._groups, (), taken)
+        return self._upright(walls_in(self.order, self._pieces, self._groups, (), taken))
+
+    def _upright(self, walls: Walls) -> Walls:
+        """Walls as a scene of two dimensions takes them."""
+        across = self.across()
+        return walls if across is None else upright(walls, across)
 
     def __getstate__(self) -> dict[str, Any]:
         # Whoever has a copy makes walls of its own: `apart` of other walls, a worker of what is compiled there.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .bodies.state import Bodies
     from .bodies.table import Made
 
-_TABLES = ("gravity", "period", "particles", "body", "surface", "method", "run")
+_TABLES = ("gravity", "period", "plane", "particles", "body", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
 
@@ -178,7 +178,7 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     return Job(
         scene=scene
         or tables.scene_of(
-            _with_bodies(document.get("surface"), path), document.get("gravity"), document.get("period")
+            _with_bodies(document.get("surface"), path), *(document.get(key) for key in ("gravity", "period", "plane"))
         ),
         method=tables.method_of(document["method"]),
         run=_run(document["run"]),

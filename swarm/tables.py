@@ -27,12 +27,12 @@ NESTED = ("openings", "part")
 _LONG, _ARRAY = 1000, "sha256:"
 
 
-def scene_of(surfaces: Any, gravity: Any, period: Any = None) -> Scene:
-    """A scene from its tables: a list of surface tables, gravity or None, and the period or None."""
+def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None) -> Scene:
+    """A scene from its tables: a list of surface tables; gravity, the period and the plane, or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
     built = [_surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
-    return Scene(surfaces=built, gravity=gravity, period=period)
+    return Scene(surfaces=built, gravity=gravity, period=period, plane=plane)
 
 
 def _surface_of(table: Any, where: str) -> Surface:
@@ -111,7 +111,8 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
     # TOML has no None.
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
-    return {**gravity, **period, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
+    plane = {} if scene.plane is None else {"plane": scene.plane}
+    return {**gravity, **period, **plane, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
 def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:
@@ -126,7 +127,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     names = {field.metadata.get("key", field.name): field for field in _kept(cls)}
     for key in table:
         if key not in names:
-            at_top = key in ("gravity", "period")
+            at_top = key in ("gravity", "period", "plane")
             hint = f"; {key} belongs at the top, before the first table" if at_top else closest(key, names)
             raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
     for key, field in names.items():

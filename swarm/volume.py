@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks
 from . import motion as motions
 from .particles import Particles
+from .plane import across_of
 from .surfaces.fields.many import Many
 from .surfaces.images import Lengths, cell_of, into_cell
 from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
@@ -30,6 +31,7 @@ class Volume:
     surfaces: tuple[Surface, ...]
     gravity: checks.Vector | None
     period: Lengths | None
+    plane: str | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...]
 
@@ -39,7 +41,15 @@ class Volume:
         if math.isfinite(smallest):
             return smallest
         low, high = self.bounds()
-        return min(b - a for a, b in zip(low, high, strict=True)) / 2.0
+        return min(high[k] - low[k] for k in self.axes()) / 2.0
+
+    def across(self) -> int | None:
+        """The axis across the plane of a scene of two dimensions, None where it has none."""
+        return across_of(self.plane)
+
+    def axes(self) -> list[int]:
+        """The axes along which particles may move."""
+        return [k for k in range(3) if k != self.across()]
 
     def finite_size(self) -> float:
         """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
@@ -120,7 +130,10 @@ class Volume:
         return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])
 
     def bounds(self, time: float = 0.0) -> Box:
-        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open."""
+        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open.
+
+        Across the plane of a scene of two dimensions it has no width.
+        """
         low, high = self._bounds(time, self.surfaces)
         return tuple(low.tolist()), tuple(high.tolist())
 
@@ -134,11 +147,13 @@ class Volume:
         planes = [plane for surface in surfaces for plane in planes_of(surface, surface.half_spaces(), time)]
         if planes:
             low, high = polyhedron_bounds(planes, low, high)
+        if (across := self.across()) is not None:
+            low[across] = high[across] = 0.0
         return low, high
 
     def _has_volume(self) -> bool:
         low, high = (np.array(corner) for corner in self.bounds())
-        if not (low < high).all():
+        if not (low < high)[self.axes()].all():
             return False
         # Open directions are searched as far as the scene itself extends.
         reach = 2.0 * self.extent()

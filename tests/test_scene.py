@@ -179,7 +179,7 @@ def test_every_wall_has_the_laws_of_its_surface():
     box = {"half_widths": (1.0, 1.0, 1.0)}
     lossy = Scene([Sphere(0.5, side="outside"), Box(**box, restitution=0.5)])
     assert by_surface(lossy, lossy.laws().restitution) == [(0, 1.0), *3 * [(1, 0.5)]]
-    assert lossy.laws()[1:] == (None, None, None, None)
+    assert lossy.laws()[1:] == (None, None, None, None, None)
     rough = Scene([Box(**box, friction=0.3), Sphere(0.5, side="outside", friction=0.1)])
     assert by_surface(rough, rough.laws().friction) == [*3 * [(0, 0.3)], (1, 0.1)]
     assert (rough.laws().restitution, rough.laws().thermal) == (None, None)

@@ -40,15 +40,20 @@ def exchange(laws, walls, wall, arriving, mass, random):
     happens, after = False, before
     if laws.thermal is not None:
         law, u = laws.thermal_of(wall), uniforms(random.seed, random.particle, random.number)
-        after, happens = flux_maxwellian(n, law.energy / mass, u), u.choice < law.accommodation
+        after = flux_maxwellian(n, law.energy / mass, u, laws.across)
+        happens = u.choice < law.accommodation
         happens = (b > 0.0) & happens
     for one in laws.own or ():
         acts = one.has(wall) & (b > slow) & (not happens)
         if acts:
             own = relative(moving, one.leave(v, -1.0 * n, ZERO if moving is None else moving, random, mass))
-            # What is no velocity, or one into the wall, ends the run when lanes are looked at (lanes/block.py).
+            # What is no velocity, or one into the wall or out of the plane, ends the run when lanes are looked at
+            # (lanes/block.py).
             into = _ROUND_OFF * (norm(v) + norm(own))
-            after = select(dot(own, n) <= into, own, Vec(math.nan, math.nan, math.nan))
+            is_right = dot(own, n) <= into
+            if laws.across is not None:
+                is_right = is_right & (laws.across.part(own) == 0.0)
+            after = select(is_right, own, Vec(math.nan, math.nan, math.nan))
         happens = happens | acts
     work = given(moving, after - before)
     return Left(happens, from_relative(moving, after), b, -dot(after, n), work)

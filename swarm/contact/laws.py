@@ -1,10 +1,13 @@
 """The laws of walls: restitution, Coulomb's friction, thermal walls, one's own. What no wall has is None."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import dot
+from ..surfaces.shapes.slab import AXES
 
 
 class Laws(Record):
@@ -15,6 +18,7 @@ class Laws(Record):
     thermal: Any  # None, or `Thermal` of each wall
     moving: Any  # None, or `Moves` where a wall moves
     own: Any = None  # None, or `Owned` of each surface that has laws of one's own
+    across: Any = None  # None, or the axis across the plane in which all particles stay
 
     @property
     def loses(self):
@@ -30,6 +34,10 @@ class Laws(Record):
     def give_heat(self):
         """Whether a wall may send a particle off by a law that gives or takes heat: a constant for the compiler."""
         return self.thermal is not None or self.own is not None
+
+    def in_plane(self, across):
+        """These laws in a scene whose plane is across the axis of this number, None where it has none."""
+        return self if across is None or not self.give_heat else self._replace(across=AXES[across](1.0))
 
     def restitution_of(self, wall):
         """e of a wall."""
@@ -104,3 +112,25 @@ def of_wall(given, wall, neutral=0.0):
     for here, value in reversed(each):
         found = select(here, value, found)
     return found
+
+
+def owned_in(spans: Iterable[tuple[int, int]], surfaces: Sequence[Any]) -> tuple[Owned, ...] | None:
+    """`Owned` of every surface that has laws of one's own, None where there is none.
+
+    `spans` are (number of a surface, how many walls in a row are of it).
+    """
+    owned: list[Owned] = []
+    first = 0
+    for i, walls in spans:
+        laws = surfaces[i].laws
+        if any(isinstance(law, str) for law in laws):
+            raise SceneError(
+                f"surfaces[{i}].laws: {laws[0]!r} is Python, of which a file holds the name; build the scene in "
+                "Python, as the run's script does"
+            )
+        if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
+            owned[-1] = owned[-1]._replace(after=float(first + walls))
+        elif laws:
+            owned.append(Owned(laws, float(first), float(first + walls)))
+        first += walls
+    return tuple(owned) or None

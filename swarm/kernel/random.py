@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from .jit import select
 from .record import Record
-from .vector import Vec
+from .vector import Vec, cross
 
 # Philox4x32-10 of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
 _ROUNDS = 10
@@ -146,13 +146,19 @@ def circle(u):
     return select((n == 1.0) | (n == 2.0), -x, x), select((n == 2.0) | (n == 3.0), -y, y)
 
 
-def flux_maxwellian(n, speed2, u):
+def flux_maxwellian(n, speed2, u, across=None):
     """The velocity with which a particle leaves a diffuse wall with the unit normal n, against n.
 
-    `speed2` is k_B T/m. The normal speed has the distribution 1 - exp(-w^2/(2 speed2)) of what passes a plane in a gas
-    at rest, the two tangential components are Gaussian (Box and Muller). The tangents are those of Duff et al.,
-    "Building an orthonormal basis, revisited" (JCGT 2017).
+    `speed2` is k_B T/m, `across` the axis across the plane that it stays in, or None. The normal speed has the
+    distribution 1 - exp(-w^2/(2 speed2)) of what passes a plane in a gas at rest, the two tangential components are
+    Gaussian (Box and Muller); in a plane there is one. The tangents are those of Duff et al., "Building an orthonormal
+    basis, revisited" (JCGT 2017).
     """
+    if across is not None:
+        cosine, _sine = circle(u.angle)
+        tangent = cross(across.scaled(1.0), n)
+        along = math.sqrt(-2.0 * speed2 * logarithm(u.tangential)) * cosine
+        return along * tangent - math.sqrt(-2.0 * speed2 * logarithm(u.normal)) * n
     sign = math.copysign(1.0, n.z)
     a = -1.0 / (sign + n.z)
     b = n.x * n.y * a

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -13,6 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike
 
 from ..particles import Floats
+from ..plane import along, shown_as
 from . import colours, series
 from .colours import Colours
 
@@ -25,6 +27,8 @@ _FEW_WIRES = 300
 # A direction in which a picture extends by less than this part of its widest one is drawn as flat.
 _FLAT = 1e-9
 _DPI = 100
+# Around a vessel that is seen from above, as a part of its width.
+_ROOM = 0.02
 # Matplotlib leaves room around 3-D axes: with this zoom a cube fills its cell, seen from where it is by default.
 _ZOOM, _AZIMUTH, _ELEVATION = 1.15, math.radians(-60.0), math.radians(30.0)
 # What a width, a depth and a height add to the width and to the height of the picture.
@@ -84,8 +88,15 @@ def frame(
     wires: list[tuple[bool, list[Floats]]],
     lines: tuple[Floats, Colours],
     faces: tuple[Floats, Colours],
+    across: int | None = None,
 ) -> None:
-    """A frame: `particles` of colours 0xRRGGBBAA, which bodies with faces do not show, and their `ties`."""
+    """A frame: `particles` of colours 0xRRGGBBAA, which bodies with faces do not show, and their `ties`.
+
+    `across` is the axis across the plane of a scene of two dimensions, whose axes are `view`s of it.
+    """
+    if across is not None:
+        flat(axes, across, points, red_green_blue(packed), wires)
+        return
     particles(axes, points, red_green_blue(packed), wires, 0.0 if len(faces[0]) else 1.0)
     ties(axes, lines, faces)
 
@@ -136,6 +147,42 @@ def particles(
     relative = (high - low) / np.sqrt(((high - low) ** 2).mean())
     axes.set_box_aspect(high - low, zoom=_ZOOM * (_SEEN.sum(axis=1) / (_SEEN @ relative)).min())
     axes.grid(False)
+    axes.set_facecolor(BACKGROUND)
+    return dots, drawn
+
+
+def view(figure: Any, across: int | None, *place: int) -> Any:
+    """Axes for particles among their walls: 3-D ones, or those of a plane across an axis, seen from above."""
+    return figure.add_subplot(*place, projection="3d" if across is None else None)
+
+
+def flat(
+    axes: Any, across: int, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]],
+    box: tuple[Floats, Floats] | None = None,
+) -> tuple[Any, list[Any]]:  # fmt: skip
+    """`particles` of a scene of two dimensions, in axes of its plane, in which the picture fits the vessel."""
+    points, drawn = np.asarray(positions), []
+    for solid, curves in wires:
+        few = min(1.0, (_FEW_WIRES / max(1, len(curves))) ** 0.35)
+        drawn.append(
+            LineCollection(
+                [shown_as(across, curve) for curve in curves], colors=_SOLID_WIRE if solid else _WIRE,
+                linewidths=1.6 * few, zorder=3, capstyle="round", clip_on=False,
+            )
+        )  # fmt: skip
+        axes.add_collection(drawn[-1], autolim=False)
+    dot = float(np.clip(3e4 / len(points), 0.3, 300.0)) ** 0.5
+    dots = axes.scatter(*shown_as(across, points).T, c=colour, s=dot, linewidths=0.0, zorder=2, clip_on=False)
+    low, high = (shown_as(across, one) for one in _roomy(*(around(points, wires) if box is None else box)))
+    room = _ROOM * (high - low).max()
+    names = ["xyz"[k] for k in along(across)]
+    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
+    for axis, name in zip((axes.xaxis, axes.yaxis), names, strict=True):
+        axis.set_major_locator(MaxNLocator(5))
+        axis.set_tick_params(colors=LIGHT, labelsize=8)
+        axis.set_label_text(f"{name} [m]", fontsize=9, color=LIGHT)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
     axes.set_facecolor(BACKGROUND)
     return dots, drawn
 

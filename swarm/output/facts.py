@@ -36,7 +36,7 @@ def of_log(log: Any) -> dict[str, str]:
         "surfaces": "\n".join(
             f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, log.counts(), strict=True)
         ),
-        **_period(scene.period),
+        **_period(scene),
         "method": _call(log.method),
         "columns": ", ".join(log.dtype.names or ()),
         "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
@@ -49,7 +49,7 @@ def of_scene(scene: Any) -> dict[str, str]:
         "surfaces": _call(", ".join(shortened(scene.surfaces))),
         **of_meshes(scene),
         "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
-        **_period(scene.period),
+        **_period(scene),
     }
 
 
@@ -106,12 +106,13 @@ def _what(trajectory: Any) -> dict[str, str]:
     return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
 
 
-def _period(period: Any) -> dict[str, str]:
-    """The row of a scene that repeats."""
-    if period is None:
-        return {}
-    lengths = ", ".join("none" if length is None else f"{length:g}" for length in period)
-    return {"period": f"({lengths}) m"}
+def _period(scene: Any) -> dict[str, str]:
+    """The rows of a scene that repeats, and of one of two dimensions."""
+    plane = {} if scene.plane is None else {"plane": f"{scene.plane} = 0"}
+    if scene.period is None:
+        return plane
+    lengths = ", ".join("none" if length is None else f"{length:g}" for length in scene.period)
+    return {"period": f"({lengths}) m", **plane}
 
 
 def _call(described: Any) -> str:

@@ -16,6 +16,7 @@ from PIL import Image
 from .. import checks
 from ..errors import FileError, SceneError
 from ..particles import Floats
+from ..plane import shown_as
 from . import colours, drawing, paths
 from .drawn import Drawn
 from .shapes import shapes_of, since_start
@@ -134,12 +135,16 @@ class _Film:
         self.picture.set_dpi(dpi)
         self._canvas: Any = FigureCanvasAgg(self.picture)
         self.picture.set_facecolor(drawing.BACKGROUND)
-        self._axes = self.picture.add_subplot(projection="3d")
+        self._across = across = self._scene.across()
+        self._axes = drawing.view(self.picture, across)
         self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
         at = drawn.points(start.position).T
-        self._dots, self._wires = drawing.particles(
-            self._axes, at, drawing.LIGHT, self._walls, 0.0 if len(drawn.triangles) else 1.0, self._box(numbers)
-        )
+        box = self._box(numbers)
+        if across is not None:
+            self._dots, self._wires = drawing.flat(self._axes, across, at, drawing.LIGHT, self._walls, box)
+        else:
+            size = 0.0 if len(drawn.triangles) else 1.0
+            self._dots, self._wires = drawing.particles(self._axes, at, drawing.LIGHT, self._walls, size, box)
         # What lies in front of the dots, or moves, is drawn in every frame, and all else once.
         self._wires = [one for one in self._wires if self._scene.moves() or one.get_zorder() > self._dots.get_zorder()]
         for artist in (*self._wires, self._dots, self._title):
@@ -173,18 +178,21 @@ class _Film:
         """Draw frame k on the canvas."""
         drawn = self._drawn
         position, packed, tints = drawn.coloured(self._trajectory.frame(k), self._scale, self._values)
-        self._dots.set_offsets(position[:2].T)
-        self._dots.set_3d_properties(position[2], "z")
+        across = self._across
+        self._dots.set_offsets(position[:2].T if across is None else shown_as(across, position.T))
+        if across is None:
+            self._dots.set_3d_properties(position[2], "z")
         self._dots.set_facecolor(drawing.red_green_blue(packed))
         if self._scene.moves():
             for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
-                artist.set_segments(curves)
-        ties = drawing.ties(self._axes, *drawn.ties(position.T, packed, tints))
+                artist.set_segments(curves if across is None else [shown_as(across, curve) for curve in curves])
+        ties = drawing.ties(self._axes, *drawn.ties(position.T, packed, tints)) if across is None else []
         of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
         self._title.set_text(f"{drawn.shown}{of} {drawn.noun}, t = {self._seen['time'][k]:.4g} s")
         self._canvas.restore_region(self._still)
         for artist in sorted((*self._wires, self._dots, *ties), key=lambda artist: artist.get_zorder()):
-            artist.do_3d_projection()
+            if across is None:
+                artist.do_3d_projection()
             self._axes.draw_artist(artist)
         self.picture.draw_artist(self._title)
         for tie in ties:

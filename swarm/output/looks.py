@@ -2,10 +2,12 @@
 
 from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from ..particles import Floats
+from ..plane import across_of, along
 from . import series
 from .colours import BACKGROUND, Scale
 from .drawn import Drawn
@@ -13,6 +15,8 @@ from .playback import LINES, MESH, PARTICLES
 from .shapes import Shape
 
 _CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
+# The distance of the eye above a plane, in widths of the scene.
+_EYE = 1.3
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
@@ -57,8 +61,8 @@ def log_series(stream: Any, lines: list[series.Line]) -> None:
             stream.log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
 
 
-def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats) -> None:
-    """Log the meaning of the colours, what is shown of how many, and the origin."""
+def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats, plane: str | None = None) -> None:
+    """Log the meaning of the colours, what is shown of how many, the origin, and the plane of two dimensions."""
     of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
     every = f", every {stride}th frame" if stride > 1 else ""
     text = (
@@ -69,19 +73,36 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
     if center.any():
         text += f" Positions are less {tuple(center.tolist())} m."
         stream.log("/about", rr.AnyValues(center=center), static=True)
+    if plane is not None:
+        stream.log("/about", rr.AnyValues(plane=plane), static=True)
     stream.log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
     values = rr.AnyValues(**vars(scale), particles=drawn.count, shown=drawn.shown, stride=stride, noun=drawn.noun)
     stream.log("/about", values, static=True)
 
 
-def blueprint(lines: list[series.Line], noun: str) -> rrb.Blueprint:
-    """The 3-D view beside the plots, paused at the start."""
+def eye_above(plane: str | None, shapes: list[Shape], center: Floats) -> Any:
+    """The eye that sees the plane of a scene of two dimensions from above, all of its walls; None where it has none."""
+    across = across_of(plane)
+    curves = [curve - center for shape in shapes for curve in shape.wires]
+    if across is None or not curves:
+        return None
+    points = np.concatenate(curves)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, up = 0.5 * (low + high), np.zeros(3)
+    place = middle.copy()
+    place[across] += _EYE * float((high - low).max())
+    up[along(across)[1]] = 1.0
+    return rrb.EyeControls3D(position=place, look_target=middle, eye_up=up)
+
+
+def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str | None = None) -> rrb.Blueprint:
+    """The 3-D view, from an eye or from where it shows all, beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
-        origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False)
+        origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False), eye_controls=eye
     )
     plots = []
     for group, together in series.views_of(lines).items():
-        view, logarithm = series.VIEWS[group]
+        view, logarithm = series.title_of(group, plane)
         legend = rrb.PlotLegend(visible=len(together) > 1)
         name = f"{view}, log10" if logarithm else view
         paths = [line.path for line in together]

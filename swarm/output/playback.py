@@ -20,7 +20,7 @@ from .sources import DAMAGE, DamagedError, reason, require_file
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 # Recordings of older versions do not say them.
-_NOUN, _CENTER = "noun", "center"
+_NOUN, _CENTER, _PLANE = "noun", "center", "plane"
 # The entities of particles, and of bodies; recordings are written with them too.
 PARTICLES, LINES, MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
@@ -94,7 +94,8 @@ class Playback:
         for name in _ABOUT:
             if name not in said:
                 raise ValueError(f"it does not say its {name}")
-        self.about = {_NOUN: "particles", **{name: said[name].as_py()[0] for name in (*_ABOUT, _NOUN) if name in said}}
+        known = (*_ABOUT, _NOUN, _PLANE)
+        self.about = {_NOUN: "particles", **{name: said[name].as_py()[0] for name in known if name in said}}
         self.center = np.array(said[_CENTER].as_py()) if _CENTER in said else np.zeros(3)
         moments = scalars.pop("/time")
         # A crash may have left more points than rows of the time series.

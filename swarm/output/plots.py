@@ -112,7 +112,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     columns = max(1, min(round(width / _CELL), -(-count // 2)))
     cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for cell, (group, curves) in zip(cells, plots.items(), strict=False):
-        drawing.lines(cell, *series.VIEWS[group], curves)
+        drawing.lines(cell, *series.title_of(group, content.scene.plane), curves)
     if content.frames:
         _speeds(cells[len(plots)], content)
     for cell in cells[count:]:
@@ -125,10 +125,11 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     start = content.frames.get("start", end)
     scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, packed, tints = drawn.coloured(end, scale, values)
-    axes = figure.add_subplot(projection="3d")
+    across = content.scene.across()
+    axes = drawing.view(figure, across)
     figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
-    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints))
+    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across)
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
     title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"

@@ -126,7 +126,9 @@ class RecordingWriter:
         sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
         try:
             sinks += [rr.FileSink(self._path)] if self._path else []
-            blueprint = looks.blueprint(self._series, self._drawn.noun)
+            plane = self._scene.plane
+            eye = looks.eye_above(plane, self._shapes, self._center)
+            blueprint = looks.blueprint(self._series, self._drawn.noun, eye, plane)
             if sinks:
                 self.stream.set_sinks(*sinks, default_blueprint=blueprint)
             else:
@@ -136,7 +138,7 @@ class RecordingWriter:
         self.stream.set_log_time_enabled(False)
         looks.log_static(self.stream, self._drawn, self._shapes, self._center)
         looks.log_series(self.stream, self._series)
-        looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center)
+        looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
         return self._write
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:

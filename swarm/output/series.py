@@ -61,6 +61,12 @@ class Line:
         return np.diff(column, prepend=np.nan) / (np.diff(times, prepend=np.nan) * self.per)
 
 
+def title_of(group: str, plane: str | None) -> tuple[str, bool]:
+    """The entry of `VIEWS` of a plot; in a scene of two dimensions pressures are per length."""
+    title, logarithm = VIEWS[group]
+    return (title if plane is None else title.replace("[Pa]", "[N/m]")), logarithm
+
+
 def group_of(path: str) -> str:
     """The key in `VIEWS` of an entity."""
     return path.split("/")[1]

@@ -19,6 +19,7 @@ from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
+from .planar import PlaneWalls
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
@@ -50,6 +51,7 @@ class Shape:
         solid: whether particles are kept out of it.
         vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
         wires: curves (k, 3) [m].
+        height: of the ribbon that the triangles are, in a scene of two dimensions [m]; else None.
     """
 
     name: str
@@ -58,9 +60,12 @@ class Shape:
     triangles: NDArray[np.int64]
     normals: Floats
     wires: list[Floats]
+    height: float | None = None
 
     def area(self) -> float:
-        """Of the triangles [m^2]."""
+        """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
+        if self.height is not None:
+            return float(sum(np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1)).sum() for curve in self.wires))
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
@@ -70,6 +75,8 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
 
     That of a surface of more than `most` bodies is empty.
     """
+    if scene.plane is not None:
+        return _shapes_in_plane(scene, positions, time, most)
     walls = _Walls(scene, positions, time)
     # On a grid around all of them the many bodies of a scene would be too small, and a grid around each too slow.
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
@@ -85,6 +92,17 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
             mesh, wires = walls.drawn(i, at)
         name = f"{i}_{type(surface).__name__.lower()}"
         shapes.append(Shape(name, bodies > 0 or surface.is_solid(), *mesh, wires))
+    return shapes
+
+
+def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) -> list[Shape]:
+    walls, shapes = PlaneWalls(scene, positions, time), []
+    grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
+        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
+        wires = walls.curves(i, at, bodies) if bodies <= most else []
+        name, solid = f"{i}_{type(surface).__name__.lower()}", bodies > 0 or surface.is_solid()
+        shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height))
     return shapes
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.image import imread
 
 from ..errors import RunError, SceneError
+from ..plane import across_of
 from . import drawing, series, viewer
 from .playback import Playback
 from .replaced import named_when_whole
@@ -73,9 +74,11 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     picture = drawing.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
     top.set_facecolor(drawing.BACKGROUND)
-    cells = []
+    about = playback.about
+    across, cells = across_of(about.get("plane") or None), []
     for place, k in enumerate(frames):
-        cells.append(top.add_subplot(above, min(_COLUMNS, len(frames)), place + 1, projection=None if found else "3d"))
+        at = above, min(_COLUMNS, len(frames)), place + 1
+        cells.append(top.add_subplot(*at) if found else drawing.view(top, across, *at))
         cells[-1].set_title(
             f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
         )
@@ -85,12 +88,13 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
         else:
             number = playback.numbers[k]
             ties = playback.lines(number), playback.faces(number)
-            drawing.frame(cells[-1], *playback.frame(number), playback.wires_at(number), *ties)
-    about = playback.about
+            drawing.frame(cells[-1], *playback.frame(number), playback.wires_at(number), *ties, across)
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
     top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
     for place, (group, curves) in enumerate(plots.items()):
-        drawing.lines(bottom.add_subplot(below, _COLUMNS, place + 1), *series.VIEWS[group], curves)
+        drawing.lines(
+            bottom.add_subplot(below, _COLUMNS, place + 1), *series.title_of(group, about.get("plane") or None), curves
+        )
     return picture

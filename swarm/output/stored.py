@@ -80,7 +80,7 @@ class Stored:
             own = any(surface["kind"] == "own" for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
-            return tables.scene_of(surfaces, table.get("gravity"), table.get("period"))
+            return tables.scene_of(surfaces, *(table.get(key) for key in ("gravity", "period", "plane")))
 
     @property
     def method(self) -> Method:

@@ -11,6 +11,7 @@ from ..motion import Path, parts_of
 from ..motion.given import require_angles
 from ..output.origin import require_near
 from ..particles import Particles
+from ..plane import require_start
 from ..scene import Scene
 from ..surfaces.formulas.own import require_compiled
 from ..surfaces.instant import gaps_of, gradient_of
@@ -71,6 +72,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     method.span("until", times.until)
     method.span("every", times.every)
     _require_motions(scene, times.until)
+    require_start(scene, particles)
     _require_inside(scene, particles)
     _require_normals(scene, particles)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)
@@ -83,6 +85,10 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
             "particles, or a vessel without a period"
+        )
+    if scene.plane is not None:
+        raise SceneError(
+            f'plane must be None with bodies, which turn in space, got "{scene.plane}"; use particles, or leave it out'
         )
     _require_walls_of_bodies(scene)
     if options.frames not in ("all", "none"):

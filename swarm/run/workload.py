@@ -107,7 +107,8 @@ def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
     for i in _chosen(particles):
         point, velocity = particles.position[:, i], particles.velocity[:, i]
         for k in range(_CHORDS):
-            way = random.standard_normal(3)
+            way = np.zeros(3)
+            way[scene.axes()] = random.standard_normal(len(scene.axes()))
             way = way / math.sqrt(way @ way)
             length, ahead, wall = _chord(walls, point, way)
             if not length < math.inf:

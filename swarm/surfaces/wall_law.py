@@ -1,6 +1,7 @@
 """The law of a wall as users write it."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,8 @@ class WallLaw(Record):
 
         Args:
             v: the velocity before it [m/s].
-            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) >= 0.
+            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) >= 0. In a
+                scene with a plane all vectors are along that, and so must be what is returned.
             u: the velocity of the wall [m/s].
             random: random numbers of this impact: `random.uniform(k)` in (0, 1), `random.normal(k)`, which takes k and
                 k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any resume.
@@ -77,19 +79,27 @@ def _checked(name: str, law: Any) -> Any:
 
 def _try(name: str, law: Any) -> None:
     """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
-    rng = np.random.default_rng(0)
-    for k in range(_TRIED):
-        n, v = (Vec(*map(np.float64, row)) for row in rng.normal(size=(2, 3)))
-        n = n / math.sqrt(dot(n, n))
-        v = v - (dot(v, n) + abs(dot(v, n))) * n
-        with np.errstate(all="ignore"):
-            after = law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), Stream(0, 0, k), np.float64(1.0))
+    for v, n, after in tries_of(law):
         is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
         if not (is_finite and dot(after, n) >= -_ROUND_OFF * math.sqrt(dot(v, v))):
             raise SceneError(
                 f"{name} must send particles away from the wall: n.v >= 0 of the velocity that leave returns; "
                 f"{law} returned {shown(after)} for v = {_said(v)}, n = {_said(n)} and u = 0"
             )
+
+
+def tries_of(law: Any, across: int | None = None) -> Iterator[tuple[Vec, Vec, Any]]:
+    """Some trials of a law: (velocity before, normal into the vessel, what it returns); in a plane across an axis."""
+    rng = np.random.default_rng(0)
+    for k in range(_TRIED):
+        rows = rng.normal(size=(2, 3))
+        if across is not None:
+            rows[:, across] = 0.0
+        n, v = (Vec(*map(np.float64, row)) for row in rows)
+        n = n / math.sqrt(dot(n, n))
+        v = v - (dot(v, n) + abs(dot(v, n))) * n
+        with np.errstate(all="ignore"):
+            yield v, n, law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), Stream(0, 0, k), np.float64(1.0))
 
 
 def _said(vector: Vec) -> str:
