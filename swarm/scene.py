@@ -12,32 +12,30 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks, notebook
 from . import motion as motions
 from . import plane as planes
-from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
+from .pieces import Pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.fields.grouped import Order, order_of, walls_in
-from .surfaces.fields.many import in_straight_flights, members_of
+from .surfaces.fields.grouped import order_of, walls_in
+from .surfaces.fields.many import in_straight_flights
 from .surfaces.fields.members import Members
-from .surfaces.images import Lengths, corners_of, images_of, lengths_of
+from .surfaces.images import Lengths, images_of, lengths_of
 from .surfaces.moving import carried
-from .surfaces.openings import Opening, openings_in, require_few, volumes_of
+from .surfaces.openings import require_few
 from .surfaces.period import Period, cell_in
+from .surfaces.rooms import with_rooms
 from .surfaces.surface import Surface
 from .surfaces.upright import upright
 from .surfaces.walls import Walls
-from .volume import Volume
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
-# The law of a wall without temperature.
-_NO_HEAT = Thermal(0.0, 0.0)
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Scene(Volume):
+class Scene(Pieces):
     """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
 
     Args:
@@ -67,8 +65,8 @@ class Scene(Volume):
     plane: str | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
-    # The volumes in which every surface is open.
-    volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    # The volumes in which every piece is open.
+    _volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -91,9 +89,9 @@ class Scene(Volume):
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
-        checks.assign(self, volumes=tuple(volumes_of(one, lengths, name) for one, name in named))
+        checks.assign(self, _volumes=volumes_of_pieces(surfaces, images, lengths))
         self._require_few_walls("")
-        require_few(self.volumes)
+        require_few(self._volumes)
         for i in self._fields() if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
@@ -150,7 +148,7 @@ class Scene(Volume):
         if not self.order.groups:
             return self
         made = copy.copy(self)
-        made.__dict__.update(order=order_of(self._pieces, together=False), _groups=[])
+        made.__dict__.update(order=order_of(self._pieces, False, self.order.unions), _groups=[])
         made._require_few_walls(f" with {what}")
         return made
 
@@ -179,8 +177,9 @@ class Scene(Volume):
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
         """
         if self.moves():
-            fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.others))
-            return self._upright(carried(fields, others, moment))
+            fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
+            rooms = [[[self._pieces[i] for i in room] for room in union] for union in self.order.unions]
+            return self._upright(with_rooms(carried(fields, others, moment), rooms))
         if own is None:
             return self._walls
         return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
@@ -202,39 +201,9 @@ class Scene(Volume):
         """Gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
-    def laws(self) -> Laws | None:
-        """The laws of every wall of the scene as kernels take them, None where no surface has one."""
-        laws = Laws(
-            self._of_walls([surface.restitution for surface in self.surfaces], 1.0),
-            self._of_walls([surface.friction for surface in self.surfaces], 0.0),
-            self._of_walls([_thermal(surface) for surface in self.surfaces], _NO_HEAT),
-            Moves(0.0) if self.moves() else None,
-            owned_in([(self.owners_of_pieces[i], n) for i, n in self.order.spans(self._pieces)], self.surfaces),
-        )
-        return None if laws == NONE else laws.in_plane(self.across())
-
-    def openings(self) -> tuple[Opening, ...] | None:
-        """The openings of every wall of the scene as kernels take them, None where there are none."""
-        return openings_in(self.order.spans(self._pieces), [self.volumes[i] for i in self.owners_of_pieces])
-
-    def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
-        """The value of the owner of every wall, None where all are neutral."""
-        if all(value == neutral for value in values):
-            return None
-        spans = ((values[self.owners_of_pieces[i]], walls) for i, walls in self.order.spans(self._pieces))
-        return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
-
-    def owners(self) -> list[int]:
-        """The surface that each row of the scene belongs to, one for a field."""
-        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
-
-    def members(self) -> NDArray[np.int64]:
-        """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
-
     @cached_property
     def _moves(self) -> bool:
-        return self._reacts or any(surface.motion is not None for surface in self.surfaces)
+        return self._reacts or any(piece.motion is not None for piece in self._pieces)
 
     @cached_property
     def _reacts(self) -> bool:
@@ -258,36 +227,9 @@ class Scene(Volume):
         # Whoever has a copy makes walls of its own: `apart` of other walls, a worker of what is compiled there.
         return {name: value for name, value in self.__dict__.items() if name != "_walls"}
 
-    @cached_property
-    def _pieces(self) -> tuple[Surface, ...]:
-        """The surfaces, and the images of those that reach over a face of the cell."""
-        return tuple(image for images in self._images for image in images)
-
-    @cached_property
-    def owners_of_pieces(self) -> list[int]:
-        """The surface that each of these is an image of."""
-        return [i for i, images in enumerate(self._images) for _image in images]
-
-    @cached_property
-    def order(self) -> Order:
-        """Surfaces and images in the order of the scene."""
-        return order_of(self._pieces)
-
-    @cached_property
-    def _groups(self) -> list[Members]:
-        """The surfaces that kernels take as fields."""
-        repeated = None if self.period is None else corners_of(self.period)
-        return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
-
     def _has_fields(self) -> bool:
         return bool(self.order.fields or self.order.groups)
 
     def _fields(self) -> list[int]:
         """The surfaces that are many bodies."""
         return [self.owners_of_pieces[i] for i in self.order.fields]
-
-
-def _thermal(surface: Surface) -> Thermal:
-    if surface.temperature is None:
-        return _NO_HEAT
-    return Thermal(surface.temperature, surface.accommodation)

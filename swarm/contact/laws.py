@@ -114,18 +114,20 @@ def of_wall(given, wall, neutral=0.0):
     return found
 
 
-def owned_in(spans: Iterable[tuple[int, int]], surfaces: Sequence[Any]) -> tuple[Owned, ...] | None:
-    """`Owned` of every surface that has laws of one's own, None where there is none.
+def owned_in(
+    spans: Iterable[tuple[int, int]], pieces: Sequence[Any], owners: Sequence[int]
+) -> tuple[Owned, ...] | None:
+    """`Owned` of every piece of a scene that has laws of one's own, None where there is none.
 
-    `spans` are (number of a surface, how many walls in a row are of it).
+    `spans` are (number of a piece, how many walls in a row are of it), `owners` the surfaces that pieces are of.
     """
     owned: list[Owned] = []
     first = 0
     for i, walls in spans:
-        laws = surfaces[i].laws
+        laws = pieces[i].laws
         if any(isinstance(law, str) for law in laws):
             raise SceneError(
-                f"surfaces[{i}].laws: {laws[0]!r} is Python, of which a file holds the name; build the scene in "
+                f"surfaces[{owners[i]}].laws: {laws[0]!r} is Python, of which a file holds the name; build the scene in "
                 "Python, as the run's script does"
             )
         if laws and owned and owned[-1].after == first and owned[-1].laws == laws:

@@ -76,7 +76,7 @@ class Look(Record):
 
     def goes_on(self, course, i):
         """Whether more safe steps may find a hit that is the first so far."""
-        hit = flights.end(self.one(i), course, 0, i)
+        hit = flights.end(self.one(i), self.gravity, course, 0, i, self.flight(i))
         return (hit.wall < 0.0) & (hit.time < self.seen.time[i]) & (self.k < self.seen.number[i])
 
     @outlined
@@ -228,5 +228,5 @@ def _look_by_steps(look, live):
                 look.go_on(course, index(order[j]), steps)
             some = 0
     for i in range(index(live)):
-        hit = flights.end(look.one(i), course, 0, i)
+        hit = flights.end(look.one(i), look.gravity, course, 0, i, look.flight(i))
         look.take(i, hit.time, select(hit.wall < 0.0, -1.0, look.seen.which[i] + look.before))

@@ -55,7 +55,7 @@ def _first_hit(met, walls, gravity, lane, lanes, i):
         return safe.first_hit_moving(walls, gravity, lane.r, lane.v, lane.remaining)
     if _is_closed(gravity, walls):
         return flights.first_hit(walls.at(lane.remaining), gravity, lane.r, lane.v)
-    return flights.end(walls.at(lane.remaining), lanes.course, 0, i)
+    return flights.end(walls.at(lane.remaining), gravity, lanes.course, 0, i, (lane.r, lane.v))
 
 
 def _has_fields(met):
@@ -94,12 +94,12 @@ def _go_by_steps(walls, gravity, lanes, live):
             _step_on(walls, gravity, lanes, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
     for i in range(index(live)):
-        lanes.marked[i] = _needs_more(walls, lanes, i)
+        lanes.marked[i] = _needs_more(walls, gravity, lanes, i)
     for k in range(marked_lanes(lanes, live)):
         i = lanes.order[k]
         for _step in range(MORE_STEPS):
             _step_on(walls, gravity, lanes, i)
-            if not _needs_more(walls, lanes, i):
+            if not _needs_more(walls, gravity, lanes, i):
                 break
 
 
@@ -109,11 +109,11 @@ def _step_on(walls, gravity, lanes, i):
     flights.step(walls.at(lane.remaining), gravity, lanes.course, 0, i, lane.r, lane.v)
 
 
-def _needs_more(walls, lanes, i):
+def _needs_more(walls, gravity, lanes, i):
     """Whether more safe steps may find a hit in this frame."""
-    remaining = lanes.lane(i).remaining
-    hit = flights.end(walls.at(remaining), lanes.course, 0, i)
-    return (hit.wall < 0.0) & (hit.time < remaining)
+    lane = lanes.lane(i)
+    hit = flights.end(walls.at(lane.remaining), gravity, lanes.course, 0, i, (lane.r, lane.v), stops=True)
+    return (hit.wall < 0.0) & (hit.time < lane.remaining)
 
 
 def _flight(method, walls, gravity, lanes, i, hit):

@@ -1,11 +1,12 @@
 """When a free flight meets the walls of a scene."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from .course import Fall, Quartic
+from .rooms import leaving
 from .walls import Field
 
 
@@ -45,13 +46,27 @@ def hit(gravity, surface, r, v):
 def first_hit(walls, gravity, r, v):
     """The first `Hit` of a free flight."""
     first = NEVER
-    for number, wall in reversed(walls.numbered()):
+    for rooms in reversed(walls.joined()):
+        hits = tuple(tuple(hit(gravity, wall, r, v) for _number, wall, _gentle in room) for room in rooms)
+        first = soonest(union_hit(walls, rooms, hits, gravity, (r, v)), 0.0, first)
+    for number, wall in reversed(walls.shared()):
         if isinstance(wall, Field):
             first = soonest(wall.members.field_hit(gravity, r, v), number, first)
         else:
             time, found = hit(gravity, wall, r, v)
             first = sooner(time, found, number, first)
     return first
+
+
+def union_hit(walls, rooms, hits, gravity, flight, stops=False):
+    """The first `Hit` of a flight (r, v) with a union, from those with the walls of its rooms; `stops` as of `end`."""
+    leaves: Any = ()
+    for room, some in zip(rooms, hits, strict=True):
+        first = NEVER
+        for (number, _wall, _gentle), (time, found) in zip(reversed(room), reversed(some), strict=True):
+            first = sooner(time, found, number, first)
+        leaves = (*leaves, first)
+    return Hit(*leaving(walls, rooms, leaves, gravity, flight, stops))
 
 
 def soonest(hit, number, later):
@@ -103,12 +118,21 @@ def step(walls, gravity, course, row, lane, r, v):
             course[at + _TIME, lane], course[at + _LAST, lane] = t, last
 
 
-def end(walls, course, row, lane):
-    """`first_hit` from the course."""
-    first = NEVER
-    for k, _wall in reversed(tuple(enumerate(walls.each))):
+def end(walls, gravity, course, row, lane, flight, stops=False):
+    """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
+    found: Any = ()
+    for k, _wall in enumerate(walls.each):
         at = row + k * COURSE
-        first = sooner(course[at + _TIME, lane], course[at + _LAST, lane] == 0.0, float(k), first)
+        found = (*found, (course[at + _TIME, lane], course[at + _LAST, lane] == 0.0))
+    first, k = NEVER, len(walls.shared())
+    for rooms in walls.joined():
+        hits: Any = ()
+        for room in rooms:
+            hits = (*hits, found[k : k + len(room)])
+            k += len(room)
+        first = soonest(union_hit(walls, rooms, hits, gravity, flight, stops), 0.0, first)
+    for k, (time, hits) in reversed(tuple(enumerate(found[: len(walls.shared())]))):
+        first = sooner(time, hits, float(k), first)
     return first
 
 

@@ -60,7 +60,7 @@ class Carried(Walls):
         for wall in self.each:
             last = _during(wall.members if isinstance(wall, Field) else wall, last, remaining, after)
             made = (*made, Field(last) if isinstance(wall, Field) else last)
-        return Walls(made)
+        return Walls(made, self.unions, self.slack)
 
     def in_steps(self):
         return False

@@ -74,7 +74,7 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
     for k, opening in enumerate(surface.openings):
         where = f"{name}.openings[{k}]"
         required.require_description([opening], where)
-        if not _reaches(surface, opening):
+        if not reaches(surface, opening):
             raise SceneError(
                 f"{where} must reach the wall that it opens, got {opening}, in which no point of {name} "
                 f"({type(surface).__name__}) is; move it, or make it larger"
@@ -108,7 +108,7 @@ def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
         )
 
 
-def _reaches(surface: Surface, opening: Surface) -> bool:
+def reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
     both = _gap(opening, _sign(opening)), _gap(surface, side_of(surface))
     reach = _REACH * max(surface.extent(), opening.extent())

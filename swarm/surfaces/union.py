@@ -35,7 +35,7 @@ _REACH = 2.0
 
 
 @dataclass(frozen=True, repr=False)
-class _Joined(Surface):
+class Joined(Surface):
     """What `Union` and `Intersection` have in common."""
 
     parts: Any = field(metadata={"key": "part"})
@@ -81,7 +81,7 @@ class _Joined(Surface):
     def _rooms(self, turned: bool) -> list[Room]:
         """`rooms`, or those of what is not admissible."""
         parts = [_handed_down(self, part) for part in self.parts]
-        given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, _Joined)
+        given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, Joined)
                  else [(_turned(one) if turned else one,)] for one in parts]  # fmt: skip
         if (self._of_gaps is np.minimum) ^ turned:
             return [room for rooms in given for room in rooms]
@@ -152,7 +152,7 @@ class _Joined(Surface):
 
 
 @dataclass(frozen=True, repr=False)
-class Union(_Joined):
+class Union(Joined):
     """A vessel of several parts, which may overlap: who is in one of them is in the vessel.
 
     A wall is there where it is in no other part. Parts that do not touch are separate rooms, and so are parts that
@@ -177,7 +177,7 @@ class Union(_Joined):
 
 
 @dataclass(frozen=True, repr=False)
-class Intersection(_Joined):
+class Intersection(Joined):
     """What several parts have in common, as one of the parts of a `Union`, or of a scene.
 
     The surfaces of a scene are an intersection already. Each part has its laws, temperature, motion and openings; what
@@ -218,7 +218,7 @@ def _parts(value: Any, name: str) -> tuple[Surface, ...]:
 
 
 def _moves(part: Surface) -> bool:
-    return part.motion is not None or (isinstance(part, _Joined) and any(map(_moves, part.parts)))
+    return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
 
 
 def _handed_down(whole: Surface, part: Surface) -> Surface:
@@ -269,10 +269,10 @@ def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Flo
     return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
 
 
-def _require_room(whole: _Joined) -> None:
+def _require_room(whole: Joined) -> None:
     """Raise a `SceneError` where a part, or the whole, has no volume."""
     for k, part in enumerate(whole.parts):
-        if not isinstance(part, _Joined) and not _has_volume((part,)):
+        if not isinstance(part, Joined) and not _has_volume((part,)):
             raise SceneError(f"parts[{k}] must have a volume, got {part!r:.200}, of which no point is admissible")
     if not any(map(_has_volume, whole.rooms)):
         came = ", ".join(f"{part!r:.80}" for part in whole.parts)

@@ -40,12 +40,15 @@ class Touched(Record):
 
 
 class Walls(Record):
-    """The walls of a scene: its fields, those that are `Listed` last, and then all other walls.
+    """The walls of a scene: its fields, those that are `Listed` last, all other walls, and then those of its unions.
 
     What is asked of one wall is a method too, with the number of the wall before the other arguments.
     """
 
     each: tuple[Any, ...]
+    # Of each union its rooms, of each room its walls, of each of these 1/the steepness of its level. See rooms.py.
+    unions: tuple[Any, ...] = ()
+    slack: Any = None  # a distance that is round-off where rooms meet [m]
 
     if TYPE_CHECKING:
 
@@ -83,7 +86,29 @@ class Walls(Record):
 
     def others(self):
         """The walls that are in no field."""
-        return Walls(tuple(wall for wall in self.each if not isinstance(wall, Field)))
+        return self._replace(each=tuple(wall for wall in self.each if not isinstance(wall, Field)))
+
+    def shared(self):
+        """`numbered` of the walls that are in no union: all particles keep to them."""
+        every = self.numbered()
+        return every[: len(every) - self._count_joined()]
+
+    def joined(self):
+        """Of each union its rooms, of each room its walls as (number, wall, 1/the steepness of its level)."""
+        every = self.numbered()
+        k = len(every) - self._count_joined()
+        found: tuple[Any, ...] = ()
+        for union in self.unions:
+            rooms: tuple[Any, ...] = ()
+            for room in union:
+                walls = zip(every[k : k + len(room)], room, strict=True)
+                rooms = (*rooms, tuple((*one, gentle) for one, gentle in walls))
+                k += len(room)
+            found = (*found, rooms)
+        return found
+
+    def _count_joined(self):
+        return sum(len(room) for union in self.unions for room in union)
 
     def count_in_fields(self):
         """The number of walls of its fields."""
@@ -166,12 +191,20 @@ class Walls(Record):
     def outside(self, number, r):
         """Whether a point is outside any wall but this one (-1: any at all)."""
         found = False
-        for first, wall in self.numbered():
+        for first, wall in self.shared():
             if isinstance(wall, Field):
                 found = wall.members.is_in_another(number - first, r) | found
             else:
                 here = wall.level_of(wall.inner(r)) > 0.0
                 found = (here & (number != first)) | found
+        for rooms in self.joined():
+            out_of_all = True
+            for room in rooms:
+                out = False
+                for first, wall, _gentle in room:
+                    out = ((wall.level_of(wall.inner(r)) > 0.0) & (number != first)) | out
+                out_of_all = out & out_of_all
+            found = out_of_all | found
         return found
 
     def pushes(self, number, kappa):

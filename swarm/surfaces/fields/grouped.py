@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
 from ..moving import walls_of
+from ..rooms import with_rooms
 from ..surface import Surface
 from ..walls import Field, Listed, Walls, all_walls
 from .many import Many
@@ -57,33 +58,45 @@ class Order(NamedTuple):
     fields: tuple[int, ...]  # each many bodies
     groups: tuple[tuple[int, ...], ...]  # each taken as one field
     others: tuple[int, ...]
+    # Of each union its rooms, of each room its surfaces, of which the walls come last.
+    unions: tuple[tuple[tuple[int, ...], ...], ...] = ()
+
+    def alone(self) -> tuple[int, ...]:
+        """The surfaces of which each wall is one of the scene, in the order of these."""
+        return (*self.others, *(i for rooms in self.unions for room in rooms for i in room))
 
     def owners(self, surfaces: Sequence[Surface]) -> list[int]:
         """The surface that each row of the scene belongs to: one for a field, else one for each wall."""
-        walls = [i for i in self.others for _wall in surfaces[i].walls()]
+        walls = [i for i in self.alone() for _wall in surfaces[i].walls()]
         return [*self.fields, *(i for group in self.groups for i in group), *walls]
 
     def spans(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
         """The same as (surface, how many walls in a row have its laws), several where one takes the place of many."""
-        walls = [(i, 1) for i in self.others for _wall in surfaces[i].walls()]
+        walls = [(i, 1) for i in self.alone() for _wall in surfaces[i].walls()]
         many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], Many)]
         return [*many, *((group[0], len(group)) for group in self.groups), *walls]
 
     def members(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
         """The surface that each wall of the scene belongs to, and its number in the field that this is, or -1."""
-        walls = [(i, -1) for i in self.others for _wall in surfaces[i].walls()]
+        walls = [(i, -1) for i in self.alone() for _wall in surfaces[i].walls()]
         many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], Many) for m in field.numbers()]
         return [*many, *((i, -1) for group in self.groups for i in group), *walls]
 
     def compiled(self, surfaces: Sequence[Surface]) -> int:
         """The number of walls that kernels are compiled for."""
-        return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.others)
+        return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.alone())
 
 
-def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
-    """The order of the walls of a scene; where a surface moves, or not `together`, all are walls of their own."""
+def order_of(
+    surfaces: Sequence[Surface], together: bool = True, unions: Sequence[tuple[tuple[int, ...], ...]] = ()
+) -> Order:
+    """The order of the walls of a scene; where a surface moves, or not `together`, all are walls of their own.
+
+    `unions` are those of surfaces, as of `Order`.
+    """
+    joined = {i for rooms in unions for room in rooms for i in room}
     fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, Many)]
-    rest = [i for i in range(len(surfaces)) if i not in fields]
+    rest = [i for i in range(len(surfaces)) if i not in fields and i not in joined]
     of_kind: dict[Any, list[int]] = defaultdict(list)
     together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)
     for i in rest if together and len(rest) > _FEW else ():
@@ -108,7 +121,7 @@ def order_of(surfaces: Sequence[Surface], together: bool = True) -> Order:
     fields.sort(key=lambda i: len(surfaces[i]))  # type: ignore[arg-type]
     groups.sort(key=len)
     fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))
-    return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others))
+    return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others), tuple(unions))
 
 
 def walls_in(
@@ -122,7 +135,9 @@ def walls_in(
     fields = (Field(taken(surfaces[i].walls()[0])) for i in order.fields)
     listed = (Listed(taken(group)) for group in groups)
     others = all_walls([*(surfaces[i] for i in order.others), *own])
-    return Walls((*fields, *listed, *others.each))
+    joined = all_walls([surfaces[i] for i in order.alone()[len(order.others) :]])
+    rooms = [[[surfaces[i] for i in room] for room in union] for union in order.unions]
+    return with_rooms(Walls((*fields, *listed, *others.each, *joined.each)), rooms)
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:
