@@ -59,12 +59,12 @@ def _gentle(surface: Surface) -> list[float]:
 # --- In kernels ------------------------------------------------------------------------------------------
 
 
-def gaps_of(rooms, r):
+def gaps_in(rooms, r):
     """How far a point is outside of each room, about: a length, below 0 inside."""
-    return tuple(gap_of(room, r) for room in rooms)
+    return tuple(gap_in(room, r) for room in rooms)
 
 
-def gap_of(room, r):
+def gap_in(room, r):
     """The same of one room."""
     farthest = -math.inf
     for _number, wall, gentle in reversed(room):
@@ -102,7 +102,7 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
     it goes on in another room there the wall is -1, unless it `stops`.
     """
     r, v = flight
-    held = held_by(walls, gaps_of(rooms, r))
+    held = held_by(walls, gaps_in(rooms, r))
     last, wall = -math.inf, -1.0
     for holds, (time, number) in zip(reversed(held), reversed(leaves), strict=True):
         later = holds & (time > last)
@@ -110,4 +110,4 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
     if stops:
         return last, wall
     there = r + displacement(gravity, v, last)
-    return last, select(is_inside_any(walls, gaps_of(rooms, there)), -1.0, wall)
+    return last, select(is_inside_any(walls, gaps_in(rooms, there)), -1.0, wall)
