@@ -16,7 +16,7 @@ from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Opened, openings_in, reaches, volumes_of
+from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined
 from .volume import Volume
@@ -30,6 +30,8 @@ class Pieces(Volume):
 
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...]
+    # Those in which it is where another room of its union is behind it.
+    _doorways: tuple[tuple[Surface, ...], ...]
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
@@ -66,8 +68,8 @@ class Pieces(Volume):
     def volumes(self) -> tuple[tuple[Surface, ...], ...]:
         """The volumes in which every surface is open."""
         found: list[dict[Surface, None]] = [{} for _surface in self.surfaces]
-        for i, given in zip(self.owners_of_pieces, self._volumes, strict=True):
-            found[i].update(dict.fromkeys(given))
+        for i, *given in zip(self.owners_of_pieces, self._volumes, self._doorways, strict=True):
+            found[i].update(dict.fromkeys(itertools.chain(*given)))
         return tuple(map(tuple, found))
 
     def laws(self) -> Laws | None:
@@ -83,17 +85,22 @@ class Pieces(Volume):
 
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
-        return openings_in(self.order.spans(self._pieces), self._volumes, moment)
+        spans = self.order.spans(self._pieces)
+        ways = openings_in(spans, self._volumes, moment), openings_in(spans, self._doorways, moment, Doorway)
+        return None if ways == ((), ()) else (*ways[0], *ways[1])
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""
-        every = [one for piece in self._pieces for one in (piece, *piece.open_volumes())]
-        return any(one.present is not None for one in every)
+        return any(one.present is not None for one in (*self._pieces, *self.open_volumes()))
 
     @cached_property
     def instants(self) -> tuple[float, ...]:
         """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
-        return instants_of(self._pieces)
+        return instants_of(one.present for one in (*self._pieces, *self.open_volumes()))
+
+    def open_volumes(self) -> tuple[Surface, ...]:
+        """The volumes in which any piece is open."""
+        return tuple(itertools.chain(*self._volumes, *self._doorways))
 
     def pieces_of_walls(self) -> NDArray[np.int64]:
         """The piece that each wall of the scene belongs to, by its number."""
@@ -161,3 +168,27 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[
         open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
         found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
     return found
+
+
+def doorways_of_pieces(
+    images: Sequence[Sequence[Surface]], volumes: Sequence[Sequence[Surface]]
+) -> tuple[tuple[Surface, ...], ...]:
+    """The volumes in which every piece is open where another room of its union is on its other side.
+
+    Those are the volumes of the other rooms, and those that open walls between rooms only.
+    """
+    found: list[tuple[Surface, ...]] = []
+    for image in (image for some in images for image in some):
+        rooms = image.rooms if isinstance(image, Joined) else ((image,),)
+        given, first = [], len(found)
+        for room in rooms:
+            given.append([one for some in volumes[first : first + len(room)] for one in some])
+            first += len(room)
+        for k, room in enumerate(rooms):
+            others = [one for j, some in enumerate(given) if j != k for one in some]
+            between = [one for piece in itertools.chain(*rooms) for one in piece.open_volumes(True)]
+            for piece in room:
+                mine = volumes[len(found)]
+                found.append(tuple(one for one in dict.fromkeys([*others, *between])
+                                   if one not in mine and reaches(piece, one)))  # fmt: skip
+    return tuple(found)

@@ -15,7 +15,7 @@ from . import plane as planes
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
-from .pieces import Pieces, volumes_of_pieces
+from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
@@ -68,6 +68,7 @@ class Scene(Pieces):
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    _doorways: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -90,9 +91,10 @@ class Scene(Pieces):
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
-        checks.assign(self, _volumes=volumes_of_pieces(surfaces, images, lengths))
+        volumes = volumes_of_pieces(surfaces, images, lengths)
+        checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
-        require_few(self._volumes)
+        require_few((*self._volumes, *self._doorways))
         for i in self._fields() if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "

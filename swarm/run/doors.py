@@ -74,8 +74,7 @@ class DoorRun(Run):
         gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
         if any(gone):
             self._let_go(contacts, np.array(gone))
-        volumes = [volume for one in pieces for volume in one.open_volumes()]
-        if any(one.is_there(instant) and not one.is_there(last) for one in volumes):
+        if any(one.is_there(instant) and not one.is_there(last) for one in self._scene.open_volumes()):
             _wake(contacts, contacts.phase == ARRIVED)
 
     def _before(self, instant: float) -> float:
