@@ -35,7 +35,7 @@ class Pieces(Volume):
         raise NotImplementedError
 
     @cached_property
-    def _pieces(self) -> tuple[Surface, ...]:
+    def pieces(self) -> tuple[Surface, ...]:
         """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
         return tuple(piece for images in self._images for image in images for piece in _pieces_of(image))
 
@@ -53,13 +53,13 @@ class Pieces(Volume):
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
             first += len(_pieces_of(image))
-        return order_of(self._pieces, unions=unions)
+        return order_of(self.pieces, unions=unions)
 
     @cached_property
     def _groups(self) -> list[Members]:
         """The surfaces that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
-        return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
+        return [members_of([self.pieces[i] for i in group], repeated) for group in self.order.groups]
 
     @cached_property
     def volumes(self) -> tuple[tuple[Surface, ...], ...]:
@@ -72,32 +72,36 @@ class Pieces(Volume):
     def laws(self) -> Laws | None:
         """The laws of every wall of the scene as kernels take them, None where no surface has one."""
         laws = Laws(
-            self._of_walls([piece.restitution for piece in self._pieces], 1.0),
-            self._of_walls([piece.friction for piece in self._pieces], 0.0),
-            self._of_walls([_thermal(piece) for piece in self._pieces], _NO_HEAT),
+            self._of_walls([piece.restitution for piece in self.pieces], 1.0),
+            self._of_walls([piece.friction for piece in self.pieces], 0.0),
+            self._of_walls([_thermal(piece) for piece in self.pieces], _NO_HEAT),
             Moves(0.0) if self.moves() else None,
-            owned_in(self.order.spans(self._pieces), self._pieces, self.owners_of_pieces),
+            owned_in(self.order.spans(self.pieces), self.pieces, self.owners_of_pieces),
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
     def openings(self) -> tuple[Opening, ...] | None:
         """The openings of every wall of the scene as kernels take them, None where there are none."""
-        return openings_in(self.order.spans(self._pieces), self._volumes)
+        return openings_in(self.order.spans(self.pieces), self._volumes)
 
     def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
         """The value of the piece of every wall, None where all are neutral."""
         if all(value == neutral for value in values):
             return None
-        spans = ((values[i], walls) for i, walls in self.order.spans(self._pieces))
+        spans = ((values[i], walls) for i, walls in self.order.spans(self.pieces))
         return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
 
     def owners(self) -> list[int]:
         """The surface that each row of the scene belongs to, one for a field."""
-        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
+        return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
 
     def members(self) -> NDArray[np.int64]:
         """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
+        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self.pieces)]).T
+
+    def _unions(self) -> list[int]:
+        """The surfaces that are unions of several rooms."""
+        return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 
 
 def _pieces_of(image: Surface) -> tuple[Surface, ...]:
