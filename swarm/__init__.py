@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         Union,
     )  # fmt: skip
     from .surfaces.data.mesh import from_mesh
+    from .surfaces.doors import Opening
     from .surfaces.wall_law import WallLaw
 
 __version__ = VERSION
@@ -76,6 +77,7 @@ _HOMES = {
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
     "surfaces.data.mesh": ("from_mesh",),
+    "surfaces.doors": ("Opening",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
         "Intersection", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
@@ -88,11 +90,11 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path",
-    "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere",
-    "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet",
-    "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh",
-    "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "Impact", "ImpactLog", "Intersection", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
+    "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene",
+    "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
+    "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell",
+    "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

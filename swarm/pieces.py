@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
+from .surfaces.doors import instants_of
 from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Opening, openings_in, reaches, volumes_of
-from .surfaces.surface import Surface
+from .surfaces.openings import Opened, openings_in, reaches, volumes_of
+from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined
 from .volume import Volume
 
@@ -80,9 +81,30 @@ class Pieces(Volume):
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
-    def openings(self) -> tuple[Opening, ...] | None:
-        """The openings of every wall of the scene as kernels take them, None where there are none."""
-        return openings_in(self.order.spans(self._pieces), self._volumes)
+    def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
+        """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
+        return openings_in(self.order.spans(self._pieces), self._volumes, moment)
+
+    def has_doors(self) -> bool:
+        every = [one for piece in self._pieces for one in (piece, *piece.open_volumes())]
+        return any(one.present is not None for one in every)
+
+    @cached_property
+    def instants(self) -> tuple[float, ...]:
+        """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
+        return instants_of(self._pieces)
+
+    def pieces_of_walls(self) -> NDArray[np.int64]:
+        """The piece that each wall of the scene belongs to, by its number."""
+        return np.array([i for i, _member in self.order.members(self._pieces)])
+
+    def pieces_of_rows(self) -> NDArray[np.int64]:
+        """The piece that each row of `owners` belongs to."""
+        return np.array(self.order.owners(self._pieces))
+
+    def pieces(self) -> tuple[Surface, ...]:
+        """The surfaces, those of which unions are made, and images."""
+        return self._pieces
 
     def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
         """The value of the piece of every wall, None where all are neutral."""
@@ -128,13 +150,13 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[
     """Those of the surfaces of a union: what is open of the whole is open where it reaches each of them."""
     pieces = union.surfaces()
     for k, opening in enumerate(union.openings):
-        if not any(reaches(piece, opening) for piece in pieces):
+        if not any(reaches(piece, volume_of(opening)) for piece in pieces):
             raise SceneError(
                 f"{name}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of {name} "
                 f"({type(union).__name__}) is; move it, or make it larger"
             )
     found = []
     for piece in pieces:
-        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, one)]
+        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
         found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
     return found

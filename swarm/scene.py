@@ -18,6 +18,7 @@ from .kernel.vector import Vec
 from .pieces import Pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
+from .surfaces.doors import was_there
 from .surfaces.fields.grouped import order_of, walls_in
 from .surfaces.fields.many import in_straight_flights
 from .surfaces.fields.members import Members
@@ -101,7 +102,7 @@ class Scene(Pieces):
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
-        required.require_known(surfaces, lambda held: self._bounds(0.0, held))
+        required.require_known(surfaces, self._bounds_of_lasting)
         if not self._has_volume():
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
@@ -172,7 +173,7 @@ class Scene(Pieces):
         return Scene(surfaces, self.gravity, self.period, self.plane)
 
     def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
-        """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
+        """The surfaces as kernels take them, by their kinds, in the frame, or its piece, that ends at a moment [s].
 
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
         """
@@ -180,9 +181,17 @@ class Scene(Pieces):
             fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
             rooms = [[[self._pieces[i] for i in room] for room in union] for union in self.order.unions]
             return self._upright(with_rooms(carried(fields, others, moment), rooms))
-        if own is None:
-            return self._walls
-        return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
+        if own is not None:
+            return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
+        there = tuple(was_there(piece.present, moment) for piece in self._pieces)
+        if there not in self._walls:
+            made = walls_in(self.order, self._pieces, self._groups, (), self._taken, moment)
+            self._walls[there] = self._upright(made)
+        return self._walls[there]
+
+    def _taken(self, members: Members) -> Members:
+        """A field as kernels take it where nothing moves."""
+        return in_straight_flights(members, self.period is not None) if self.gravity is None else members
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """The number of walls of each row of `owners`: the members of a field, else one."""
@@ -210,13 +219,9 @@ class Scene(Pieces):
         return any(surface.reacts() for surface in self.surfaces)
 
     @cached_property
-    def _walls(self) -> Walls:
-        """The walls for particles where nothing moves."""
-
-        def taken(members: Members) -> Members:
-            return in_straight_flights(members, self.period is not None) if self.gravity is None else members
-
-        return self._upright(walls_in(self.order, self._pieces, self._groups, (), taken))
+    def _walls(self) -> dict[tuple[bool, ...], Walls]:
+        """The walls for particles where nothing moves, by which of the surfaces are there."""
+        return {}
 
     def _upright(self, walls: Walls) -> Walls:
         """Walls as a scene of two dimensions takes them."""

@@ -19,6 +19,7 @@ from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
+from .surfaces.doors import Opening
 
 T = TypeVar("T")
 # What in the table of a surface are tables of surfaces.
@@ -42,8 +43,20 @@ def _surface_of(table: Any, where: str) -> Surface:
             given = table[key]
             if not isinstance(given, list):
                 raise SceneError(f"{where}.{key}: expected [[surface.{key}]] tables, got {given!r:.200}")
-            table = {**table, key: [_surface_of(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
+            made = _opening_of if key == "openings" else _surface_of
+            table = {**table, key: [made(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
     return of_kind(table, where, ALL_SURFACES)
+
+
+def _opening_of(table: Any, where: str) -> Surface | Opening:
+    """An opening from its table, in which the times may be at which it is open."""
+    if not (isinstance(table, Mapping) and "times" in table):
+        return _surface_of(table, where)
+    surface = _surface_of({key: value for key, value in table.items() if key != "times"}, where)
+    try:
+        return Opening(surface, table["times"])
+    except SceneError as error:
+        raise SceneError(f"{where}.{error}") from None
 
 
 def method_of(table: Any) -> Method:
@@ -74,10 +87,17 @@ def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dic
         if described.laws:
             table["laws"] = [law if isinstance(law, str) else repr(law) for law in described.laws]
         if described.openings:
-            table["openings"] = [table_of(opening, arrays) for opening in described.openings]
+            table["openings"] = [_table_of_opening(opening, arrays) for opening in described.openings]
         if "part" in table:
             table["part"] = [table_of(part, arrays) for part in table["part"]]
     return table
+
+
+def _table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    if isinstance(opening, Surface):
+        return table_of(opening, arrays)
+    times = {} if opening.times is None else {"times": opening.times}
+    return {**table_of(opening.surface, arrays), **times}
 
 
 def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:

@@ -5,6 +5,7 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
+from ..surfaces.doors import Timed
 from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
 from ..surfaces.openings import is_open, outside
@@ -103,6 +104,8 @@ def may_pass(openings, active, path):
 
 
 def _may_enter(volume, path, reach):
+    if isinstance(volume, Timed):
+        return volume.if_open(_may_enter(volume.volume, path, reach), False)
     if isinstance(volume, Field):
         return _may_enter_one(volume.members, path, reach)
     return outside(volume, path.r1) <= reach
@@ -156,6 +159,8 @@ def _part(openings, wall, path, near):
 
 def _way_into(volume, path, near):
     """The part of a step after which it is in a volume."""
+    if isinstance(volume, Timed):
+        return volume.if_open(_way_into(volume.volume, path, near), math.inf)
     if isinstance(volume, Field):
         return _way_into_any(volume.members, path, near)
     return _way_in(volume, path, near)

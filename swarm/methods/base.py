@@ -22,6 +22,7 @@ _WITHOUT_LAWS = {
     "mass": None,
     "inertia": None,
     "openings": (),
+    "present": None,
 }
 
 

@@ -84,7 +84,9 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
         mesh, wires = _NOTHING, list[Floats]()
-        if bodies <= most and isinstance(surface, Spheres):
+        if not surface.is_there(time):
+            pass
+        elif bodies <= most and isinstance(surface, Spheres):
             mesh, wires = _placed(at, *_balls(surface))
         elif bodies and bodies <= most:
             mesh, wires = _placed(at, *_bodies(surface, _given(walls.box, at)))
@@ -248,7 +250,7 @@ class _Walls:
             gaps = self._scene.gaps(points, self._time)
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
             for i, volumes in enumerate(self._scene.volumes):
-                owner[(owner == i) & are_open(volumes, points)] = -1
+                owner[(owner == i) & are_open(volumes, points, self._time)] = -1
         return owner
 
     def _wires(self, i: int, vertices: Floats) -> list[Floats]:

@@ -17,6 +17,7 @@ from ..particles import Multipliers, Particles
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
+from .doors import DoorRun
 from .engine import Run
 from .impacts import log_of
 from .options import Task
@@ -144,7 +145,8 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
         return BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
     if task.scene.reacts():
         return ReactingRun(task.scene, task.particles, task.method, *how)
-    return Run(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
+    kind = DoorRun if task.scene.has_doors() else Run
+    return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:

@@ -29,7 +29,7 @@ Room = tuple[Surface, ...]
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
 # What is given to the whole holds for those of its parts that leave it at its default.
-_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion")
+_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion", "present")
 # Of the extent, how far a room without end is searched for a point in it.
 _REACH = 2.0
 
@@ -113,7 +113,7 @@ class Joined(Surface):
             return UNBOUNDED
         # The motion of the whole is none of its bounds.
         still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
-        boxes = list(map(room_bounds, still))
+        boxes = [room_bounds(_lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
 
@@ -142,9 +142,10 @@ class Joined(Surface):
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
     def _gaps(self, rows: Floats, time: float) -> Floats:
-        """The gaps of the parts; where one has no value it is not there."""
+        """The gaps of the parts; where one has no value it is not there, and one whose walls are not there is all over."""
         gaps = np.array([side_of(part) * part.phi(rows, time) for part in self.parts])
-        return np.where(np.isnan(gaps), math.inf, gaps)
+        there = np.array([part.is_there(time) for part in self.parts])
+        return np.where(there.reshape(-1, *[1] * (gaps.ndim - 1)), np.where(np.isnan(gaps), math.inf, gaps), -math.inf)
 
     def _own_points(self, points: ArrayLike, time: float) -> Floats:
         rows = self._own_rows(points, time)
@@ -258,10 +259,15 @@ def _turned(surface: Surface) -> Surface:
 
 def room_bounds(room: Sequence[Surface], time: float = 0.0) -> tuple[Floats, Floats]:
     """The corners of a box around a room at a time [s], infinite where it is open."""
-    boxes = np.array([box_of(surface, time) for surface in room])
+    boxes = np.array([box_of(surface, time) for surface in room] or [UNBOUNDED])
     low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
     planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
     return polyhedron_bounds(planes, low, high) if planes else (low, high)
+
+
+def _lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
+    """The surfaces of a room that are always there."""
+    return tuple(surface for surface in room if surface.present is None)
 
 
 def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
@@ -290,19 +296,20 @@ def _require_room(whole: Joined) -> None:
 def _ends(room: Room) -> tuple[Floats, Floats]:
     """The corners of the box in which a room is searched for a point."""
     low, high = room_bounds(room)
-    reach = _REACH * max(surface.extent() for surface in room) or 1.0
+    reach = _REACH * max((surface.extent() for surface in room), default=0.0) or 1.0
     return np.maximum(low, -reach), np.minimum(high, reach)
 
 
 def _may_have_volume(room: Room) -> bool:
-    low, high = _ends(room)
+    low, high = _ends(_lasting(room))
     return bool((low < high).all())
 
 
 def _has_volume(room: Room) -> bool:
+    room = _lasting(room)
     low, high = _ends(room)
     gaps, gradients = _gaps_of(room), _gradients_of(room)
-    return bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients)
+    return not room or bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients)
 
 
 def _gaps_of(room: Room) -> Callable[[Floats], Floats]:
