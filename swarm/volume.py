@@ -125,8 +125,8 @@ class Volume:
 
     def is_open(self) -> bool:
         """Whether a particle may fly to infinity, at the start or as soon as a wall has gone."""
-        boxes = [self.bounds(), *([self._bounds_of_lasting(self.surfaces)] if self.has_doors() else [])]
-        return not np.isfinite(boxes).all()
+        at_start = np.isfinite(self.bounds()).all()
+        return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""

@@ -101,7 +101,7 @@ class PlaneWalls:
                 gaps = self._scene.gaps(curve.T, self._time)
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
             for k, volumes in enumerate(self._scene.volumes):
-                owner[(owner == k) & are_open(volumes, curve.T)] = -1
+                owner[(owner == k) & are_open(volumes, curve.T, self._time)] = -1
             ends = np.flatnonzero(np.diff(np.concatenate([[False], owner == i, [False]]).astype(np.int8)))
             found += [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
         return found

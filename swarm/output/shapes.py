@@ -102,7 +102,7 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
-        wires = walls.curves(i, at, bodies) if bodies <= most else []
+        wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
         name, solid = f"{i}_{type(surface).__name__.lower()}", bodies > 0 or surface.is_solid()
         shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height))
     return shapes
