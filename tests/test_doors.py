@@ -13,6 +13,7 @@ import swarm
 from swarm import scene_file
 from swarm.contact.events import ARRIVED
 from swarm.kernel.vector import Vec, norm
+from swarm.output.film import _Film
 from swarm.output.shapes import shapes_of
 from swarm.run.doors import DoorRun
 from swarm.surfaces.doors import instants_of, is_there, was_there
@@ -366,6 +367,20 @@ def test_pictures_draw_what_is_there():
     assert [area[0] for area in areas] == pytest.approx([24.0, 24.0, 20.0, 20.0, 24.0], rel=0.05)
     for k, area in ((1, 4.0 * math.pi * 0.09), (2, 4.0 * math.pi * 0.01)):
         assert [one[k] for one in areas] == pytest.approx([0.0, area, area, 0.0, 0.0], rel=0.1)
+
+
+@pytest.mark.parametrize("motion", [None, swarm.Oscillation((0.1, 0.0, 0.0), 1.0)])
+def test_a_film_draws_what_is_there(tmp_path, motion):
+    ball = swarm.Sphere(0.3, side="outside", present=[(0.5, 1.0)], motion=motion)
+    scene = swarm.Scene([swarm.Sphere(0.9), ball])
+    start = thrown([(0, 0, 0.8)], [(0, 0, 0)])
+    run(scene, start, until=1.5, frames=3, trajectory=tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        film = _Film(trajectory, [0, 1, 2, 3], (320, 240), 10)
+        counts = [[len(curves) for _solid, curves in film._walls_at(k)] for k in range(4)]
+        assert [one[1] > 0 for one in counts] == [False, True, False, False]
+        assert all(one[0] > 0 for one in counts)
+        assert trajectory.animate(tmp_path / "run.gif", size=(160, 120)).stat().st_size > 0
 
 
 # --- What is refused -------------------------------------------------------------------------------------
