@@ -86,6 +86,7 @@ class Pieces(Volume):
         return openings_in(self.order.spans(self._pieces), self._volumes, moment)
 
     def has_doors(self) -> bool:
+        """Whether some walls are present, or some openings open, for some times only."""
         every = [one for piece in self._pieces for one in (piece, *piece.open_volumes())]
         return any(one.present is not None for one in every)
 

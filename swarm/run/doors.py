@@ -104,7 +104,7 @@ class DoorRun(Run):
             raise RunError(sentence_of_coming(self._scene, self.state, found, depth, instant, self._first))
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
-        """Let what slides or rests on walls that have gone fly: `gone` says of each piece of the scene whether it has."""
+        """Let what slides or rests on walls that have gone fly: those of the pieces that are `gone`."""
         # Number -1 is no wall.
         walls = np.append(gone[self._scene.pieces_of_walls()], False)
         held = walls[contacts.walls.astype(np.int64)].any(axis=0)

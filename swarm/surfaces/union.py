@@ -142,7 +142,7 @@ class Joined(Surface):
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
     def _gaps(self, rows: Floats, time: float) -> Floats:
-        """The gaps of the parts; where one has no value it is not there, and one whose walls are not there is all over."""
+        """The gaps of the parts: nowhere where one has no value, and all over where its walls are not there."""
         gaps = np.array([side_of(part) * part.phi(rows, time) for part in self.parts])
         there = np.array([part.is_there(time) for part in self.parts])
         return np.where(there.reshape(-1, *[1] * (gaps.ndim - 1)), np.where(np.isnan(gaps), math.inf, gaps), -math.inf)
@@ -309,7 +309,7 @@ def _has_volume(room: Room) -> bool:
     room = _lasting(room)
     low, high = _ends(room)
     gaps, gradients = _gaps_of(room), _gradients_of(room)
-    return not room or bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients)
+    return not room or (bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients))
 
 
 def _gaps_of(room: Room) -> Callable[[Floats], Floats]:
