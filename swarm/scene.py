@@ -23,10 +23,10 @@ from .surfaces.fields.grouped import order_of, walls_in
 from .surfaces.fields.many import in_straight_flights
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, images_of, lengths_of
+from .surfaces.joined import with_rooms
 from .surfaces.moving import carried
 from .surfaces.openings import require_few
 from .surfaces.period import Period, cell_in
-from .surfaces.rooms import with_rooms
 from .surfaces.surface import Surface
 from .surfaces.upright import upright
 from .surfaces.walls import Walls

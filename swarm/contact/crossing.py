@@ -10,24 +10,17 @@ from ..kernel.vector import Vec, dot, highest, lowest, square
 from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried
+from ..surfaces.patched import Patched
 from ..surfaces.posed import Posed
 from ..surfaces.walls import Field
+from .path import Path, at_part, bisected, members_of
+from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
 # Of a length, the part that is none.
 _NEAR = 1e-13
-# Places of a step that are looked at for another wall, and halvings down to its instant.
-_PLACES, _HALVINGS = 16, 60
-
-
-class Path(Record):
-    """A step of length h."""
-
-    r0: Vec
-    v0: Vec
-    r1: Vec
-    v1: Vec
-    h: Any
+# Places of a step that are looked at for another wall.
+_PLACES = 16
 
 
 def meets(walls, ends, active, path, near):
@@ -36,13 +29,26 @@ def meets(walls, ends, active, path, near):
     `ends` are the walls at its end, which are others where they move.
     """
     found = False
-    for (number, wall), end in zip(walls.numbered(), ends.each, strict=True):
+    for rooms, rooms_then in zip(walls.joined(), ends.joined(), strict=True):
+        found = _leaves_all(rooms, rooms_then, active, path, near) | found
+    for (number, wall), (_number, end) in zip(walls.shared(), ends.shared(), strict=True):
         if isinstance(wall, Field):
             here = _meets_one(wall.members, end.members, number, active, path, near)
         else:
             here = _may_meet(wall, end, path, near) & (not active.has(number))
         found = found | here
     return found
+
+
+def _leaves_all(rooms, ends, active, path, near):
+    """Whether a step may leave every room of a union."""
+    leaves = True
+    for room, then in zip(rooms, ends, strict=True):
+        met = False
+        for (number, wall, _gentle), (_number, end, _) in zip(room, then, strict=True):
+            met = (_may_meet(wall, end, path, near) & (not active.has(number))) | met
+        leaves = met & leaves
+    return leaves
 
 
 @outlined
@@ -59,11 +65,6 @@ def _meets_one(field, ends, number, active, path, near):
 def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
     return found or ((not active.has(number + m)) and _may_meet(field.wall(m), ends.wall(m), path, near))
-
-
-def members_of(field):
-    """The bodies of a field."""
-    return field.body if isinstance(field, Posed) else field
 
 
 def own_path(field, ends, path):
@@ -122,14 +123,25 @@ def arrival(walls, active, path, near, remaining):
     """The first wall that a step goes into, with so much of the frame left at its start [s]."""
     if isinstance(walls, Carried):
         return _arrival_later(walls, active, path, near, remaining)
-    found = Arrival(math.inf, -1.0)
-    for number, wall in reversed(walls.numbered()):
+    found = _out_of_unions(walls, active, path, near, remaining)
+    for number, wall in reversed(walls.shared()):
         if isinstance(wall, Field):
             found = _first_of(wall.members, number, active, path, near, found)
         elif not active.has(number):
             time = _deep_after(_Still(wall), path, near)
             if time <= found.time:
                 found = Arrival(time, number)
+    return found
+
+
+def _out_of_unions(walls, active, path, near, remaining):
+    """The first `Arrival` where a step leaves a union."""
+    found = Arrival(math.inf, -1.0)
+    for rooms in walls.joined():
+        spans = tuple((room[0][0], room[-1][0]) for room in rooms)
+        time, wall = leaving(walls, spans, active, path, near, remaining)
+        if time < found.time:
+            found = Arrival(time, wall)
     return found
 
 
@@ -144,6 +156,8 @@ def _sooner_body(found, m, members, number, active, path, near):
     if active.has(number + m):
         return found
     time = _deep_after(_Still(member(members, index(m))), path, near)
+    if isinstance(members, Patched) and time < math.inf and not members.is_there(float(m), at_part(path, time), near):
+        return found
     if time < found.time or (time == found.time and number + m < found.wall):
         return Arrival(time, number + m)
     return found
@@ -151,8 +165,8 @@ def _sooner_body(found, m, members, number, active, path, near):
 
 def _arrival_later(walls, active, path, near, remaining):
     """`arrival` where some walls move."""
-    later, before = Arrival(math.inf, -1.0), walls.count_in_fields()
-    for i in range(walls.others().length()):
+    later, before = _out_of_unions(walls, active, path, near, remaining), walls.count_in_fields()
+    for i in range(len(walls.shared()) - len(walls.fields())):
         later = _sooner_at(later, i, walls, before, active, path, near, remaining)
     if not walls.fields():
         return later
@@ -234,31 +248,6 @@ def _deep_after(body, path, near):
 
 def _is_deep(body, path, s):
     return body.depth(at_part(path, s), s * path.h) > 0.0
-
-
-def bisected(has_happened, given, low, high):
-    """The part of a step from which on has_happened(*given, part), which it is at `high` and not at `low`."""
-    for _i in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if has_happened(*given, middle):
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-def at_part(path, s):
-    """The place on the cubic through both ends of a step."""
-    r0, a, b, c = cubic(path)
-    return r0 + s * (a + s * (b + s * c))
-
-
-def cubic(path):
-    """The cubic through both ends of a step, as the coefficients of the powers of the part of it."""
-    d, h = path.r1 - path.r0, path.h
-    # Hermite's form
-    a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
-    return path.r0, h * path.v0, a, b
 
 
 def near(rules, r):

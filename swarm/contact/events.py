@@ -12,6 +12,7 @@ from .hold import One, Two
 from .laws import NONE
 from .projection import ALLOWED
 from .reflection import Energy, exact, relative, wall_velocity
+from .rooms import are_one
 
 # What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
 # decided; or it is left to `careful`.
@@ -120,7 +121,8 @@ def enter(rules, walls, gravity, wall, p):
     if not short:
         return flies
     following = flights.first_hit(walls, gravity, p.r, v)
-    if 0.0 <= following.wall != wall and following.time < hop:
+    is_other = following.wall >= 0.0 and not are_one(walls, wall, following.wall, p.r)
+    if is_other and following.time < hop:
         at = accelerated(gravity, v, following.time)
         other = wall_velocity(rules.laws.moving, walls, following.wall, p.r)
         towards = dot(_normal(walls, following.wall, p.r), relative(other, at))

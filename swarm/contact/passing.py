@@ -10,8 +10,9 @@ from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
 from ..surfaces.openings import is_open, outside
 from ..surfaces.walls import Field
-from .crossing import at_part, bisected, block_of_path
+from .crossing import block_of_path
 from .events import TOUCH
+from .path import at_part, bisected
 from .reflection import relative, wall_velocity
 
 # Places of a step between which the distance to an opening has one least value, and steps of the search for it.

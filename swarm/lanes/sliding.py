@@ -12,7 +12,7 @@ from ..kernel.record import Record
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
-LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES = 1, 2, 4, 8, 16, 32, 64
+LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES, ENDS = 1, 2, 4, 8, 16, 32, 64, 128
 # A lane goes on to stay.
 AGAIN = -1
 

@@ -7,12 +7,14 @@ import numpy as np
 from ..contact import crossing, events
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
 from ..contact.passing import part_until_open
+from ..contact.path import Path, cubic
+from ..contact.rooms import ended_wall, have_ends, part_until_end, wall_after
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
 from ..surfaces.period import part_until
 from .escape import is_at_opening
-from .sliding import FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
+from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after
 from .sticking import stay
 
@@ -32,6 +34,10 @@ def set_going(slide, i):
     now = walls.at(remaining)
     if lanes.openings is not None and is_at_opening(slide, now, i):
         return EVENT
+    if have_ends(walls):
+        phase = _past_ends(slide, now, i)
+        if phase != slide.phase():
+            return phase
     force = slide.force(lane, now, r, v)
     lane.a, lane.press, lane.press_second = force.acceleration, force.n, force.m
     if not lane.step > 0.0:
@@ -66,7 +72,9 @@ def decide(slide, i):
     if event & FAILED:
         return _shorten(slide, i)
     active, r, v = slide.active(lane), lane.r, lane.v
-    path, near = crossing.Path(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
+    if event & ENDS and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0:
+        return set_going(slide, i)
+    path, near = Path(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
     cut = 1.0
     if event & LIFTED:
         particle = events.Particle(r, v, lane.remaining, lane.twice, lane.scale2)
@@ -81,15 +89,47 @@ def decide(slide, i):
             lane.r = walls.at(lane.remaining).project(met.wall, r)
             return EVENT
         cut = min(cut, met.time)
-    if event & (LEAVES | PASSES):
-        cut = min(cut, part_until(lanes.period, crossing.cubic(path)))
-        cut = min(cut, part_until_open(lanes.openings, method, walls.at(lane.remaining), active, path, near))
+    cut = min(cut, _until_gone(slide, event, active, path, lane.remaining))
     if not cut < 1.0:
         # It passes near a wall.
         return _take(slide, i)
     lane.cut = cut * h
     lane.trials += 1.0
     return slide.phase() if lane.trials <= _MOST_TRIALS else _give_up(slide, i)
+
+
+def _until_gone(slide, event, active, path, remaining):
+    """The part of a step after which a wall ends, or is open, or a cell that repeats does; infinite where none does."""
+    lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
+    if event & ENDS:
+        found = part_until_end(slide.walls, active, path, near, remaining)
+    if event & (LEAVES | PASSES):
+        found = min(found, part_until(lanes.period, cubic(path)))
+        now = slide.walls.at(remaining)
+        found = min(found, part_until_open(lanes.openings, slide.method, now, active, path, near))
+    return found
+
+
+@outlined
+def _past_ends(slide, now, i):
+    """The phase of a lane whose walls may end where it is: on those that follow, or where it flies."""
+    lane, near = slide.lanes.lane(i), crossing.near(slide.method, slide.lanes.lane(i).r)
+    for _wall in range(2):
+        ended = ended_wall(now, slide.active(lane), lane.r, near)
+        if ended < 0.0:
+            break
+        after = wall_after(now, ended, lane.r, near)
+        if ended == lane.second:
+            lane.second = after
+        elif after >= 0.0:
+            lane.first = after
+        elif lane.second >= 0.0:
+            lane.first, lane.second = lane.second, -1.0
+        else:
+            return FLYING
+        if lane.second < 0.0:
+            return HELD
+    return slide.phase()
 
 
 def _stop(slide, i):

@@ -54,6 +54,8 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("list_in_cell", (None, None, "place", None), None),
     ("one_in_cell", (None, "place"), None),
     ("deepest_in_cell", ("place",), None),
+    ("is_there", (None, "place", None), None),
+    ("wall_after", (None, "place", None), None),
 )
 _CONSTANTS = ("side", "flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "lacks_bend", "chord_sweeps")
 

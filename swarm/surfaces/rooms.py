@@ -9,54 +9,14 @@ wall, 1/the steepness of its level).
 """
 
 import math
-from collections.abc import Sequence
-
-import numpy as np
 
 from ..kernel.gravity import displacement
 from ..kernel.jit import select
-from ..kernel.vector import Vec, norm
-from .surface import Surface
-from .walls import Walls
 
 # A flight goes on into a room that it is inside of by so many times the slack.
 _INSIDE = 4.0
-# Of the extent of a union, the slack of its rooms.
-_SLACK = 1e-13
-# Places at which it is asked how steep a level is, and moves of each onto its wall.
-_PLACES, _MOVES = 64, 4
-
-
-# --- From a description ----------------------------------------------------------------------------------
-
-
-def with_rooms(walls: Walls, unions: Sequence[Sequence[Sequence[Surface]]]) -> Walls:
-    """The walls of a scene of which the last are those of unions: of each its rooms, and of these the surfaces."""
-    if not unions:
-        return walls
-    gentle = tuple(tuple(tuple(g for one in room for g in _gentle(one)) for room in rooms) for rooms in unions)
-    extent = max(surface.extent() for rooms in unions for room in rooms for surface in room)
-    return walls._replace(unions=gentle, slack=_SLACK * (extent or 1.0))
-
-
-def _gentle(surface: Surface) -> list[float]:
-    """1/the steepness of the level of each wall of a surface, at its steepest place."""
-    random, reach = np.random.default_rng(0), surface.extent() or 1.0
-    points = reach * random.uniform(-1.0, 1.0, (3, _PLACES))
-    found = []
-    with np.errstate(all="ignore"):
-        for wall in surface.walls():
-            places = points
-            for _move in range(_MOVES):
-                slope = np.array(np.broadcast_arrays(*wall.gradient(Vec(*places)), places[0])[:3])
-                places = places - wall.phi(Vec(*places)) / (slope**2).sum(axis=0) * slope
-            slopes = [float(norm(wall.inner_gradient(Vec(*place)))) for place in places.T if np.isfinite(place).all()]
-            steepest = max((slope for slope in slopes if slope < math.inf), default=1.0)
-            found.append(1.0 / steepest if steepest > 0.0 else 1.0)
-    return found
-
-
-# --- In kernels ------------------------------------------------------------------------------------------
+# Walls nearer than so many times the slack touch a particle; more of them than any room has.
+_TOUCH, _OUT = 1024.0, 1e6
 
 
 def gaps_in(rooms, r):
@@ -111,3 +71,21 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
         return last, wall
     there = r + displacement(gravity, v, last)
     return last, select(is_inside_any(walls, gaps_in(rooms, there)), -1.0, wall)
+
+
+def owner_of(walls, rooms, r):
+    """The number of the room that is asked for the walls near a point: whose walls touch it least, then the deepest."""
+    owner, fewest, deepest = 0, math.inf, math.inf
+    for k, room in enumerate(rooms):
+        gap, touching = gap_in(room, r), 0.0
+        for _number, wall, gentle in room:
+            near = wall.level_of(wall.inner(r)) * gentle >= -_TOUCH * walls.slack
+            touching += select(near, 1.0, 0.0)
+        touching = select(gap > walls.slack, _OUT, touching)
+        better = (touching < fewest) | ((touching == fewest) & (gap < deepest))
+        owner, fewest, deepest = (
+            select(better, k, owner),
+            select(better, touching, fewest),
+            select(better, gap, deepest),
+        )
+    return owner

@@ -10,6 +10,7 @@ from ..kernel.arrays import scratch
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
+from .rooms import owner_of
 
 
 class Field(Record):
@@ -129,11 +130,13 @@ class Walls(Record):
             row = select(number < stop, k, row)
         return row
 
-    # --- Near a point: all that are in no field, and of a field those in the cell of the point ---
+    # --- Near a point: all that are in no field, of a field those in the cell of the point, of a union one room's ---
 
     def numbers_near(self, r):
         """The numbers of the walls near a point, in an array of the function that asks."""
-        near = self.others().length()
+        near = len(self.shared()) - len(self.fields())
+        for rooms in self.joined():
+            near = self._count_in_owner(rooms, r) + near
         for _number, field in reversed(self.fields()):
             near = field.members.count_in_cell(r) + near
         number = scratch(near, np.float64)
@@ -145,9 +148,25 @@ class Walls(Record):
         k = 0
         for number, field in self.fields():
             k += field.members.list_in_cell(k, number, r, into)
-        before = self.count_in_fields()
-        for i in range(self.others().length()):
+        before, alone = self.count_in_fields(), len(self.shared()) - len(self.fields())
+        for i in range(alone):
             into[k + i] = before + i
+        k += alone
+        for rooms in self.joined():
+            owner = owner_of(self, rooms, r)
+            for i, room in enumerate(rooms):
+                if i == owner:
+                    for number, _wall, _gentle in room:
+                        into[k] = number
+                        k += 1
+
+    @outlined
+    def _count_in_owner(self, rooms, r):
+        """The number of walls of the room of a union that is asked for those near a point."""
+        owner, count = owner_of(self, rooms, r), 0
+        for i, room in enumerate(rooms):
+            count = select(i == owner, len(room), count)
+        return count
 
     def until_others(self, r, v):
         """When a straight flight may meet a wall that is not near its start."""

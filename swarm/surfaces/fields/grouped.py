@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
 from ..doors import walls_then
+from ..joined import with_rooms
 from ..moving import walls_of
-from ..rooms import with_rooms
 from ..surface import Surface
 from ..walls import Field, Listed, Walls, all_walls
 from .many import Many
