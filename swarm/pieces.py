@@ -16,7 +16,7 @@ from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Opened, openings_in, reaches, volumes_of
+from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined
 from .volume import Volume
@@ -30,13 +30,15 @@ class Pieces(Volume):
 
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...]
+    # Those in which it is where another room of its union is behind it.
+    _doorways: tuple[tuple[Surface, ...], ...]
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
         raise NotImplementedError
 
     @cached_property
-    def _pieces(self) -> tuple[Surface, ...]:
+    def pieces(self) -> tuple[Surface, ...]:
         """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
         return tuple(piece for images in self._images for image in images for piece in _pieces_of(image))
 
@@ -54,73 +56,78 @@ class Pieces(Volume):
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
             first += len(_pieces_of(image))
-        return order_of(self._pieces, unions=unions)
+        return order_of(self.pieces, unions=unions)
 
     @cached_property
     def _groups(self) -> list[Members]:
         """The surfaces that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
-        return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
+        return [members_of([self.pieces[i] for i in group], repeated) for group in self.order.groups]
 
     @cached_property
     def volumes(self) -> tuple[tuple[Surface, ...], ...]:
         """The volumes in which every surface is open."""
         found: list[dict[Surface, None]] = [{} for _surface in self.surfaces]
-        for i, given in zip(self.owners_of_pieces, self._volumes, strict=True):
-            found[i].update(dict.fromkeys(given))
+        for i, *given in zip(self.owners_of_pieces, self._volumes, self._doorways, strict=True):
+            found[i].update(dict.fromkeys(itertools.chain(*given)))
         return tuple(map(tuple, found))
 
     def laws(self) -> Laws | None:
         """The laws of every wall of the scene as kernels take them, None where no surface has one."""
         laws = Laws(
-            self._of_walls([piece.restitution for piece in self._pieces], 1.0),
-            self._of_walls([piece.friction for piece in self._pieces], 0.0),
-            self._of_walls([_thermal(piece) for piece in self._pieces], _NO_HEAT),
+            self._of_walls([piece.restitution for piece in self.pieces], 1.0),
+            self._of_walls([piece.friction for piece in self.pieces], 0.0),
+            self._of_walls([_thermal(piece) for piece in self.pieces], _NO_HEAT),
             Moves(0.0) if self.moves() else None,
-            owned_in(self.order.spans(self._pieces), self._pieces, self.owners_of_pieces),
+            owned_in(self.order.spans(self.pieces), self.pieces, self.owners_of_pieces),
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
-        return openings_in(self.order.spans(self._pieces), self._volumes, moment)
+        spans = self.order.spans(self.pieces)
+        ways = openings_in(spans, self._volumes, moment), openings_in(spans, self._doorways, moment, Doorway)
+        return None if ways == ((), ()) else (*ways[0], *ways[1])
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""
-        every = [one for piece in self._pieces for one in (piece, *piece.open_volumes())]
-        return any(one.present is not None for one in every)
+        return any(one.present is not None for one in (*self.pieces, *self.open_volumes()))
 
     @cached_property
     def instants(self) -> tuple[float, ...]:
         """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
-        return instants_of(self._pieces)
+        return instants_of(one.present for one in (*self.pieces, *self.open_volumes()))
+
+    def open_volumes(self) -> tuple[Surface, ...]:
+        """The volumes in which any piece is open."""
+        return tuple(itertools.chain(*self._volumes, *self._doorways))
 
     def pieces_of_walls(self) -> NDArray[np.int64]:
         """The piece that each wall of the scene belongs to, by its number."""
-        return np.array([i for i, _member in self.order.members(self._pieces)])
+        return np.array([i for i, _member in self.order.members(self.pieces)])
 
     def pieces_of_rows(self) -> NDArray[np.int64]:
         """The piece that each row of `owners` belongs to."""
-        return np.array(self.order.owners(self._pieces))
-
-    def pieces(self) -> tuple[Surface, ...]:
-        """The surfaces, those of which unions are made, and images."""
-        return self._pieces
+        return np.array(self.order.owners(self.pieces))
 
     def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
         """The value of the piece of every wall, None where all are neutral."""
         if all(value == neutral for value in values):
             return None
-        spans = ((values[i], walls) for i, walls in self.order.spans(self._pieces))
+        spans = ((values[i], walls) for i, walls in self.order.spans(self.pieces))
         return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
 
     def owners(self) -> list[int]:
         """The surface that each row of the scene belongs to, one for a field."""
-        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
+        return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
 
     def members(self) -> NDArray[np.int64]:
         """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
+        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self.pieces)]).T
+
+    def _unions(self) -> list[int]:
+        """The surfaces that are unions of several rooms."""
+        return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 
 
 def _pieces_of(image: Surface) -> tuple[Surface, ...]:
@@ -161,3 +168,27 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[
         open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
         found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
     return found
+
+
+def doorways_of_pieces(
+    images: Sequence[Sequence[Surface]], volumes: Sequence[Sequence[Surface]]
+) -> tuple[tuple[Surface, ...], ...]:
+    """The volumes in which every piece is open where another room of its union is on its other side.
+
+    Those are the volumes of the other rooms, and those that open walls between rooms only.
+    """
+    found: list[tuple[Surface, ...]] = []
+    for image in (image for some in images for image in some):
+        rooms = image.rooms if isinstance(image, Joined) else ((image,),)
+        given, first = [], len(found)
+        for room in rooms:
+            given.append([one for some in volumes[first : first + len(room)] for one in some])
+            first += len(room)
+        for k, room in enumerate(rooms):
+            others = [one for j, some in enumerate(given) if j != k for one in some]
+            between = [one for piece in itertools.chain(*rooms) for one in piece.open_volumes(True)]
+            for piece in room:
+                mine = volumes[len(found)]
+                found.append(tuple(one for one in dict.fromkeys([*others, *between])
+                                   if one not in mine and reaches(piece, one)))  # fmt: skip
+    return tuple(found)

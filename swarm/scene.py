@@ -15,7 +15,7 @@ from . import plane as planes
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
-from .pieces import Pieces, volumes_of_pieces
+from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
@@ -68,6 +68,7 @@ class Scene(Pieces):
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    _doorways: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -90,10 +91,11 @@ class Scene(Pieces):
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
-        checks.assign(self, _volumes=volumes_of_pieces(surfaces, images, lengths))
+        volumes = volumes_of_pieces(surfaces, images, lengths)
+        checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
-        require_few(self._volumes)
-        for i in self._fields() if self.reacts() else ():
+        require_few((*self._volumes, *self._doorways))
+        for i in (*self._fields(), *self._unions()) if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
                 f"{surfaces[i]}; give that surface a motion instead of a mass and an inertia, or list the bodies one "
@@ -125,7 +127,7 @@ class Scene(Pieces):
 
     def _require_few_walls(self, why: str) -> None:
         """Raise a `SceneError` where there are more walls than kernels can be compiled for."""
-        walls = self.order.compiled(self._pieces)
+        walls = self.order.compiled(self.pieces)
         if walls > MOST_WALLS:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
@@ -146,10 +148,15 @@ class Scene(Pieces):
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
                 f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
+        for i in self._unions():
+            raise SceneError(
+                f"surfaces[{i}] must not be a {type(self.surfaces[i]).__name__} of several rooms with {what}, got "
+                f"{self.surfaces[i]!r:.200}; use Impact with contact_step = 0"
+            )
         if not self.order.groups:
             return self
         made = copy.copy(self)
-        made.__dict__.update(order=order_of(self._pieces, False, self.order.unions), _groups=[])
+        made.__dict__.update(order=order_of(self.pieces, False, self.order.unions), _groups=[])
         made._require_few_walls(f" with {what}")
         return made
 
@@ -178,14 +185,14 @@ class Scene(Pieces):
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
         """
         if self.moves():
-            fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
-            rooms = [[[self._pieces[i] for i in room] for room in union] for union in self.order.unions]
+            fields, others = ([self.pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
+            rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
             return self._upright(with_rooms(carried(fields, others, moment), rooms))
         if own is not None:
-            return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
-        there = tuple(was_there(piece.present, moment) for piece in self._pieces)
+            return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
+        there = tuple(was_there(piece.present, moment) for piece in self.pieces)
         if there not in self._walls:
-            made = walls_in(self.order, self._pieces, self._groups, (), self._taken, moment)
+            made = walls_in(self.order, self.pieces, self._groups, (), self._taken, moment)
             self._walls[there] = self._upright(made)
         return self._walls[there]
 
@@ -195,7 +202,7 @@ class Scene(Pieces):
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """The number of walls of each row of `owners`: the members of a field, else one."""
-        fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
+        fields = [len(self.pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
         return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
     def cell(self) -> Period | None:
@@ -212,7 +219,7 @@ class Scene(Pieces):
 
     @cached_property
     def _moves(self) -> bool:
-        return self._reacts or any(piece.motion is not None for piece in self._pieces)
+        return self._reacts or any(piece.motion is not None for piece in self.pieces)
 
     @cached_property
     def _reacts(self) -> bool:

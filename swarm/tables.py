@@ -49,12 +49,13 @@ def _surface_of(table: Any, where: str) -> Surface:
 
 
 def _opening_of(table: Any, where: str) -> Surface | Opening:
-    """An opening from its table, in which the times may be at which it is open."""
-    if not (isinstance(table, Mapping) and "times" in table):
+    """An opening from its table, in which may be what it has besides a surface."""
+    mine = {key: table[key] for key in ("times", "between") if key in table} if isinstance(table, Mapping) else {}
+    if not mine:
         return _surface_of(table, where)
-    surface = _surface_of({key: value for key, value in table.items() if key != "times"}, where)
+    surface = _surface_of({key: value for key, value in table.items() if key not in mine}, where)
     try:
-        return Opening(surface, table["times"])
+        return Opening(surface, **mine)
     except SceneError as error:
         raise SceneError(f"{where}.{error}") from None
 
@@ -96,8 +97,8 @@ def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dic
 def _table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
     if isinstance(opening, Surface):
         return table_of(opening, arrays)
-    times = {} if opening.times is None else {"times": opening.times}
-    return {**table_of(opening.surface, arrays), **times}
+    mine = {"times": opening.times, "between": opening.between or None}
+    return {**table_of(opening.surface, arrays), **{key: value for key, value in mine.items() if value is not None}}
 
 
 def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:

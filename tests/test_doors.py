@@ -54,7 +54,8 @@ def test_a_span_has_its_begin_and_not_its_end():
     assert was_there(None, 5.0)
     assert not was_there(((0.5, 1.0),), 0.0)
     wall = swarm.Sphere(1.0, present=spans, openings=[swarm.Opening(swarm.Sphere(0.1, (0, 0, 1)), [(0.5, 3.0)])])
-    assert instants_of([wall, wall]) == (0.5, 2.0, 3.0)
+    assert instants_of([spans, None, spans]) == (2.0, 3.0)
+    assert swarm.Scene([wall, wall]).instants == (0.5, 2.0, 3.0)
 
 
 # --- Openings --------------------------------------------------------------------------------------------

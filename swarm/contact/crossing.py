@@ -6,7 +6,7 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import Vec, dot, highest, lowest, square
+from ..kernel.vector import Vec, dot, highest, lowest, norm, square
 from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried
@@ -17,6 +17,8 @@ from .path import Path, at_part, bisected, members_of
 from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
+# Of a speed, the part across a wall of what goes along it.
+_ALONG = 1e-9
 # Of a length, the part that is none.
 _NEAR = 1e-13
 # Places of a step that are looked at for another wall.
@@ -44,11 +46,19 @@ def _leaves_all(rooms, ends, active, path, near):
     """Whether a step may leave every room of a union."""
     leaves = True
     for room, then in zip(rooms, ends, strict=True):
-        met = False
+        met, enters, holds = False, False, False
         for (number, wall, _gentle), (_number, end, _) in zip(room, then, strict=True):
             met = (_may_meet(wall, end, path, near) & (not active.has(number))) | met
-        leaves = met & leaves
+            enters, holds = _is_entrance(wall, path, near) | enters, active.has(number) | holds
+        # Who comes to the face of a room that does not hold it has not come in.
+        leaves = (met | (enters & (not holds))) & leaves
     return leaves
+
+
+def _is_entrance(wall, path, near):
+    """Whether a step begins at a wall of a room, and goes into that."""
+    level, rise, scale = _level(wall, path.r0, path.v0)
+    return (level > -near * scale) & (rise < -_ALONG * scale * norm(path.v0))
 
 
 @outlined

@@ -58,6 +58,11 @@ def _is_of(room, number):
     return (number >= room[0][0]) & (number <= room[-1][0])
 
 
+def has_ended(walls, number, r, near):
+    """Whether a wall is not there at a place on it."""
+    return have_ends(walls) and _ends(walls, number, r, _BEYOND, near)
+
+
 def may_end(walls, active, r, near):
     """Whether a wall that holds a particle is not there where a step ends."""
     found = False
@@ -162,12 +167,26 @@ def leaving(walls, spans, active, path, near, remaining):
 
 @outlined
 def _begin(walls, spans, active, path, near, remaining, inside):
-    """Which rooms of a union hold a particle at the start of a step; the nearest at least."""
-    nearest = math.inf
-    for span in spans:
-        nearest = min(nearest, _deepest(walls, span, active, path, remaining, 0.0)[0])
-    for k, span in enumerate(spans):
-        inside[k] = _deepest(walls, span, active, path, remaining, 0.0)[0] <= max(near, nearest)
+    """Which rooms of a union a particle is in at the start of a step: that whose wall holds it, or the nearest.
+
+    It is in another one if it is inside of that by more than `near`: rooms that touch are apart.
+    """
+    nearest, held = math.inf, False
+    for first, last in spans:
+        nearest = min(nearest, _deepest(walls, (first, last), active, path, remaining, 0.0)[0])
+        held = held or _holds(active, first, last)
+    least = -near if held else max(near, nearest)
+    for k, (first, last) in enumerate(spans):
+        depth = _deepest(walls, (first, last), active, path, remaining, 0.0)[0]
+        inside[k] = depth <= least or _holds(active, first, last)
+
+
+def _holds(active, first, last):
+    """Whether one of the walls that hold a particle is one of a room."""
+    found = False
+    for one in active:
+        found = found or first <= one <= last
+    return found
 
 
 @outlined

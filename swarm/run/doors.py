@@ -70,12 +70,11 @@ class DoorRun(Run):
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return
-        last, pieces = self._before(instant), self._scene.pieces()
+        last, pieces = self._before(instant), self._scene.pieces
         gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
         if any(gone):
             self._let_go(contacts, np.array(gone))
-        volumes = [volume for one in pieces for volume in one.open_volumes()]
-        if any(one.is_there(instant) and not one.is_there(last) for one in volumes):
+        if any(one.is_there(instant) and not one.is_there(last) for one in self._scene.open_volumes()):
             _wake(contacts, contacts.phase == ARRIVED)
 
     def _before(self, instant: float) -> float:
@@ -87,7 +86,7 @@ class DoorRun(Run):
         """Raise a RunError where a particle is inside a wall that comes at an instant [s]."""
         last, owners = self._before(instant), self._scene.owners_of_pieces
         came = np.zeros(len(self._scene.surfaces), np.bool_)
-        for i, piece in zip(owners, self._scene.pieces(), strict=True):
+        for i, piece in zip(owners, self._scene.pieces, strict=True):
             came[i] |= piece.is_there(instant) and not piece.is_there(last)
         if not came.any():
             return

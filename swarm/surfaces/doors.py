@@ -7,7 +7,7 @@ one instant to the next a number says of each such wall whether it is there, and
 import bisect
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +39,7 @@ class Opening:
         surface: the volume, a surface without openings, laws and motion.
         times: pairs (t0, t1) [s] that ascend, from 0 s on: it is open from t0 on and shut again from t1 on, which is
             infinite in the last pair if it stays open. None: it is always open, as a surface is by itself.
+        between: True: only walls between rooms of a `Union` are open in it, so that a door may reach the floor.
 
     Raises:
         SceneError: the times are no such pairs.
@@ -51,8 +52,11 @@ class Opening:
 
     surface: "Surface"
     times: Any = None
+    between: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.between, bool):
+            raise SceneError(f"between must be True or False, got {self.between!r:.200}")
         object.__setattr__(self, "times", checked_spans("times", self.times))
 
 
@@ -111,14 +115,13 @@ def was_there(spans: Spans, moment: float) -> bool:
     return k >= 0 and moment <= spans[k][1]
 
 
-def instants_of(surfaces: Sequence["Surface"]) -> tuple[float, ...]:
-    """The instants after 0 s at which a wall comes or goes, or an opening opens or shuts [s], in order."""
+def instants_of(every: Iterable[Spans]) -> tuple[float, ...]:
+    """The instants after 0 s at which any of some spans begins or ends [s], in order."""
     found: set[float] = set()
-    for surface in surfaces:
-        for spans in (surface.present, *(volume.present for volume in surface.open_volumes())):
-            begins, ends = ({pair[k] for pair in spans or ()} for k in (0, 1))
-            # Pairs that touch are one.
-            found |= begins ^ ends
+    for spans in every:
+        begins, ends = ({pair[k] for pair in spans or ()} for k in (0, 1))
+        # Pairs that touch are one.
+        found |= begins ^ ends
     return tuple(sorted(time for time in found if 0.0 < time < math.inf))
 
 

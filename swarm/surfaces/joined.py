@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..kernel.vector import Vec, norm
+from .moving import Marched, Strided
 from .surface import Surface
 from .walls import Walls
 
@@ -21,6 +22,9 @@ def with_rooms(walls: Walls, unions: Sequence[Sequence[Sequence[Surface]]]) -> W
         return walls
     gentle = tuple(tuple(tuple(g for one in room for g in _gentle(one)) for room in rooms) for rooms in unions)
     extent = max(surface.extent() for rooms in unions for room in rooms for surface in room)
+    if isinstance(walls, Strided):
+        # Lanes take the safe steps of walls that hold every particle.
+        walls = Marched(*walls)
     return walls._replace(unions=gentle, slack=_SLACK * (extent or 1.0))
 
 

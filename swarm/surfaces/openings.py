@@ -43,23 +43,25 @@ class Opened(Record):
         return (wall >= self.first) & (wall < self.last)
 
 
+class Doorway(Opened):
+    """The volumes in which they are open where another room of their union is on the other side."""
+
+
 # --- From a description ----------------------------------------------------------------------------------
 
 
 def openings_in(
-    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float
-) -> tuple[Opened, ...] | None:
-    """The openings of the walls of a scene as kernels take them, None where there are none.
+    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened] = Opened
+) -> tuple[Opened, ...]:
+    """The openings of the walls of a scene as kernels take them.
 
     `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece; they are those of the
     frame, or the piece of one, that ends at a moment [s].
     """
-    if not any(volumes):
-        return None
     runs, number = [], 0
     for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
         first, number = number, number + sum(walls for _piece, walls in some)
-        runs += [Opened(_taken(given, moment), float(first), float(number))] if given else []
+        runs += [kind(_taken(given, moment), float(first), float(number))] if given else []
     return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
 
 

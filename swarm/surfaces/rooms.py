@@ -19,16 +19,17 @@ _INSIDE = 4.0
 _TOUCH, _OUT = 1024.0, 1e6
 
 
-def gaps_in(rooms, r):
-    """How far a point is outside of each room, about: a length, below 0 inside."""
-    return tuple(gap_in(room, r) for room in rooms)
+def gaps_in(rooms, r, t=0.0):
+    """How far a point is outside of each room after a time [s], about: a length, below 0 inside."""
+    return tuple(gap_in(room, r, t) for room in rooms)
 
 
-def gap_in(room, r):
+def gap_in(room, r, t=0.0):
     """The same of one room."""
     farthest = -math.inf
     for _number, wall, gentle in reversed(room):
-        here = wall.level_of(wall.inner(r)) * gentle
+        then = wall.later(t)
+        here = then.level_of(then.inner(r)) * gentle
         farthest = select(here <= farthest, farthest, here)
     return farthest
 
@@ -70,7 +71,7 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
     if stops:
         return last, wall
     there = r + displacement(gravity, v, last)
-    return last, select(is_inside_any(walls, gaps_in(rooms, there)), -1.0, wall)
+    return last, select(is_inside_any(walls, gaps_in(rooms, there, last)), -1.0, wall)
 
 
 def owner_of(walls, rooms, r):

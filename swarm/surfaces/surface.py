@@ -114,9 +114,9 @@ class Surface:
         """As kernels take it: one record for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
 
-    def open_volumes(self) -> tuple["Surface", ...]:
-        """The surfaces that its openings are, each present while it is open."""
-        return tuple(map(volume_of, self.openings))
+    def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
+        """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
+        return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)
 
     def is_there(self, time: float) -> bool:
         """Whether the wall is there at a time [s]."""

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import motion as motions
 from ..checks import Vector
 from ..errors import SceneError
+from .fields.many import Many
 from .instant import box_of, has_room, planes_of, side_of
 from .polyhedron import polyhedron_bounds
 from .shapes.plane import Plane
@@ -69,6 +70,8 @@ class Joined(Surface):
                 f"parts must leave at most {_MOST_ROOMS} rooms, which are unions of parts taken together, got "
                 f"{len(self.rooms)}; list what they have in common as a surface of the scene"
             )
+        if len(self.rooms) > 1:
+            _require_alone(self)
         _require_room(self)
 
     @cached_property
@@ -273,6 +276,21 @@ def _lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
 def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
     """The gap of every surface of a room at points (3, N)."""
     return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
+
+
+def _require_alone(whole: Joined) -> None:
+    """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
+    for surface in whole.surfaces():
+        if isinstance(surface, Many):
+            raise SceneError(
+                f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
+                f"{surface}; list them as a surface of the scene, or their bodies one by one"
+            )
+        if surface.known_in() is not None:
+            raise SceneError(
+                f"parts must be known everywhere, got {surface!r:.200}, which reaches the border of its grid; sample "
+                "it in a larger box"
+            )
 
 
 def _require_room(whole: Joined) -> None:

@@ -89,6 +89,10 @@ class Walls(Record):
         """The walls that are in no field."""
         return self._replace(each=tuple(wall for wall in self.each if not isinstance(wall, Field)))
 
+    def alone(self, each):
+        """Some of the walls, with no unions."""
+        return self._replace(each=each, unions=(), slack=None)
+
     def shared(self):
         """`numbered` of the walls that are in no union: all particles keep to them."""
         every = self.numbered()
