@@ -193,7 +193,8 @@ class Outlined(Many):
             low = np.hstack([low, np.vstack([np.tile(first[:, None], 2), lids])])
             high = np.hstack([high, np.vstack([np.tile(last[:, None], 2), lids])])
         corners = np.array([np.where(np.array(pick)[:, None], high, low) for pick in np.ndindex(2, 2, 2)])
-        terms = self.frame[None, :, :, None] * corners[:, None]
+        with np.errstate(invalid="ignore"):
+            terms = self.frame[None, :, :, None] * corners[:, None]
         placed = np.where(self.frame[None, :, :, None] == 0.0, 0.0, terms).sum(axis=2) + np.array(self.center)[:, None]
         room = _SLACK * (self.extent() + self.boundary.extent)
         return np.ascontiguousarray(placed.min(axis=0) - room), np.ascontiguousarray(placed.max(axis=0) + room)
@@ -338,8 +339,8 @@ class Prism(Outlined):
         object.__setattr__(self, "height", length("height", self.height))
         if self.side != "inside":
             raise SceneError(
-                f'side must be "inside" for a Prism, got {self.side!r}; of a solid that reaches through its vessel make '
-                "a Polygon, or of a bounded one a union or a mesh"
+                f'side must be "inside" for a Prism, got {self.side!r}; of a solid that reaches through its vessel '
+                "make a Polygon, or of a bounded one a union or a mesh"
             )
 
 

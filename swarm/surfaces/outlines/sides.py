@@ -5,7 +5,7 @@ import math
 from ...kernel.arrays import index
 from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
-from ...kernel.vector import Vec, dot, norm, square, times
+from ...kernel.vector import Vec, cross, dot, norm, square, times
 from ..course import Fall, Quartic, close, rise_time, under_way
 from ..fields.members import Members, member
 from ..frames import Framed
@@ -14,6 +14,8 @@ from ..shapes.quadratic import QuadricNumbers, form
 
 # How often a fall may cross the whole of a round wall, and how often it may need more steps between.
 _CROSSINGS = 12
+# The sine of the angle between sides that join smoothly.
+_SMOOTH = 1e-7
 
 
 class Side(Framed):
@@ -53,9 +55,10 @@ class Side(Framed):
     def straight_hit(self, end, r0, r1):
         return self.first_hit(r0, r1 - r0)
 
-    def is_within(self, d):
-        """Whether a point of the quadric, from the start of the side, is of the side."""
-        return (dot(d, self.ahead) >= -self.slack) & (dot(d - self.end, self.behind) <= self.slack)
+    def is_within(self, d, near=0.0):
+        """Whether a point of the quadric, from the start of the side, is of the side, or nearer to it than that."""
+        room = self.slack + near
+        return (dot(d, self.ahead) >= -room) & (dot(d - self.end, self.behind) <= room)
 
     def first_hit(self, r, v):
         body = self.body
@@ -141,6 +144,16 @@ class Sides(Members):
     def deepest_in_cell(self, r):
         return _nearest(self, r)[0]
 
+    def is_there(self, number, r, near):
+        """Whether a side reaches to a place on its wall, or nearer to it than that."""
+        side = self.wall(number)
+        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        return side.is_within(r - side.body.center, near)
+
+    def wall_after(self, number, r, near):
+        """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
+        return _smoothly_after(self, number, r)
+
 
 class FewSides(Sides):
     """So few sides that each lane looks at all of them on a straight flight."""
@@ -217,6 +230,20 @@ def _nearest(sides, r):
         if away < least:
             least, found, which = away, signed, float(m)
     return found, which
+
+
+@outlined
+def _smoothly_after(sides, number, r):
+    """The side other than this one that is nearest to a place, if it has the same normal there; else -1."""
+    least, found, n = math.inf, -1.0, sides.wall(number).unit_normal(r)
+    for m in range(sides.table.shape[0]):
+        side = member(sides, index(m))
+        _signed, away, _within = _beside(side, r)
+        if float(m) != number and away < least:
+            normal = side.unit_normal(r)
+            is_smooth = dot(n, normal) > 0.0 and square(cross(n, normal)) <= _SMOOTH * _SMOOTH
+            least, found = away, select(is_smooth, float(m), -1.0)
+    return found
 
 
 def _beside(side, r):
