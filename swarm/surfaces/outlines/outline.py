@@ -26,6 +26,8 @@ _NOTHING, _SMOOTH = 1e-12, 1e-9
 _BATCH = 1 << 20
 # Points of a picture's curve along a side.
 _POINTS = 65
+# Of the distance of two sides, what is behind one of them and not the other.
+_HALF = 0.4
 
 
 class Sides(NamedTuple):
@@ -108,6 +110,37 @@ class Outline:
         back = _along(before, after) < 0.0
         return np.where(np.abs(sine) > _SMOOTH, np.sign(sine), np.where(back, 1.0, 0.0)).astype(np.int64)
 
+    def wedges(self, side: float) -> Floats:
+        """1 where sides join at a convex corner at their end, 0 smoothly, at a re-entrant one -sin of half its wedge.
+
+        As they are seen from within (side = 1) or from around (-1).
+        """
+        after = np.roll(self.sides.ahead, -1, axis=0)
+        # The wedge is what the turn leaves of half a circle.
+        cosine = np.clip(-_along(self.sides.behind, after), -1.0, 1.0)
+        turns = side * self.turns
+        return np.asarray(np.where(turns < 0.0, -np.sqrt(0.5 * (1.0 - cosine)), turns))
+
+    @cached_property
+    def thickness(self) -> Floats:
+        """Of every side a distance within which there is none but those next to it [m]."""
+        s, n = self.sides, len(self)
+        found, bent = np.full(n, self.extent), np.flatnonzero(s.curvature)
+        points, owner = [s.start, s.end], [np.arange(n)] * 2
+        for k in bent:
+            points.append(self._curve(int(k))[:: (_POINTS - 1) // 16])
+            owner.append(np.full(len(points[-1]), k))
+        every, whose = np.concatenate(points), np.concatenate(owner)
+        step = max(1, _BATCH // n)
+        for first in range(0, len(every), step):
+            some, k = every[first : first + step], whose[first : first + step]
+            distance = self._distances(some)[3]
+            apart = np.abs(np.arange(n) - k[:, None])
+            distance[(apart <= 1) | (apart == n - 1)] = math.inf
+            np.minimum.at(found, k, distance.min(axis=1))
+            found = np.minimum(found, distance.min(axis=0))
+        return np.asarray(_HALF * found)
+
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
         """The signed distance (N,) of points (2, N), below 0 within, and its gradient (2, N)."""
         step = max(1, _BATCH // len(self))
@@ -116,8 +149,9 @@ class Outline:
             return np.empty(0), np.empty((2, 0))
         return np.concatenate([d for d, _g in parts]), np.concatenate([g for _d, g in parts], axis=1)
 
-    def _nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        s, r = self.sides, points.T[:, None, :]
+    def _distances(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of points (N, 2) from every side: signed of the whole curve, the unit vector along it, within, the distance."""
+        s, r = self.sides, points[:, None, :]
         off = r - s.start
         grad = s.normal + s.curvature[:, None] * off
         level = _along(s.normal, off) + 0.5 * s.curvature * _along(off, off)
@@ -126,18 +160,22 @@ class Outline:
         signed = 2.0 * level / (1.0 + steep)
         out = grad / np.maximum(steep, np.finfo(np.float64).tiny)[..., None]
         foot = off - signed[..., None] * out
-        before, beyond = _along(foot, s.ahead), _along(foot - (s.end - s.start), s.behind)
-        at_start, at_end = np.sqrt(_along(off, off)), np.sqrt(_along(r - s.end, r - s.end))
-        within = (before >= 0.0) & (beyond <= 0.0)
-        ends_first = at_start < at_end
-        distance = np.where(within, np.abs(signed), np.minimum(at_start, at_end))
+        within = (_along(foot, s.ahead) >= 0.0) & (_along(foot - (s.end - s.start), s.behind) <= 0.0)
+        ends = np.sqrt(np.minimum(_along(off, off), _along(r - s.end, r - s.end)))
+        return signed, out, within, np.where(within, np.abs(signed), ends)
+
+    def _nearest(self, points: Floats) -> tuple[Floats, Floats]:
+        signed, out, within, distance = self._distances(points.T)
+        s, r = self.sides, points.T
         k = np.argmin(distance, axis=1)
         i = np.arange(len(k))
         # At a corner both its sides are at one distance: there the corner says which side of it a point is on.
-        turn = np.where(ends_first[i, k], np.roll(self.turns, 1)[k], self.turns[k])
+        off, back = r - s.start[k], r - s.end[k]
+        first = _along(off, off) < _along(back, back)
+        turn = np.where(first, np.roll(self.turns, 1)[k], self.turns[k])
         corner = ~within[i, k] & (turn != 0)
         found = np.where(corner, turn * distance[i, k], np.where(signed[i, k] < 0.0, -1.0, 1.0) * distance[i, k])
-        away = np.where(ends_first[i, k, None], off[i, k], (r - s.end)[i, k])
+        away = np.where(first[:, None], off, back)
         size = np.maximum(np.sqrt(_along(away, away)), np.finfo(np.float64).tiny)
         slope = np.where((corner & (distance[i, k] > 0.0))[:, None], turn[:, None] * away / size[:, None], out[i, k])
         return found, slope.T

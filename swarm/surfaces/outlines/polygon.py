@@ -208,7 +208,7 @@ class Outlined(Many):
         slack = _SLACK * (self.extent() + self.boundary.extent)
         if k >= n:
             return self._lid(1.0 if k == n else -1.0, slack)
-        turns = sign * self.boundary.turns
+        turns = self.boundary.wedges(sign)
         across, frame = self.across, self.frame
         own = across is None
         place = (lambda v: np.append(v, 0.0)) if own else (lambda v: frame[:, :2] @ v)
@@ -219,7 +219,8 @@ class Outlined(Many):
         body = QuadricNumbers(_vec(start), _vec(a), _vec(place(sign * s.normal[k])), 0.0, float(s.length[k]), 1.0)
         side = Side(
             body, _vec(place(s.ahead[k])), _vec(place(s.behind[k])), _vec(place(s.end[k] - s.start[k])), slack,
-            self.extent(), float(turns[k - 1]), float(turns[k]),
+            self.extent(), float(turns[k - 1]), float(turns[k]), float(self.boundary.thickness[k]),
+            float((k - 1) % n if turns[k - 1] == 0.0 else -1), float((k + 1) % n if turns[k] == 0.0 else -1),
         )  # fmt: skip
         return Rotated(side, *(_vec(row) for row in frame)) if own else side
 
@@ -230,7 +231,7 @@ class Outlined(Many):
         normal = np.array([0.0, 0.0, sign]) if own else sign * frame[:, 2]
         center = frame.T @ self.center if own else np.array(self.center)
         body = QuadricNumbers(_vec(center + 0.5 * self.height * normal), none, _vec(normal), 0.0, self.height, 1.0)
-        side = Side(body, none, none, none, slack, self.extent(), 0.0, 0.0)
+        side = Side(body, none, none, none, slack, self.extent(), 0.0, 0.0, self.extent(), -1.0, -1.0)
         return Rotated(side, *(_vec(row) for row in frame)) if own else side
 
 

@@ -5,17 +5,16 @@ import math
 from ...kernel.arrays import index
 from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
-from ...kernel.vector import Vec, cross, dot, norm, square, times
+from ...kernel.vector import Vec, dot, norm, square, times
 from ..course import Fall, Quartic, close, rise_time, under_way
 from ..fields.members import Members, member
 from ..frames import Framed
+from ..patched import Patched
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers, form
 
 # How often a fall may cross the whole of a round wall, and how often it may need more steps between.
 _CROSSINGS = 12
-# The sine of the angle between sides that join smoothly.
-_SMOOTH = 1e-7
 
 
 class Side(Framed):
@@ -30,8 +29,11 @@ class Side(Framed):
     end: Vec  # from the start
     slack: float  # round-off of a place [m]: a hit so far beyond an end is one still
     extent: float  # of the outline [m]
-    before: float  # 1 where the outline has a convex corner at the start, -1 a re-entrant one, 0 smooth
+    before: float  # 1 where there is a convex corner at the start, 0 smooth, at a re-entrant one -sin of half its wedge
     after: float  # and at the end
+    thickness: float  # of what is behind it, at the least [m]
+    previous: float  # the number of the side that joins it smoothly at its start, or -1
+    following: float  # and at its end
 
     def same(self, a):
         """What is the same in the frame of the quadric, which has none of its own."""
@@ -111,7 +113,7 @@ class Side(Framed):
         at_start, at_end = norm(d), norm(d - self.end)
         first = at_start < at_end
         beyond, turn = select(first, at_start, at_end), select(first, self.before, self.after)
-        outside = select(turn == 0.0, select(signed < 0.0, -beyond, beyond), turn * beyond)
+        outside = select(turn == 0.0, select(signed < 0.0, -beyond, beyond), select(turn < 0.0, -beyond, beyond))
         within = self.is_within(d - signed * out)
         return select(within, signed, outside), select(within, abs(signed), beyond), within
 
@@ -127,12 +129,17 @@ class Side(Framed):
         return self.beside(middle)[1] <= 1.000001 * norm(half)
 
     def distance(self, r):
-        # Beside the side a point is not outside, however far it is beyond the whole quadric.
+        # Beside the side a point is not outside, however far it is beyond the whole quadric; nor is it where the wedge,
+        # or what is behind the side, ends: there it is in front of another side.
         signed, away, within = self.beside(r)
-        return select(within, signed, -away)
+        d = self.along_plane(r - self.body.center)
+        first = select(self.before < 0.0, -self.before * norm(d), math.inf)
+        last = select(self.after < 0.0, -self.after * norm(d - self.end), math.inf)
+        behind = signed <= min(self.thickness, min(first, last))
+        return select(within & behind, signed, -away)
 
 
-class Sides(Members):
+class Sides(Members, Patched):
     """The sides of an outline: a field whose bodies are walls as far as they go."""
 
     def looked_at_all(self):
@@ -152,7 +159,16 @@ class Sides(Members):
 
     def wall_after(self, number, r, near):
         """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
-        return _smoothly_after(self, number, r)
+        side = self.wall(number)
+        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        d = side.along_plane(r - side.body.center)
+        return select(norm(d) < norm(d - side.end), side.previous, side.following)
+
+    def goes_on(self, number, other):
+        """Whether a side joins this one smoothly: what slides on this one does not meet it, but goes on on it."""
+        side = self.wall(number)
+        side = side.body if isinstance(side, Rotated) else side
+        return (side.previous == other) | (side.following == other)
 
 
 class FewSides(Sides):
@@ -230,20 +246,6 @@ def _nearest(sides, r):
         if away < least:
             least, found, which = away, signed, float(m)
     return found, which
-
-
-@outlined
-def _smoothly_after(sides, number, r):
-    """The side other than this one that is nearest to a place, if it has the same normal there; else -1."""
-    least, found, n = math.inf, -1.0, sides.wall(number).unit_normal(r)
-    for m in range(sides.table.shape[0]):
-        side = member(sides, index(m))
-        _signed, away, _within = _beside(side, r)
-        if float(m) != number and away < least:
-            normal = side.unit_normal(r)
-            is_smooth = dot(n, normal) > 0.0 and square(cross(n, normal)) <= _SMOOTH * _SMOOTH
-            least, found = away, select(is_smooth, float(m), -1.0)
-    return found
 
 
 def _beside(side, r):
