@@ -42,11 +42,14 @@ if TYPE_CHECKING:
         OwnSurface,
         Paraboloid,
         Plane,
+        Polygon,
+        Prism,
         Quadric,
         Sampled,
         Slab,
         Sphere,
         Spheres,
+        Stadium,
         Torus,
         Union,
     )  # fmt: skip
@@ -80,8 +83,8 @@ _HOMES = {
     "surfaces.doors": ("Opening",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "Intersection", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
-        "Union",
+        "Intersection", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab", "Sphere",
+        "Spheres", "Stadium", "Torus", "Union",
     ),
     "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
@@ -91,10 +94,11 @@ __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
     "Impact", "ImpactLog", "Intersection", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
-    "Particles", "Path", "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene",
-    "SceneError", "Slab", "Sphere", "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
-    "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell",
-    "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
+    "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
+    "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
+    "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
+    "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -74,7 +74,17 @@ def _meets_one(field, ends, number, active, path, near):
 
 def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
-    return found or ((not active.has(number + m)) and _may_meet(field.wall(m), ends.wall(m), path, near))
+    return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
+
+
+def _is_held(field, number, m, active):
+    """Whether wall m of a field, which has so many walls before it, holds a particle, or goes on where one does."""
+    held = active.has(number + m)
+    if isinstance(members_of(field), Patched):
+        for one in active:
+            is_of = (one >= number) & (one < number + field.count())
+            held = held | (is_of & field.goes_on(one - number, m))
+    return held
 
 
 def own_path(field, ends, path):
@@ -163,7 +173,7 @@ def _first_of(members, number, active, path, near, later):
 
 
 def _sooner_body(found, m, members, number, active, path, near):
-    if active.has(number + m):
+    if _is_held(members, number, m, active):
         return found
     time = _deep_after(_Still(member(members, index(m))), path, near)
     if isinstance(members, Patched) and time < math.inf and not members.is_there(float(m), at_part(path, time), near):

@@ -11,6 +11,7 @@ from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
+from ..surfaces.outlines.polygon import Outlined
 from ..surfaces.surface import Surface
 
 # Points along each side of the grid on which curves are found, and of a small body on a grid of its own; of a circle.
@@ -44,8 +45,8 @@ class PlaneWalls:
     def curves(self, i: int, pose: Pose, bodies: int) -> list[Floats]:
         """The curves (k, 3) [m] of surface i."""
         surface = self._scene.surfaces[i]
-        if hasattr(surface, "curves"):
-            return [pose.placed(curve.T).T for curve in surface.curves()]
+        if isinstance(surface, Outlined):
+            return self._of(i, surface.curves())
         if isinstance(surface, Spheres):
             angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
             circle = self._placed(np.stack([np.cos(angle), np.sin(angle)], axis=1))

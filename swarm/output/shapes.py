@@ -17,6 +17,7 @@ from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
+from ..surfaces.outlines.polygon import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from .planar import PlaneWalls
@@ -82,7 +83,7 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     shapes = []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
+        bodies = bodies_of(surface) or int(i in grouped)
         mesh, wires = _NOTHING, list[Floats]()
         if not surface.is_there(time):
             pass
@@ -97,11 +98,16 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     return shapes
 
 
+def bodies_of(surface: Surface) -> int:
+    """The number of bodies of a surface of many, else 0."""
+    return len(surface) if isinstance(surface, Many) and not isinstance(surface, Outlined) else 0
+
+
 def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) -> list[Shape]:
     walls, shapes = PlaneWalls(scene, positions, time), []
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
+        bodies = bodies_of(surface) or int(i in grouped)
         wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
         name, solid = f"{i}_{type(surface).__name__.lower()}", bodies > 0 or surface.is_solid()
         shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height))

@@ -12,6 +12,7 @@ from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
+from .outlines.polygon import Polygon, Prism, Stadium
 from .shapes.box import Box
 from .shapes.capsule import Capsule
 from .shapes.cone import Cone
@@ -43,11 +44,14 @@ __all__ = [
     "OwnSurface",
     "Paraboloid",
     "Plane",
+    "Polygon",
+    "Prism",
     "Quadric",
     "Sampled",
     "Slab",
     "Sphere",
     "Spheres",
+    "Stadium",
     "Surface",
     "Torus",
     "Union",
@@ -77,5 +81,8 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "sampled": Sampled,
     "union": Union,
     "intersection": Intersection,
+    "polygon": Polygon,
+    "prism": Prism,
+    "stadium": Stadium,
     **ALL_FIELDS,
 }

@@ -22,6 +22,7 @@ from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
 from .instant import has_room, side_of
+from .outlines.polygon import Outlined
 from .surface import Surface
 from .walls import Field, Walls, all_walls
 
@@ -84,6 +85,11 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
     found: list[Surface] = []
     for k, opening in enumerate(surface.open_volumes()):
         where = f"{name}.openings[{k}]"
+        if isinstance(opening, Outlined):
+            raise SceneError(
+                f"{where} must be a volume of surfaces such as swarm.Box, got {type(opening).__name__}; give boxes or "
+                "cylinders"
+            )
         required.require_description([opening], where)
         if not reaches(surface, opening):
             raise SceneError(

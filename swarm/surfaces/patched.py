@@ -22,3 +22,7 @@ class Patched(Record):
     def wall_after(self, number, r, near):
         """The wall on which what slides on this one goes on beyond the end of its patch at r; -1: it flies."""
         return -1.0
+
+    def goes_on(self, number, other):
+        """Whether another wall joins this one smoothly where it ends: what slides on this one does not meet it."""
+        return False

@@ -47,6 +47,13 @@ class Members(Record):
         """A time in which their motion changes little [s]."""
         return math.inf
 
+    # Whether each lane looks at all of them on a straight flight.
+    few = False
+
+    def looked_at_all(self) -> Any:
+        """The same, for lanes that look at all of them: they are so few that this is faster than from cell to cell."""
+        return Few(*self)
+
     def count(self):
         """Their number."""
         return float(self.table.shape[0])
@@ -68,19 +75,19 @@ class Members(Record):
 
     def count_in_cell(self, r):
         """Their number."""
-        first, stop = _entries_at(self.grid, r)
+        first, stop = entries_at(self.grid, r)
         return int(stop - first)
 
     def list_in_cell(self, k, before, r, into):
         """Their numbers, with so many walls before them, into into[k:], and how many they are."""
-        first, stop = _entries_at(self.grid, r)
+        first, stop = entries_at(self.grid, r)
         for i in range(first, stop):
             into[k + i - first] = before + self.grid.entries[i]
         return int(stop - first)
 
     def one_in_cell(self, k, r):
         """The number of one of them."""
-        first, _stop = _entries_at(self.grid, r)
+        first, _stop = entries_at(self.grid, r)
         return self.grid.entries[first + k]
 
     def until_next_cell(self, r, v):
@@ -95,8 +102,10 @@ class Members(Record):
 class Few(Members):
     """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
 
+    few = True
 
-def _entries_at(grid, r):
+
+def entries_at(grid, r):
     """The begin and the end of the entries of the cell of a point."""
     cell = index(cell_of(grid, r).number)
     return grid.first[cell], grid.first[cell + 1]
@@ -205,7 +214,7 @@ def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @outlined
 def _is_in_another(members, number, r):
-    first, stop = _entries_at(members.grid, r)
+    first, stop = entries_at(members.grid, r)
     for k in range(first, stop):
         m = members.grid.entries[k]
         body = member(members, index(m))
@@ -217,7 +226,7 @@ def _is_in_another(members, number, r):
 @outlined
 def _deepest(members, r):
     most = -math.inf
-    first, stop = _entries_at(members.grid, r)
+    first, stop = entries_at(members.grid, r)
     for k in range(first, stop):
         most = max(most, member(members, index(members.grid.entries[k])).distance(r))
     return most
