@@ -14,6 +14,7 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
+from . import overlaps
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
@@ -80,6 +81,8 @@ def carry_out_task(task: Task, session: Session) -> End:
     """Carry out a run that is checked."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()
+    if not task.is_shard:
+        overlaps.warn(task.scene)
     until, span_of, kept = task.options.until, task.method.span, Columns()
     with _begun(task, session) as (run, writer, show, (log, tally)):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
