@@ -11,7 +11,7 @@ from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
-from ..surfaces.outlines.polygon import Outlined
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
 
 # Points along each side of the grid on which curves are found, and of a small body on a grid of its own; of a circle.

@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
-from ..surfaces.outlines.polygon import Outlined
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from .planar import PlaneWalls

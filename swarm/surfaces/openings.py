@@ -22,7 +22,7 @@ from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
 from .instant import has_room, side_of
-from .outlines.polygon import Outlined
+from .outlines.outlined import Outlined
 from .surface import Surface
 from .walls import Field, Walls, all_walls
 
