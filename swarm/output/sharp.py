@@ -1,0 +1,195 @@
+"""A part of a surface as triangles and wires with its edges sharp: each smooth wall by itself, cut by all others."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel.vector import vec
+from ..motion import Pose, pose
+from ..particles import Floats
+from ..surfaces import Torus
+from ..surfaces.rotation import matrix
+from ..surfaces.surface import Surface
+from . import curves
+from .cut import Indices, Smooth, cut, found_in
+from .parts import Cover, Part
+
+# Points around the tube of a torus and along it.
+_AROUND, _ALONG = 24, 96
+# A wall of which this part of its box is seen is found again in the box of that, so often.
+_SEEN, _AGAIN = 0.4, 3
+
+Box = tuple[Floats, Floats]
+# Points (V, 3) [m], triangles (T, 3), normals (V, 3); and the curves of wires.
+Walls = tuple[tuple[Floats, Indices, Floats], list[Floats]]
+
+
+class _Placed(NamedTuple):
+    """A part in the frame in which its surface is given, and the box of the scene in that frame."""
+
+    part: Part
+    pose: Pose
+    frame: Floats  # columns are its axes
+    low: Floats  # of the box along these
+    high: Floats
+    size: float  # of what is drawn [m]
+
+    def level(self, wall: Smooth, covers: list[Cover], others: list[Smooth]) -> Any:
+        """The level of where the wall is none."""
+
+        def above(points: Floats) -> Floats:
+            found = np.full(len(points), -self.size)
+            if covers:
+                outwards = self.side() * self.pose.turned(wall.normals(points).T).T
+                places = self.pose.placed(points.T).T
+                found = np.max([cover.level(places, outwards, self.size) for cover in covers], axis=0)
+            for other in others:
+                steep = np.maximum(np.sqrt((other.gradient(points) ** 2).sum(axis=1)), 1e-300)
+                found = np.maximum(found, other.phi(points) / steep)
+            return np.asarray(found)
+
+        return above
+
+    def side(self) -> float:
+        return -1.0 if self.part.surface.is_solid() else 1.0
+
+
+def drawn(part: Part, box: Box, time: float) -> Walls:
+    """The part of a scene in a box, at a time [s]."""
+    surface, at = part.surface, pose(part.surface.motion, time)
+    frame, own = _frame(surface)
+    low, high = (np.array(corner) for corner in _bounds(own))
+    corners = frame.T @ at.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
+    low, high = np.maximum(low, corners.min(axis=1)), np.minimum(high, corners.max(axis=1))
+    placed = _Placed(part, at, frame, low, high, float((box[1] - box[0]).max()))
+    points, triangles, normals, edges, first = (
+        [np.empty((0, 3))],
+        [np.empty((0, 3), np.int64)],
+        [np.empty((0, 3))],
+        [],
+        0,
+    )
+    inwards = 1.0 if part.solid else -1.0
+    for found, wall in _pieces(placed) if (low < high).all() else ():
+        points.append(found.points)
+        normal = wall.normals(found.points)
+        triangles.append(first + _turned_to(found.points, found.triangles, inwards * normal))
+        normals.append(inwards * normal)
+        edges += curves.joined(found.points, found.rims)
+        first += len(found.points)
+    vertices, cells = np.concatenate(points), np.concatenate(triangles)
+    wires = edges + curves.across(vertices, cells, frame)
+    here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
+    return here, [at.placed(wire.T).T for wire in wires]
+
+
+def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
+    """The triangles of every smooth wall, cut, and the wall."""
+    walls = smooth_walls(placed.part.surface)
+    for wall in walls:
+        others = [other for other in walls if other is not wall]
+        low, high = placed.low, placed.high
+        for _ in range(_AGAIN):
+            points, triangles = _triangles(placed.part.surface, wall, low, high, placed.frame)
+            covers = _near(placed, points)
+            found = cut(wall, points, triangles, placed.level(wall, covers, others))
+            if not len(found.points):
+                break
+            seen = found.points @ placed.frame
+            least, most = seen.min(axis=0), seen.max(axis=0)
+            if (most - least).max() > _SEEN * (high - low).max():
+                break
+            low, high = np.maximum(low, least), np.minimum(high, most)
+            room = 0.05 * (high - low).max()
+            low, high = low - room, high + room
+        if len(found.points):
+            yield found, wall
+
+
+def _near(placed: _Placed, points: Floats) -> list[Cover]:
+    """The covers that may take away something of a wall with these points."""
+    if not len(points):
+        return []
+    here = placed.pose.placed(points.T)
+    room = 1e-3 * placed.size
+    return [one for one in placed.part.covers if one.may_cover(here.min(axis=1) - room, here.max(axis=1) + room)]
+
+
+def smooth_walls(surface: Surface) -> list[Smooth]:
+    """Every smooth wall of a surface; of a solid with edges those of what it fills."""
+    filled = surface
+    if surface.is_solid():
+        try:
+            filled = replace(surface, side="inside")  # type: ignore[call-arg]
+        except Exception:
+            filled = surface
+    walls = filled.walls() if type(filled).phi is Surface.phi else (filled,)
+    return [_smooth(wall) for wall in walls]
+
+
+def _smooth(wall: Any) -> Smooth:
+    if isinstance(wall, Surface):
+        still = replace(wall, motion=None)
+        return Smooth(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)
+
+    def gradient(points: Floats) -> Floats:
+        rows = vec(points.T)
+        return np.stack(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3], axis=1)
+
+    return Smooth(lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
+
+
+def _frame(surface: Surface) -> tuple[Floats, Surface]:
+    """A frame along the axes of a surface, the columns of a matrix, and the surface in that."""
+    given: Any = surface
+    if hasattr(given, "turn"):
+        frame = matrix(given.turn())
+        own = replace(given, rotation=None, axis=(0.0, 0.0, 1.0), motion=None, center=_in(frame, given.center))
+        return frame, own
+    if given.rotation is not None and hasattr(given, "center"):
+        frame = matrix(given.rotation)
+        return frame, replace(given, rotation=None, motion=None, center=_in(frame, given.center))
+    return np.eye(3), replace(given, motion=None)
+
+
+def _in(frame: Floats, point: Any) -> Any:
+    return tuple((frame.T @ np.array(point)).tolist())
+
+
+def _bounds(surface: Any) -> Any:
+    """The box around the walls of a surface, also of a solid."""
+    if not surface.is_solid():
+        return surface.bounds()
+    try:
+        return replace(surface, side="inside").bounds()
+    except Exception:
+        return np.full(3, -math.inf), np.full(3, math.inf)
+
+
+def _triangles(surface: Any, wall: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:
+    """Triangles on a smooth wall in a box."""
+    if not isinstance(surface, Torus):
+        return found_in(wall, low, high, frame)
+    # A thin tube would be lost between the points of a grid.
+    u, v = (np.linspace(0.0, 2.0 * math.pi, count, endpoint=False) for count in (_ALONG, _AROUND))
+    along, around = np.meshgrid(u, v, indexing="ij")
+    rho = surface.major_radius + surface.minor_radius * np.cos(around)
+    own = np.stack([rho * np.cos(along), rho * np.sin(along), surface.minor_radius * np.sin(around)], axis=-1)
+    points = own.reshape(-1, 3) @ matrix(surface.rotation).T + np.array(surface.center)
+    place = np.arange(_ALONG * _AROUND).reshape(_ALONG, _AROUND)
+    a, b = place, np.roll(place, -1, axis=0)
+    c, d = np.roll(b, -1, axis=1), np.roll(place, -1, axis=1)
+    both = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return points, both.reshape(-1, 3)
+
+
+def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:
+    """Triangles whose corners go round their normals."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    wrong = (np.cross(b - a, c - a) * normals[triangles].sum(axis=1)).sum(axis=1) < 0.0
+    return np.where(wrong[:, None], triangles[:, ::-1], triangles)
