@@ -144,6 +144,13 @@ class Pieces(Volume):
         of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
         return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
 
+    def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
+        """The volumes in which walls of a part are open where another room is on their other side."""
+        found: dict[tuple[int, Place], list[Surface]] = {}
+        for part, volumes in zip(self._parts_of_pieces, self._doorways, strict=True):
+            found.setdefault(part, []).extend(volumes)
+        return found
+
     def owners(self) -> list[int]:
         """The surface that each row of the scene belongs to, one for a field."""
         return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]

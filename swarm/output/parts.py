@@ -1,17 +1,18 @@
 """The parts of the surfaces of a scene, each a wall where no other one takes that away: of unions and the like."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..particles import Floats
+from ..scene import Scene
 from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of, side_of
 from ..surfaces.openings import sign_of
 from ..surfaces.surface import Surface
-from ..surfaces.union import Joined, Union, handed_down
+from ..surfaces.union import Joined, Place, Union, handed_down
 
 # Of the size of what is drawn, what is no distance, and how far beside a wall it is asked which of two is there.
 _NOTHING, _BESIDE = 1e-8, 2e-8
@@ -25,6 +26,7 @@ class Cover:
 
     Attributes:
         time: [s].
+        is_room: whether it is a part beside the wall's in a union.
         first: whether it has what lies in both, so that two walls in one place are drawn once.
         turn: +1 or -1, whether a way out of the wall is one of what the surface is to cover.
         side: +1 or -1, the sign of phi that is its gap.
@@ -35,6 +37,7 @@ class Cover:
     side: float
     time: float
     first: bool = False
+    is_room: bool = False
     turn: float = 1.0
 
     def level(self, points: Floats, outwards: Floats, size: float) -> Floats:
@@ -48,6 +51,10 @@ class Cover:
             return self._level(points - way if self.first else points, size)
         before = self._level(points - way, size)
         return np.maximum(before, self._level(points + way, size)) if self.first else before
+
+    def level_behind(self, points: Floats, outwards: Floats, size: float) -> Floats:
+        """The same a little behind a wall."""
+        return self._level(points + self.turn * _BESIDE * size * outwards, size)
 
     def _level(self, points: Floats, size: float) -> Floats:
         rows = np.ascontiguousarray(points.T)
@@ -75,47 +82,64 @@ class Part:
         surface: with what is given to the whole.
         solid: whether particles are kept out of it.
         covers: what leaves of it a wall.
+        doorways: volumes in which it is none where another part is behind it.
     """
 
     owner: int
-    place: tuple[int, ...]
+    place: Place
     surface: Surface
     solid: bool
     covers: tuple[Cover, ...]
+    doorways: tuple[Cover, ...] = ()
+
+    def level(self, points: Floats, outwards: Floats, size: float, near: list[Cover]) -> Floats:
+        """As that of all covers, of which those that are not `near` take nothing away."""
+        found = np.full(len(points), -size)
+        for cover in near:
+            found = np.maximum(found, cover.level(points, outwards, size))
+        if self.doorways:
+            opened = np.max([one.level(points, outwards, size) for one in self.doorways], axis=0)
+            behind = [one.level_behind(points, outwards, size) for one in self.covers if one.is_room]
+            found = np.maximum(found, np.where(np.max(behind, axis=0, initial=-size) > 0.0, opened, -size))
+        return found
 
 
-def parts_of(surfaces: Sequence[Surface], time: float) -> list[Part]:
+def parts_of(scene: Scene, time: float) -> list[Part]:
     """The parts of all surfaces at a time [s], in their order."""
-    found = _Found(time, [])
-    for i, surface in enumerate(surfaces):
-        found.add(Part(i, (), surface, False, found.beside(surfaces, i, 1.0)))
+    found = _Found(time, scene.doorways_of_parts(), [])
+    for i, surface in enumerate(scene.surfaces):
+        found.add(Part(i, (), surface, False, found.beside(scene.surfaces, i, 1.0)))
     return found.parts
 
 
 class _Found(NamedTuple):
-    """The parts that are found."""
+    """The parts that are found, and the volumes of doorways of each."""
 
     time: float
+    doorways: dict[tuple[int, Place], list[Surface]]
     parts: list[Part]
 
     def beside(self, surfaces: Sequence[Surface], k: int, sign: float) -> tuple[Cover, ...]:
         """The covers of one of several surfaces, by the others."""
         return tuple(
-            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many))
+            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many), is_room=sign < 0.0)
             for j, one in enumerate(surfaces) if j != k and (sign < 0.0 or one.is_there(self.time))
         )  # fmt: skip
 
+    def open(self, volumes: Iterable[Surface]) -> tuple[Cover, ...]:
+        """Those by volumes in which a wall is open."""
+        return tuple(Cover(one, -1.0, sign_of(one), self.time) for one in volumes if one.is_there(self.time))
+
     def add(self, part: Part) -> None:
         """Add a part, or what it consists of."""
-        whole = part.surface
+        whole, solid = part.surface, part.solid ^ part.surface.is_solid()
         if not isinstance(whole, Joined):
-            volumes = (one for one in whole.open_volumes() if one.is_there(self.time))
-            opened = tuple(Cover(one, -1.0, sign_of(one), self.time) for one in volumes)
-            self.parts.append(replace(part, solid=part.solid ^ whole.is_solid(), covers=(*part.covers, *opened)))
+            doorways = self.open(self.doorways.get((part.owner, part.place), ()))
+            covers = (*part.covers, *self.open(whole.open_volumes()))
+            self.parts.append(replace(part, solid=solid, covers=covers, doorways=doorways))
             return
         parts = [handed_down(whole, one) for one in whole.parts]
         turned = tuple(replace(one, turn=one.turn * side_of(whole)) for one in part.covers)
-        solid, sign = part.solid ^ whole.is_solid(), -1.0 if isinstance(whole, Union) else 1.0
         for k, one in enumerate(parts):
-            covers = (*turned, *self.beside(parts, k, sign))
+            covers = (*turned, *self.beside(parts, k, -1.0 if isinstance(whole, Union) else 1.0))
             self.add(Part(part.owner, (*part.place, k), one, solid, covers))

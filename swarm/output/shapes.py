@@ -121,7 +121,7 @@ def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
     if not any(isinstance(surface, Joined) for surface in scene.surfaces):
         return {}
     found: dict[int, list[Shape]] = {}
-    for part in parts_of(scene.surfaces, time):
+    for part in parts_of(scene, time):
         whole = scene.surfaces[part.owner]
         if not bodies_of(whole):
             there = part.surface.is_there(time)

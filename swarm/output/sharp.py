@@ -43,11 +43,8 @@ class _Placed(NamedTuple):
         """The level of where the wall is none."""
 
         def above(points: Floats) -> Floats:
-            found = np.full(len(points), -self.size)
-            if covers:
-                outwards = self.side() * self.pose.turned(wall.normals(points).T).T
-                places = self.pose.placed(points.T).T
-                found = np.max([cover.level(places, outwards, self.size) for cover in covers], axis=0)
+            outwards = self.side() * self.pose.turned(wall.normals(points).T).T
+            found = self.part.level(self.pose.placed(points.T).T, outwards, self.size, covers)
             for other in others:
                 steep = np.maximum(np.sqrt((other.gradient(points) ** 2).sum(axis=1)), 1e-300)
                 found = np.maximum(found, other.phi(points) / steep)

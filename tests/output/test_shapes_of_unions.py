@@ -66,6 +66,20 @@ SCENES = {
 }
 
 
+def test_a_doorway_is_open_in_both_walls():
+    """A door in the wall between two rooms that touch; one that is shut, and one of a wall with nothing behind."""
+    hole = swarm.Cylinder(0.1, (1.0, 0.0, 0.0), 0.2, (0.5, 0.0, 0.0))
+    for times, area in ((None, math.pi * 0.01), ([(0.0, 1.0)], math.pi * 0.01), ([(1.0, 2.0)], 0.0)):
+        first = swarm.Box((0.5, 0.5, 0.5), openings=[swarm.Opening(hole, times)])
+        scene = swarm.Scene([swarm.Union([first, swarm.Box((0.5, 0.5, 0.5), (1.0, 0.0, 0.0))])])
+        assert [shape.area() for shape in shapes_of(scene, NOWHERE)] == pytest.approx(2 * [6.0 - area], rel=1e-3)
+    low = swarm.Opening(swarm.Box((0.1, 0.1, 0.1), (0.5, 0.0, -0.5)), between=True)
+    rooms = swarm.Union([swarm.Box((0.5, 0.5, 0.5), openings=[low]), swarm.Box((0.5, 0.5, 0.5), (1.0, 0.0, 0.0))])
+    shapes = shapes_of(swarm.Scene([rooms]), NOWHERE)
+    # The door reaches through the floor, which stays.
+    assert [shape.area() for shape in shapes] == pytest.approx(2 * [5.98], rel=1e-3)
+
+
 def normals_of(shape):
     a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
